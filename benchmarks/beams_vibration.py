@@ -24,7 +24,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.vibration import Masses, frequencies
+from cfmkit.elastica.vibration import NetworkMasses, frequencies
 
 MM, DENSITY, COUNT = 1e-3, 1410.0, 3
 SECTION = Section(2e9, 10 * MM, 1 * MM)
@@ -71,7 +71,7 @@ def main() -> None:
         network = build()
         drive = Displacement(node, -np.pi / 2, np.linspace(0, down, 31)[1:])
         path = trace(network, drive, Control(tolerance=1e-9, branch="primary"))
-        weights = Masses(dict.fromkeys(network.beams, DENSITY), masses)
+        weights = NetworkMasses(dict.fromkeys(network.beams, DENSITY), masses)
         ours = frequencies(path, weights, COUNT, [len(path) - 1])
         coarse, fine = (_opensees(ops, path, drive, count, masses) for count in (40, 80))
         print(name)

@@ -19,7 +19,7 @@ from cfmkit import api
 from cfmkit.elastica import Displacement, trace
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.methods import carry_out
@@ -34,7 +34,8 @@ def block() -> np.ndarray:
     """Return the forces of many designs at many travels."""
     thickness = np.linspace(0.6, 1.2, DESIGNS)[:, None]
     leaf, side = (
-        Strip(length, np.radians(7), t, b, 1477.0, 0.3) for length, t, b in ((35.0, thickness, 6.0), (25.0, 1.5, 10.0))
+        LeafStrip(length, np.radians(7), t, b, 1477.0, 0.3)
+        for length, t, b in ((35.0, thickness, 6.0), (25.0, 1.5, 10.0))
     )
     travel = np.linspace(0.0, 6.0, POINTS)[None, :]
     return 4 * VBeam(leaf).force(travel) + Diamond(side).force(travel)
@@ -63,7 +64,7 @@ def peer(points: int = 100) -> np.ndarray:
 def main() -> None:
     """Print one line per part."""
     spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml")
-    ours = VBeam(Strip(35.0, np.radians(7), 1.0, 6.0, 1477.0, 0.3)).s_force(np.linspace(0.01, 0.9, 100))
+    ours = VBeam(LeafStrip(35.0, np.radians(7), 1.0, 6.0, 1477.0, 0.3)).s_force(np.linspace(0.01, 0.9, 100))
     print(f"the peer's forces differ by {np.abs(peer() / ours - 1).max():.1e}")
     values, alone = DESIGNS * POINTS / best(block), 100 / best(peer)
     verdict = "goal met" if values >= GOALS["values"] else "goal missed"

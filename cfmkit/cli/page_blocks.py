@@ -74,7 +74,7 @@ class GridColumn(NamedTuple):
     wraps: bool = True
 
 
-class Grid(NamedTuple):
+class CellGrid(NamedTuple):
     """Cells in columns, without lines between them.
 
     Attributes
@@ -107,7 +107,7 @@ class JsonText(NamedTuple):
     data: Record
 
 
-Block = TextLine | Paragraph | Grid | Verbatim | JsonText
+Block = TextLine | Paragraph | CellGrid | Verbatim | JsonText
 
 
 def line(text: str, tone: str = PLAIN) -> TextLine:
@@ -167,7 +167,7 @@ def listed(heading: str, records: Iterable[Record], fields: Sequence[Field]) -> 
     yield BLANK
     if heading:
         yield line(heading, LABEL)
-    yield Grid(tuple(GridColumn(one.head, one.wraps) for one in fields), rows, gap=2, indented=True)
+    yield CellGrid(tuple(GridColumn(one.head, one.wraps) for one in fields), rows, gap=2, indented=True)
 
 
 class Written(NamedTuple):

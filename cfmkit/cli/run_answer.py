@@ -10,7 +10,7 @@ from cfmkit.cli.answer import Answer
 from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
-    Grid,
+    CellGrid,
     Paragraph,
     Span,
     Written,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.runs.run import Outcome, Verb
+    from cfmkit.runs.run import FinishedRun, Verb
     from cfmkit.runs.run_findings import Report
 
 
@@ -66,7 +66,7 @@ def folder_of(options: OneSpec, verb: str) -> str:
     return str(Path("cfm-out") / f"{Path(options.spec).stem}-{verb}")
 
 
-def answer(outcome: Outcome, everything: bool) -> Answer:
+def answer(outcome: FinishedRun, everything: bool) -> Answer:
     """Return the answer of a finished run; its page shows what matters most, or everything."""
     found = outcome.report
     spec = found.result.spec
@@ -92,7 +92,7 @@ def _complaints(found: Report) -> list[str]:
     return [*partial, *(f"missed   {outcome.sentence.removesuffix(': missed')}" for outcome in found.missed)]
 
 
-def _page(outcome: Outcome, written: Written, everything: bool) -> Iterator[Block]:
+def _page(outcome: FinishedRun, written: Written, everything: bool) -> Iterator[Block]:
     """Yield a header, the numbers that matter, how the run ended, warnings, files."""
     from cfmkit.cli.run_numbers import rows, searched
 
@@ -102,7 +102,7 @@ def _page(outcome: Outcome, written: Written, everything: bool) -> Iterator[Bloc
     yield BLANK
     if listed := rows(found, everything):
         cells = [(f"  {row.label}", row.value, row.bound, verdict(row.ok)) for row in listed]
-        yield Grid(columns(True, True, False, False), cells)
+        yield CellGrid(columns(True, True, False, False), cells)
         yield BLANK
     for word, text in found.supplement.lines:
         yield Paragraph(word, text)
@@ -128,7 +128,7 @@ def _ending(found: Report) -> Iterator[Block]:
         yield Paragraph("missed", f"{len(found.missed)} of {len(found.requirements)} requirements", BAD)
 
 
-def _warnings(outcome: Outcome) -> Iterator[Block]:
+def _warnings(outcome: FinishedRun) -> Iterator[Block]:
     """Yield the warnings that say more than the run's message, each with the commands that would cure it."""
     for item in outcome.report.warnings:
         if item.message == outcome.report.result.message:
@@ -138,7 +138,7 @@ def _warnings(outcome: Outcome) -> Iterator[Block]:
             yield whole_line(Span(" " * MARGIN + _cure(outcome, cure)))
 
 
-def _cure(outcome: Outcome, cure: str) -> str:
+def _cure(outcome: FinishedRun, cure: str) -> str:
     """Return the command line that applies a cure to the spec of a run, changed as it was."""
     verb = "design" if cure.startswith("design.") else outcome.verb.name
     path = cure.partition("=")[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
-from cfmkit.cli.page_blocks import FAINT, Grid, JsonText, Paragraph, Span, TextLine, Verbatim
+from cfmkit.cli.page_blocks import FAINT, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class Terminal:
             return _json(block.data)
         return self._rendered(block)
 
-    def _rendered(self, block: TextLine | Paragraph | Grid) -> str:
+    def _rendered(self, block: TextLine | Paragraph | CellGrid) -> str:
         from rich.console import Console
 
         page = io.StringIO()
@@ -131,9 +131,9 @@ def _json(data: Mapping[str, Any]) -> str:
     return json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n"
 
 
-def _renderables(block: TextLine | Paragraph | Grid, width: int) -> Iterator[RenderableType]:
+def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator[RenderableType]:
     """Yield what rich prints of a block; of a paragraph line by line."""
-    if isinstance(block, Grid):
+    if isinstance(block, CellGrid):
         yield _table(block)
     elif isinstance(block, Paragraph):
         import textwrap
@@ -163,7 +163,7 @@ def _text(*spans: Span, whole: bool = False) -> Text:
     return text
 
 
-def _table(block: Grid) -> Table:
+def _table(block: CellGrid) -> Table:
     from rich.table import Table
 
     headed = any(column.head for column in block.columns)

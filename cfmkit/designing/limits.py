@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from cfmkit.designing.sqp_program import Rows
+    from cfmkit.designing.sqp_program import LimitRows
 
 STILL = 1e-9
 """A row that no variable moves by more than this is met or missed whatever the design: it holds nothing."""
@@ -25,12 +25,12 @@ class Missed:
     about: str
 
 
-def worst(rows: Iterable[Rows]) -> float:
+def worst(rows: Iterable[LimitRows]) -> float:
     """Return by how much the worst row is missed; zero or less where all hold."""
     return max((-float(one.values.min(initial=0.0)) for one in rows), default=0.0)
 
 
-def missed(rows: Iterable[Rows], allowed: float) -> list[Missed]:
+def missed(rows: Iterable[LimitRows], allowed: float) -> list[Missed]:
     """Return the limits that are missed by more than what counts as nothing, the worst first."""
     found: dict[str, Missed] = {}
     for one in rows:
@@ -42,7 +42,7 @@ def missed(rows: Iterable[Rows], allowed: float) -> list[Missed]:
     return sorted(found.values(), key=lambda one: (-one.by, one.name, one.about))
 
 
-def held(rows: Iterable[Rows], close: float) -> Iterator[str]:
+def held(rows: Iterable[LimitRows], close: float) -> Iterator[str]:
     """Yield what holds a design: the rows that are nearly zero and move with it, as ``limit: about``."""
     for one in rows:
         about = one.about()

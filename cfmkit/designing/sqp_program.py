@@ -24,7 +24,7 @@ def _unnamed() -> list[str]:
 
 
 @dataclass(frozen=True)
-class Rows:
+class LimitRows:
     """Some rows of one limit; each must be at least zero, all are of order one.
 
     Attributes
@@ -51,7 +51,7 @@ class SeenPoint:
 
     objective: float
     slope: FloatArray | None
-    rows: Sequence[Rows]
+    rows: Sequence[LimitRows]
 
 
 class Source(Protocol):
@@ -93,7 +93,7 @@ def slopes(source: Source, z: FloatArray, elastic: tuple[str, ...] = ()) -> tupl
     return objective, np.concatenate([np.zeros((0, len(z))), *(_wide(one, len(z), elastic) for one in seen.rows)])
 
 
-def _wide(rows: Rows, count: int, elastic: tuple[str, ...]) -> FloatArray:
+def _wide(rows: LimitRows, count: int, elastic: tuple[str, ...]) -> FloatArray:
     """Return the derivatives of rows by all variables."""
     wide = np.zeros((len(rows.values), count))
     if rows.slopes is not None:

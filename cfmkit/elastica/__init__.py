@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.batch import Outcome, trace_many
+    from cfmkit.elastica.continuation.batch import NetworkOutcome, trace_many
     from cfmkit.elastica.continuation.tracing import trace
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
 
 _HOMES = {
-    "continuation.batch": ("Outcome", "trace_many"),
+    "continuation.batch": ("NetworkOutcome", "trace_many"),
     "continuation.tracing": ("trace",),
     "model.beam": ("Beam",),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
@@ -86,8 +86,8 @@ __all__ = [
     "Link",
     "Loading",
     "Network",
+    "NetworkOutcome",
     "Node",
-    "Outcome",
     "Path",
     "PathStatus",
     "PointLoad",

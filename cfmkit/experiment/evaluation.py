@@ -26,7 +26,7 @@ from cfmkit.experiment.hysteresis import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import settled
-from cfmkit.metrics import Frame, Window, measure
+from cfmkit.metrics import MeasuringFrame, Window, measure
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
@@ -341,14 +341,16 @@ class Measurement:
     warnings: tuple[Finding, ...] = ()
 
 
-def numbers_of(source: MeasuredCurves, frame: Frame | None = None, window: Window | None = None) -> Measurement:
+def numbers_of(
+    source: MeasuredCurves, frame: MeasuringFrame | None = None, window: Window | None = None
+) -> Measurement:
     """Return the metrics of a measured mechanism, raw and filtered, and its repeatability.
 
     Parameters
     ----------
     source : MeasuredCurves
         With at least one cycle or branch.
-    frame : Frame, optional
+    frame : MeasuringFrame, optional
         Target and so on.
     window : Window, optional
         Default: what every branch of every cycle covers.
@@ -359,8 +361,8 @@ def numbers_of(source: MeasuredCurves, frame: Frame | None = None, window: Windo
         If a branch does not cover the window.
     """
     window, warnings = _window(source, window)
-    each = tuple(measure(curve, frame or Frame(), window) for curve in source.raw)
-    smooth = tuple(measure(curve, frame or Frame(), window) for curve in source.filtered)
+    each = tuple(measure(curve, frame or MeasuringFrame(), window) for curve in source.raw)
+    smooth = tuple(measure(curve, frame or MeasuringFrame(), window) for curve in source.filtered)
     raw = _mean(each) | repeatability(source.raw, window)
     return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.curves import Curve
-    from cfmkit.metrics import Frame, Window
+    from cfmkit.metrics import MeasuringFrame, Window
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.results import Finding
 
@@ -69,7 +69,9 @@ def _ends(report: MeasureReport) -> dict[str, Any]:
     return {"from": low, "to": high, "unit": border_unit(dimension)}
 
 
-def report_on(source: MeasuredCurves, frame: Frame | None = None, window: Window | None = None) -> MeasureReport:
+def report_on(
+    source: MeasuredCurves, frame: MeasuringFrame | None = None, window: Window | None = None
+) -> MeasureReport:
     """Return the report on a measured mechanism."""
     return MeasureReport(source, numbers_of(source, frame, window))
 

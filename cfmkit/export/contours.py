@@ -226,7 +226,7 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Dimension:
+class DrawnDimension:
     """A length that a drawing states: between two points, measured along x, along y or straight.
 
     Attributes
@@ -265,7 +265,7 @@ class Drawing:
     tables: tuple[Curve2D, ...] = ()
     notes: tuple[str, ...] = ()
     sheet: Sheet = Sheet()
-    dimensions: tuple[Dimension, ...] = ()
+    dimensions: tuple[DrawnDimension, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
 
     @property

@@ -95,7 +95,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Offer:
+class FamilyOffer:
     """What a family could do with a wish.
 
     Attributes

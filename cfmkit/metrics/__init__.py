@@ -5,7 +5,7 @@ windows, `branch_views` is what a metric looks at, `evaluation` runs the table o
 curve, `requirements` compares with bounds, `metrics_json` writes border units.
 """
 
-from cfmkit.metrics.branch_views import Branch, Cycle, Frame
+from cfmkit.metrics.branch_views import Branch, Cycle, MeasuringFrame
 from cfmkit.metrics.evaluation import (
     Survey,
     evaluate,
@@ -40,7 +40,7 @@ __all__ = [
     "BranchTrace",
     "Cycle",
     "Definition",
-    "Frame",
+    "MeasuringFrame",
     "Outcome",
     "Survey",
     "Undefined",

@@ -32,7 +32,7 @@ ZERO = 1e-9
 
 
 @dataclass(frozen=True)
-class Frame:
+class MeasuringFrame:
     """What a curve is measured against.
 
     Attributes
@@ -117,7 +117,7 @@ class Branch:
         The whole branch, in path order.
     kind : {"force", "torque"}
         What its effort is.
-    frame : Frame
+    frame : MeasuringFrame
         What it is measured against.
     window : Window or None
         Where it is measured; None: everywhere.
@@ -125,7 +125,7 @@ class Branch:
 
     trace: BranchTrace
     kind: Kind
-    frame: Frame
+    frame: MeasuringFrame
     window: Window | None = None
 
     @property
@@ -347,7 +347,7 @@ class Cycle:
     """All branches of a curve together."""
 
     branches: tuple[Branch, ...]
-    frame: Frame
+    frame: MeasuringFrame
 
     @property
     def closed(self) -> tuple[ManyBranches, ...]:
@@ -361,7 +361,7 @@ class Cycle:
         return usable_interval(self)
 
 
-def cycle(curve: Curve, frame: Frame, window: Window | None = None) -> Cycle:
+def cycle(curve: Curve, frame: MeasuringFrame, window: Window | None = None) -> Cycle:
     """Return a curve as metrics see it."""
     return Cycle(tuple(Branch(trace, curve.kind, frame, window) for trace in traces(curve)), frame)
 

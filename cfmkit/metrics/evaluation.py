@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.errors import UsageError
-from cfmkit.metrics.branch_views import Cycle, Frame, cycle, span_text
+from cfmkit.metrics.branch_views import Cycle, MeasuringFrame, cycle, span_text
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, time_of, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, covers, traces
@@ -103,13 +103,13 @@ def _value(function: Callable[..., float], subject: object) -> Value:
     return Value(value) if isfinite(value) else Value(None, "it is not finite")
 
 
-def survey(curve: Curve, frame: Frame, window: Window | None = None) -> Survey:
+def survey(curve: Curve, frame: MeasuringFrame, window: Window | None = None) -> Survey:
     """Return the metrics of a curve, measured in a frame over a window."""
     return Survey(cycle(curve, frame, window))
 
 
 def measure(
-    curve: Curve, frame: Frame, window: Window | None = None, extra: Iterable[Definition] = ()
+    curve: Curve, frame: MeasuringFrame, window: Window | None = None, extra: Iterable[Definition] = ()
 ) -> dict[str, Quantity]:
     """Return every metric of a curve by name, with ``[branch]`` variants where there are several branches.
 
@@ -117,7 +117,7 @@ def measure(
     ----------
     curve : Curve
         Computed or measured.
-    frame : Frame
+    frame : MeasuringFrame
         Target, reference pose, allowable stress, band.
     window : Window, optional
         Where to measure; default: the whole of each branch.
@@ -155,10 +155,10 @@ def _quantity(definition: Definition, value: Value) -> Quantity:
     return Quantity(value.value, definition.dimension, definition.definition, value.reason)
 
 
-def frame_of(result: Result) -> Frame:
+def frame_of(result: Result) -> MeasuringFrame:
     """Return what the curves of a result are measured against."""
-    band = getattr(getattr(result.spec, "analysis", None), "band", Frame.band)
-    return Frame(
+    band = getattr(getattr(result.spec, "analysis", None), "band", MeasuringFrame.band)
+    return MeasuringFrame(
         result.target,
         result.reference,
         result.allowable_stress,

@@ -17,7 +17,7 @@ from cfmkit.curves import Curve
 from cfmkit.metrics import frame_of, window_of
 from cfmkit.plots.bands import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_diagram import Limit, Region, level, padded, shade
+from cfmkit.plots.line_diagram import Limit, MarkedRange, level, padded, shade
 from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, styled
 from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result
@@ -51,7 +51,7 @@ class CurveLook:
         Requirement bands, names beside the lines, arrows along the path.
     levels : tuple of Limit
         Dashed lines to compare with.
-    regions : tuple of Region
+    regions : tuple of MarkedRange
         Parts of the motion to shade and name.
     window : ((float, float), (float, float)), optional
         Limits of motion and effort in SI; default: everything, zero effort included.
@@ -61,7 +61,7 @@ class CurveLook:
     names: bool = True
     arrows: bool = True
     levels: tuple[Limit, ...] = ()
-    regions: tuple[Region, ...] = ()
+    regions: tuple[MarkedRange, ...] = ()
     window: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 

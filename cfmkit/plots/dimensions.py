@@ -33,7 +33,7 @@ _MONO: dict[str, Any] = {"family": "DejaVu Sans Mono", "fontsize": SMALL - 0.3}
 
 
 @dataclass(frozen=True)
-class Dimension:
+class DrawingSymbol:
     """A symbol of the drawing, the key of the specification that sets it, and what it is."""
 
     symbol: str
@@ -42,7 +42,7 @@ class Dimension:
 
 
 @styled
-def drawing(title: str, size_mm: tuple[float, float], known: Sequence[Dimension]) -> tuple[Figure, Axes]:
+def drawing(title: str, size_mm: tuple[float, float], known: Sequence[DrawingSymbol]) -> tuple[Figure, Axes]:
     """Return a figure with room for a mechanism of some size [mm, drawn to scale] above the table of its dimensions.
 
     The coordinates of the axes are millimetres from their lower left corner.

@@ -33,7 +33,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Region:
+class MarkedRange:
     """A part of the horizontal axis that is special: where it starts and stops [SI], and why."""
 
     start: float
@@ -79,7 +79,7 @@ class Diagram:
         Lines, each of n values.
     limits : sequence of Limit
         Horizontal lines.
-    regions : sequence of Region
+    regions : sequence of MarkedRange
         Shaded parts of the horizontal axis.
     """
 
@@ -88,7 +88,7 @@ class Diagram:
     y: Scale
     series: Sequence[Series]
     limits: Sequence[Limit] = ()
-    regions: Sequence[Region] = ()
+    regions: Sequence[MarkedRange] = ()
 
 
 @styled
@@ -175,7 +175,7 @@ def level(ax: Axes, height: float, text: str, color: str = GREY) -> Label:
     return Label(text, color, np.column_stack([np.linspace(low, high, 40), np.full(40, height)]), prefer=0.9)
 
 
-def shade(ax: Axes, region: Region, dimension: str) -> Label:
+def shade(ax: Axes, region: MarkedRange, dimension: str) -> Label:
     """Shade a part of the horizontal axis over the full height; return its name, still to be placed."""
     start, stop = (float(to_border(value, dimension)) for value in (region.start, region.stop))
     ax.axvspan(start, stop, color=TROUBLE, alpha=0.12, linewidth=0, zorder=0.5, gid="no-obstacle")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import UNCUT, Arc, Dimension, Line, Smooth
+from cfmkit.export.contours import UNCUT, Arc, DrawnDimension, Line, Smooth
 from cfmkit.export.layers import HELD
 from cfmkit.plots.parts import mm
 from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
@@ -118,13 +118,13 @@ def holes(drawing: Drawing) -> Iterator[_Hole]:
     yield from sorted(found, key=lambda hole: (round(hole.diameter, 9), round(hole.y, 9), round(hole.x, 9)))
 
 
-def _overall(drawing: Drawing) -> list[Dimension]:
+def _overall(drawing: Drawing) -> list[DrawnDimension]:
     """Return width and height over everything that is cut."""
     x0, y0, x1, y1 = drawing.extents
-    return [Dimension("overall", (x0, y0), (x1, y0), "x"), Dimension("overall", (x0, y0), (x0, y1), "y")]
+    return [DrawnDimension("overall", (x0, y0), (x1, y0), "x"), DrawnDimension("overall", (x0, y0), (x0, y1), "y")]
 
 
-def _same(one: Dimension, other: Dimension) -> bool:
+def _same(one: DrawnDimension, other: DrawnDimension) -> bool:
     """Return whether two dimensions along the same axis have the same ends."""
     axis = "xy".find(one.along)
     if one.along != other.along or axis < 0:
@@ -198,7 +198,7 @@ def _is_clear(
 
 
 def _dimensions(
-    ax: Axes, dimensions: Sequence[Dimension], box: tuple[float, float, float, float], scale: float
+    ax: Axes, dimensions: Sequence[DrawnDimension], box: tuple[float, float, float, float], scale: float
 ) -> None:
     """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
     across = sorted((one for one in dimensions if one.along == "x"), key=lambda one: one.value)
@@ -219,7 +219,7 @@ def _dimensions(
             _line(ax, (start[0], start[1]), (end[0], end[1]), _text(one), scale)
 
 
-def _text(one: Dimension) -> str:
+def _text(one: DrawnDimension) -> str:
     return f"{one.name} {format_short(one.value, 'length')}"
 
 

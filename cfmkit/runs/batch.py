@@ -14,11 +14,11 @@ from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, li
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import batch_files
-from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
+from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch_entries import LEFT, Entry
-from cfmkit.studies.metric_changes import TOLERANCE, Comparison, earlier, gone
+from cfmkit.studies.metric_changes import TOLERANCE, BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes import changes as changes_of
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def _verb(name: str, fresh: bool) -> Verb:
     return Verb("analyze", "analysed", analysed)
 
 
-def _ended(entry: Entry, outcome: Outcome) -> Entry:
+def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
     """Return what became of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
     told = [one["sentence"] for one in data["requirements"] if not one["ok"]]
@@ -292,7 +292,7 @@ class BatchResult:
         The output folder; each specification has one of its own below.
     files : tuple of str
         What was written there.
-    compared : Comparison or None
+    compared : BatchComparison or None
         With an earlier batch.
     """
 
@@ -300,7 +300,7 @@ class BatchResult:
     exit_code: ExitCode
     folder: str
     files: tuple[str, ...]
-    compared: Comparison | None = None
+    compared: BatchComparison | None = None
 
     @property
     def summary(self) -> Mapping[str, Any]:
@@ -455,8 +455,8 @@ def batch(
     return BatchResult(entries, code, place, written, compared)
 
 
-def _compared(before: Known, folder: str, entries: Sequence[Entry], place: str, tolerance: float) -> Comparison:
-    return Comparison(folder, tolerance, changes_of(before, entries, place, tolerance), gone(before, entries))
+def _compared(before: Known, folder: str, entries: Sequence[Entry], place: str, tolerance: float) -> BatchComparison:
+    return BatchComparison(folder, tolerance, changes_of(before, entries, place, tolerance), gone(before, entries))
 
 
 def _named(specs: Any) -> list[str]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.metric_changes import Comparison
+    from cfmkit.studies.metric_changes import BatchComparison
 
 
 def about(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitCode) -> dict[str, Any]:
@@ -29,7 +29,11 @@ def about(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitC
 
 
 def write(
-    folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool, compared: Comparison | None = None
+    folder: RunFolder,
+    entries: Sequence[Entry],
+    about: dict[str, Any],
+    page: bool,
+    compared: BatchComparison | None = None,
 ) -> tuple[str, ...]:
     """Write what a batch found out, and return the names of the files."""
     from cfmkit.studies.batch_entries import message, requirements_table, results_table
@@ -49,7 +53,7 @@ def write(
     return (*folder.commit(about).files, "manifest.json")
 
 
-def data(entries: Sequence[Entry], code: ExitCode, compared: Comparison | None = None) -> dict[str, Any]:
+def data(entries: Sequence[Entry], code: ExitCode, compared: BatchComparison | None = None) -> dict[str, Any]:
     """Return what metrics.json says."""
     from cfmkit.studies.batch_entries import message
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.metric_changes import Comparison
+    from cfmkit.studies.metric_changes import BatchComparison
 
 MOST_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""
@@ -20,20 +20,20 @@ MOST_CHANGES = 50
 MARKUP = re.compile(r"([\\`*_\[\]<>|~&@#])")
 
 
-def summary(entries: Sequence[Entry], compared: Comparison | None = None) -> bytes:
+def summary(entries: Sequence[Entry], compared: BatchComparison | None = None) -> bytes:
     """Return the summary: one row per specification, what is missed, and what has changed.
 
     Parameters
     ----------
     entries : sequence of Entry
         Every specification of the batch.
-    compared : Comparison, optional
+    compared : BatchComparison, optional
         With an earlier batch.
     """
     return ("\n".join(_lines(entries, compared)) + "\n").encode()
 
 
-def _lines(entries: Sequence[Entry], compared: Comparison | None) -> Iterator[str]:
+def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterator[str]:
     yield f"## cfmkit: {plain(message(entries))}"
     yield ""
     yield "| specification | verb | verdict | requirements | warnings |"
@@ -64,7 +64,7 @@ def _troubles(one: Entry) -> Iterator[str]:
         yield f"- {plain(one.spec)}: {plain(one.message)}"
 
 
-def _compared(compared: Comparison) -> Iterator[str]:
+def _compared(compared: BatchComparison) -> Iterator[str]:
     count = len(compared.beyond)
     yield from ("", f"### Compared with {plain(compared.folder)}", "")
     if not compared.changes:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.plots.dimensions import Dimension
+    from cfmkit.plots.dimensions import DrawingSymbol
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -26,14 +26,14 @@ class FamilyDrawing:
     ----------
     family : str
         Its name.
-    dimensions : tuple of Dimension
+    dimensions : tuple of DrawingSymbol
         Symbols of the drawing, the keys that set them, and what they are.
     figure : callable
         Draws it.
     """
 
     family: str
-    dimensions: tuple[Dimension, ...]
+    dimensions: tuple[DrawingSymbol, ...]
     figure: Callable[[], Figure]
 
 

@@ -75,12 +75,12 @@ def measure(
     from cfmkit.experiment.measurement_options import read_target, read_window
     from cfmkit.experiment.reading import Recording, read_recording
     from cfmkit.experiment.report import report_on
-    from cfmkit.metrics import Frame
+    from cfmkit.metrics import MeasuringFrame
 
     low_pass = filter if filter == "default" else read_filter(filter)
     recording = data if isinstance(data, Recording) else read_recording(_file(data), units)
     place = read_window(window, recording.kind)
-    frame = Frame(target=read_target(target, recording.kind))
+    frame = MeasuringFrame(target=read_target(target, recording.kind))
     recording = corrected(recording, tare, zero, _each(flip))
     source = measured(recording, low_pass, () if as_recorded else LEFT_OUT)
     if not one_branch:

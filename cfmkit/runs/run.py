@@ -66,7 +66,7 @@ class Verb:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FinishedRun:
     """Everything about a finished run that is shown: the report, where it was written, how long it took."""
 
     verb: Verb
@@ -142,7 +142,7 @@ class Request:
 
 def carry_out(
     verb: Verb, wanted: Request, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
-) -> Outcome:
+) -> FinishedRun:
     """Return what a run found, after writing its folder.
 
     Parameters
@@ -170,7 +170,7 @@ def carry_out(
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))
         kept = dict(folder.kept)
     seconds = time.perf_counter() - start
-    return Outcome(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
+    return FinishedRun(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
 
 
 def spec_of(wanted: RunRequest) -> Spec:

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfmkit.errors import QuantityError
 from cfmkit.specs.block import Model
 from cfmkit.specs.data_files import DataSource
-from cfmkit.specs.units import Displacement, Place, Quantity, format_quantity, format_short, read_quantity
+from cfmkit.specs.units import Displacement, Place, UnitField, format_quantity, format_short, read_quantity
 from cfmkit.specs.units.fields import plain_schema
 
 if TYPE_CHECKING:
@@ -31,34 +31,34 @@ MOTION_OF = {"force": "length", "torque": "angle"}
 MOST_POINTS = 10_000
 
 
-class Measured(float):
+class DimensionedFloat(float):
     """An SI float that knows its dimension."""
 
     __slots__ = ("dimension",)
     dimension: str
 
-    def __new__(cls, value: float, dimension: str) -> Measured:
+    def __new__(cls, value: float, dimension: str) -> DimensionedFloat:
         """Return `value` as a number of that dimension."""
         number = super().__new__(cls, value)
         number.dimension = dimension
         return number
 
-    def __reduce__(self) -> tuple[type[Measured], tuple[float, str]]:
+    def __reduce__(self) -> tuple[type[DimensionedFloat], tuple[float, str]]:
         """Return what copying and pickling need."""
         return type(self), (float(self), self.dimension)
 
 
 @dataclass(frozen=True)
-class _OneOf(Quantity):
+class _OneOf(UnitField):
     """Text of one of several dimensions, which the number then knows; a plain number is of the first."""
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator and the serialiser."""
 
-        def read(value: Any) -> Measured:
-            return value if isinstance(value, Measured) else Measured(*self.read(value))
+        def read(value: Any) -> DimensionedFloat:
+            return value if isinstance(value, DimensionedFloat) else DimensionedFloat(*self.read(value))
 
-        def write(value: Measured) -> str:
+        def write(value: DimensionedFloat) -> str:
             return format_quantity(value, getattr(value, "dimension", self.dimensions[0]))
 
         return plain_schema(read, write)
@@ -151,7 +151,9 @@ class Target(Model):
         if isinstance(self.file, DataSource):
             return Target(points=_from_file(self.file), interpolation=self.interpolation)
         if self.stiffness is not None and self.start is None and level:
-            return self.model_copy(update={"start": Measured(level, EFFORTS[SLOPES.index(_dim(self.stiffness))])})
+            return self.model_copy(
+                update={"start": DimensionedFloat(level, EFFORTS[SLOPES.index(_dim(self.stiffness))])}
+            )
         return self
 
 
@@ -177,7 +179,7 @@ _HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*\[(?P<unit>[^\[\]]+)\]\s*")
 _COLUMNS = {"displacement": "length", "force": "force", "angle": "angle", "torque": "torque"}
 
 
-def _from_file(source: DataSource) -> tuple[tuple[Place, Measured], ...]:
+def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]:
     """Return the points of a CSV.
 
     Raises
@@ -207,7 +209,7 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, Measured], ...]:
             except (QuantityError, IndexError) as problem:
                 told = str(problem) if isinstance(problem, QuantityError) else f"no {name}"
                 raise ValueError(f"{source}:{line}: {told}") from None
-        points.append((Place(numbers[0], _COLUMNS[pair[0]]), Measured(numbers[1], _COLUMNS[pair[1]])))
+        points.append((Place(numbers[0], _COLUMNS[pair[0]]), DimensionedFloat(numbers[1], _COLUMNS[pair[1]])))
     if not 2 <= len(points) <= MOST_POINTS:
         raise ValueError(f"{source}: a curve has 2 to {MOST_POINTS} points, not {len(points)}")
     try:

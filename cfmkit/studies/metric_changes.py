@@ -69,7 +69,7 @@ class MetricChange:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class BatchComparison:
     """A batch beside an earlier one.
 
     Attributes

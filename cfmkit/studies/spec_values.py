@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units import BareFloat, Quantity, place_of
+from cfmkit.specs.units import BareFloat, UnitField, place_of
 from cfmkit.specs.units.fields import described
 from cfmkit.specs.yamlio.allowed_keys import Slot, expected, required
 from cfmkit.specs.yamlio.explain_errors import not_among
@@ -44,7 +44,7 @@ class Leaf:
         Dotted, with indices for the items of lists.
     kind : str
         "quantity" (a number with a unit), "number", "whole" number, "word" or "switch".
-    quantity : Quantity or None
+    quantity : UnitField or None
         How a quantity is read.
     choices : tuple
         The words of a closed choice.
@@ -52,7 +52,7 @@ class Leaf:
 
     path: str
     kind: Kind
-    quantity: Quantity | None = None
+    quantity: UnitField | None = None
     choices: tuple[Any, ...] = ()
 
     def read(self, given: Any) -> tuple[Value, str]:
@@ -77,7 +77,7 @@ class Leaf:
             return given, "text"
         return self._number(given)
 
-    def _quantity(self, given: Any, quantity: Quantity) -> tuple[Value, str]:
+    def _quantity(self, given: Any, quantity: UnitField) -> tuple[Value, str]:
         marked = BareFloat(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
         try:
             value, dimension = quantity.read(marked)

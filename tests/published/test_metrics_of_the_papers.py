@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cfmkit.curves import Curve
-from cfmkit.metrics import Frame, Window, measure
+from cfmkit.metrics import MeasuringFrame, Window, measure
 
 # [L] Table 3's mechanism, recomputed by three independent solvers, every 0.5 mm up to 18 mm [N]
 LAN = """
@@ -34,7 +34,7 @@ def lan():
 def test_lan_operational_range_from_the_printed_table():
     # c = 6.983749 mm and 48.6489 % on the dense curve; the paper prints 7.0 mm, 0.66 cm and 48.5 %. Chords of a table
     # with 0.5 mm steps miss the force by 0.0006 N at c (below) and at 13.6 mm (above): 0.003 mm of c together
-    found = measure(lan(), Frame(), Window(0, 13.6e-3))
+    found = measure(lan(), MeasuringFrame(), Window(0, 13.6e-3))
     start = 13.6e-3 - found["range_95"].value
     assert start == pytest.approx(6.983749e-3, abs=0.0035e-3)
     assert start > 6.983749e-3
@@ -44,19 +44,19 @@ def test_lan_operational_range_from_the_printed_table():
 
 
 def test_lan_force_at_the_end_of_the_range():
-    end = measure(lan(), Frame(), Window(13.5e-3, 13.6e-3))["force_min"].value
+    end = measure(lan(), MeasuringFrame(), Window(13.5e-3, 13.6e-3))["force_min"].value
     assert end == pytest.approx(9.736, abs=0.005)  # rounding of the printed shape moves it by +- 0.0047 N
 
 
 def test_lan_strict_band_of_five_percent():
     # max - min <= 5 % of the max: 47.9 % of the travel, from 7.084 mm (recomputed); the chord lies 0.0025 N low there
-    ripple = measure(lan(), Frame(), Window(7.084e-3, 13.6e-3))["force_ripple"].value
+    ripple = measure(lan(), MeasuringFrame(), Window(7.084e-3, 13.6e-3))["force_ripple"].value
     assert ripple == pytest.approx(0.05, abs=3e-4)
 
 
 def test_ding_fluctuation_and_deviations():
     # [D] sec. 6.2: 10.75 to 11.26 N about 11.15 N on 2 to 4 mm is a fluctuation of 4.5 %, +0.11 and -0.40 N
-    extremes = measure(single([0.002, 0.003, 0.004], [10.75, 11.15, 11.26]), Frame(target=11.15))
+    extremes = measure(single([0.002, 0.003, 0.004], [10.75, 11.15, 11.26]), MeasuringFrame(target=11.15))
     assert 100 * extremes["force_ripple"].value == pytest.approx(4.5, abs=0.05)
     # the paper truncates: 3.587 % is printed as 3.5 %
     assert 100 * extremes["deviation_from_target"].value == pytest.approx(3.587, abs=0.0005)
@@ -90,7 +90,7 @@ def test_bilancia_equation_8_on_the_optimum_of_table_1(start, error):
     dx = np.linspace(0, 35, 101)
     force = np.concatenate([[0.0], slider_crank(dx[1:], start)])
     assert force[30] == pytest.approx(1.5, abs=0.02)
-    found = measure(single(dx * 1e-3, force), Frame(target=1.5))["rms_to_target"].value
+    found = measure(single(dx * 1e-3, force), MeasuringFrame(target=1.5))["rms_to_target"].value
     assert found == pytest.approx(error, abs=1e-7)
 
 
@@ -121,7 +121,7 @@ def test_li_hao_constant_torque_domain_of_figure_12(stiffness, ends):
     pose = math.asin(3 / 60)
     angle = np.radians(np.linspace(-5, 14, 19001))
     torque = limb_torque(angle, stiffness) * 1e-2
-    found = measure(single(angle, torque, "torque"), Frame(reference=pose))["band_range_05pct"]
+    found = measure(single(angle, torque, "torque"), MeasuringFrame(reference=pose))["band_range_05pct"]
     assert found.dimension == "angle"
     assert math.degrees(found.value) == pytest.approx(ends[1] - ends[0], abs=2e-6)
     assert math.degrees(found.value) >= 4.26 - 1.57

@@ -21,7 +21,7 @@ from flexure_support import (
 )
 
 from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure
-from cfmkit.families.slider_crank.printed.pressing import Chain, Ending
+from cfmkit.families.slider_crank.printed.pressing import Chain, PressingEnd
 from cfmkit.families.slider_crank.printed.sizing import rotations
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.numerics.roots import bracketed_root
@@ -32,7 +32,7 @@ DOWN = 2 * STRETCHED - UNLOADED
 
 def force(chain: Chain, travel: list[float], side: int = 0) -> np.ndarray:
     found = chain.press(np.array(travel) * MM, side)
-    assert found.ending is Ending.COMPLETE, found.message
+    assert found.ending is PressingEnd.COMPLETE, found.message
     return found.force
 
 

@@ -15,7 +15,7 @@ from cfmkit.families.vcfm.leaves import v_beam as vbeam
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.springs import force_change, measured_stiffness_for, rest_shift
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
 def printed_diamond_stiffness(strip):
@@ -165,7 +165,7 @@ def test_cosine_arch_against_finite_elements():
 )
 def test_shallow_leaves_follow_the_normalised_lines(law, balance, tolerance):
     """f = F (2X)^3/(E I h) of a pair is 64 pi^2 (4/3 - D) for the cosine and 64 pi^2 (1 - D) for the V, D = d/h."""
-    strip = Strip(100.0, np.arctan(1 / 50), 0.2, 10.0, 1000.0, 0.3)
+    strip = LeafStrip(100.0, np.arctan(1 / 50), 0.2, 10.0, 1000.0, 0.3)
     place = np.array([0.5, 0.7, 0.9])
     force = 2 * law(strip).force(place * strip.rise) * (2 * strip.reach) ** 3 / (strip.bending * strip.rise)
     assert force == pytest.approx(64 * np.pi**2 * (balance - place), rel=tolerance)
@@ -199,7 +199,7 @@ def test_the_measured_set_contradicts_itself():
 
 
 def steepest(slenderness: float) -> float:
-    strip = Strip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
+    strip = LeafStrip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
     places = np.linspace(0.2, 1.2, 501) * strip.rise
     return float(np.gradient(vbeam.VBeam(strip).s_force(places), places).min() / vbeam.first_stiffness(strip))
 
@@ -210,7 +210,7 @@ def test_negative_stiffness_appears_at_a_slenderness_of_1_4246():
 
 @pytest.mark.parametrize(("slenderness", "sign"), [(3.15, 1), (3.25, -1)])
 def test_a_bare_v_beam_is_bistable_above_a_slenderness_of_3_195(slenderness, sign):
-    strip = Strip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
+    strip = LeafStrip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
     force = vbeam.VBeam(strip).force(np.linspace(0.5, 1.5, 2001) * strip.rise)
     assert np.sign(force.min()) == sign
 
@@ -218,5 +218,5 @@ def test_a_bare_v_beam_is_bistable_above_a_slenderness_of_3_195(slenderness, sig
 def test_a_leaf_is_still_buckled_when_flat_above_a_slenderness_of_3_6276():
     assert pytest.approx(3.6276, abs=5e-5) == vbeam.FLAT_BUCKLED_ABOVE
     for slenderness, buckled in ((3.58, False), (3.68, True)):
-        strip = Strip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
+        strip = LeafStrip(100.0, np.radians(2), 100.0 * np.sin(np.radians(2)) / slenderness, 10.0, 1000.0, 0.3)
         assert bool(vbeam.VBeam(strip).buckled(strip.rise)) is buckled

@@ -3,9 +3,9 @@
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.metrics import Frame, Window, measure
+from cfmkit.metrics import MeasuringFrame, Window, measure
 
-BARE = Frame()
+BARE = MeasuringFrame()
 
 
 def curve(*branches, kind="force", stress=None, names=("load", "unload")):

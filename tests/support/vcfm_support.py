@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 if TYPE_CHECKING:
     from cfmkit.results import Result
@@ -18,14 +18,14 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 TABLE_I = CONFIGS / "vcfm_ding2022.yaml"
 
 
-def leaf(thickness: Any = 1.0, length: float = 35.0, degrees: Any = 7.0, width: float = 6.0) -> Strip:
+def leaf(thickness: Any = 1.0, length: float = 35.0, degrees: Any = 7.0, width: float = 6.0) -> LeafStrip:
     """Return a leaf of the V-beam in mm, N and MPa."""
-    return Strip(length, np.radians(degrees), thickness, width, 1477.0, 0.3)
+    return LeafStrip(length, np.radians(degrees), thickness, width, 1477.0, 0.3)
 
 
-def side(thickness: Any = 1.5, length: Any = 25.0, degrees: float = 7.0) -> Strip:
+def side(thickness: Any = 1.5, length: Any = 25.0, degrees: float = 7.0) -> LeafStrip:
     """Return a leaf of the diamond in mm, N and MPa."""
-    return Strip(length, np.radians(degrees), thickness, 10.0, 1477.0, 0.3)
+    return LeafStrip(length, np.radians(degrees), thickness, 10.0, 1477.0, 0.3)
 
 
 def table_i(*changes: str, preloads: str = "[0 mm]") -> Any:

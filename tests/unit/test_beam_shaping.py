@@ -22,7 +22,7 @@ from cfmkit.families.beam.shaping.design import shaped, task_of
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
-from cfmkit.families.beam.shaping.search import Found, Plan, confirmed, improved, searched
+from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, searched
 from cfmkit.families.beam.shaping.sqp_program import Shaping
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
@@ -126,7 +126,7 @@ def seen_at(points: int) -> tuple[Task, Found]:
 
 def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
     task, found = seen_at(2)
-    kept = confirmed(replace(task, limits=TaskLimits()), found, Plan(), lambda _, design: design)
+    kept = confirmed(replace(task, limits=TaskLimits()), found, StartBudget(), lambda _, design: design)
     view = looked_at(task, Variables(task, 2).build(kept.x))
     assert view is not None
     assert kept.objective == view.half_band(found.start)
@@ -141,7 +141,7 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
         tried.append(finer.points)
         return replace(design, objective=1.0 if finer.points > 33 else design.objective)
 
-    kept = confirmed(replace(task, limits=TaskLimits()), found, Plan(), again)
+    kept = confirmed(replace(task, limits=TaskLimits()), found, StartBudget(), again)
     assert tried == [33, 65]
     assert kept.points == 65
 
@@ -149,7 +149,7 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
 def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
-    kept = confirmed(task, replace(found, start=3e-3, objective=0.05), Plan(), lambda _, design: design)
+    kept = confirmed(task, replace(found, start=3e-3, objective=0.05), StartBudget(), lambda _, design: design)
     assert 3e-3 < kept.start <= task.window[0]
     assert kept.objective <= 0.05
     wider = looked_at(task, Variables(task, 2).build(kept.x))
@@ -160,14 +160,14 @@ def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> 
 def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
-    kept = confirmed(task, replace(found, start=6.7e-3, objective=0.04), Plan(), lambda _, design: design)
+    kept = confirmed(task, replace(found, start=6.7e-3, objective=0.04), StartBudget(), lambda _, design: design)
     assert kept.start < 6.7e-3
     assert 0.0495 < kept.objective <= 0.05
     mean = 9.6  # of the force from 6.7 mm on; it is less over a wider window
     kept = confirmed(
         replace(task, limits=TaskLimits(force_min=mean)),
         replace(found, start=6.7e-3, objective=0.04),
-        Plan(),
+        StartBudget(),
         lambda _, design: design,
     )
     assert kept.start == 6.7e-3
@@ -176,7 +176,7 @@ def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
 def test_stress_that_is_missed_at_few_poses_is_a_limit_that_is_missed() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=TaskLimits(stress=40e6))
-    kept = confirmed(task, found, Plan(), lambda _, design: design)
+    kept = confirmed(task, found, StartBudget(), lambda _, design: design)
     assert kept.violation == pytest.approx(48.2187e6 / task.allowable_stress - 1, abs=1e-3)  # Table 3 at 13.6 mm
     assert not kept.feasible
 
@@ -284,7 +284,7 @@ def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() ->
     task = lan("paper", (8.8e-3, 4e-3))
     program = Shaping(Variables(task, 2), 6.8e-3, Compared())
     assert program.values(program.begin(table_3(task)))[0] == pytest.approx(0.30214615, abs=2e-5)
-    ended = improved(task, found_of(task, table_3(task)), Plan(flattening=15))
+    ended = improved(task, found_of(task, table_3(task)), StartBudget(flattening=15))
     view = program.view(ended.x)
     force = view.response.state.force[view.poses.window]
     assert ended.objective < 0.15
@@ -295,7 +295,7 @@ def test_a_force_out_of_reach_is_named_with_the_nearest_one() -> None:
     task = replace(lan(), limits=replace(lan().limits, force_min=200.0))
     start = found_of(task, table_3(task))
     assert next(iter(missed_by(task, start))) == "force"
-    found = blocked(task, [start], Plan(meeting=4))
+    found = blocked(task, [start], StartBudget(meeting=4))
     assert found.freed is None
     assert "force" in found.missed
     text = found.nearest.get("design.optimise.force.min", "at most 0 N")
@@ -322,7 +322,7 @@ class Recorder:
 
 def test_finished_starts_are_noted_and_used_again() -> None:
     task, notes = lan(), Recorder()
-    plan = Plan(drawn=3, tries=1, meeting=1, flattening=1)
+    plan = StartBudget(drawn=3, tries=1, meeting=1, flattening=1)
     first = explored(task, plan, (2, 1), "x", Run(notes=notes))
     again = explored(task, plan, (3, 1), "x", Run(notes=notes))
     other = explored(task, plan, (2, 1), "y", Run(seed=1, notes=notes))
@@ -334,7 +334,7 @@ def test_finished_starts_are_noted_and_used_again() -> None:
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:
     notes = Recorder()
-    late = Plan(clock=Clock(0.0))
+    late = StartBudget(clock=Clock(0.0))
     result = explored(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})
     assert searched(lan(), 0, 0, late) is None

@@ -10,7 +10,7 @@ from cfmkit.designing.starts import Clock
 from cfmkit.errors import SpecError
 from cfmkit.families.beam.shaping.design import _nothing, task_of, with_stretch_and_shear
 from cfmkit.families.beam.shaping.multistart import Explored
-from cfmkit.families.beam.shaping.search import Plan
+from cfmkit.families.beam.shaping.search import StartBudget
 
 TEXT = (CONFIGS / "beam_design_arch.yaml").read_text()
 
@@ -44,8 +44,8 @@ def test_nothing_that_may_vary_is_refused():
 
 def test_a_start_that_the_time_ended_is_no_reason_to_widen_the_envelope():
     nothing = Explored({0: None}, reused=0, missing=0)
-    assert "the time budget ended" in _nothing(nothing, Plan(clock=Clock(0.0))).message
-    assert "widen the envelope" in _nothing(nothing, Plan()).message
+    assert "the time budget ended" in _nothing(nothing, StartBudget(clock=Clock(0.0))).message
+    assert "widen the envelope" in _nothing(nothing, StartBudget()).message
 
 
 @pytest.mark.parametrize(

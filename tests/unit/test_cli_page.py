@@ -6,7 +6,7 @@ import pytest
 
 from cfmkit.cli.page_blocks import (
     BLANK,
-    Grid,
+    CellGrid,
     GridColumn,
     JsonText,
     Paragraph,
@@ -63,14 +63,14 @@ def test_a_line_that_is_copied_keeps_its_length(printed):
 
 def test_a_table_has_heads_only_where_one_says_something(printed):
     rows = [("a", Span("b"))]
-    assert printed(Grid(columns(True, True), rows)) == "a   b\n"
-    assert printed(Grid((GridColumn(""), GridColumn("raw")), rows)) == "    raw\na   b\n"
+    assert printed(CellGrid(columns(True, True), rows)) == "a   b\n"
+    assert printed(CellGrid((GridColumn(""), GridColumn("raw")), rows)) == "    raw\na   b\n"
 
 
 def test_cells_are_folded_and_never_cut(printed):
     cell = 30 * "abc"
-    assert "".join(printed(Grid(columns(True), [(cell,)])).split()) == cell
-    assert "\N{HORIZONTAL ELLIPSIS}" not in printed(Grid(columns(False, False), [(cell, cell)]))
+    assert "".join(printed(CellGrid(columns(True), [(cell,)])).split()) == cell
+    assert "\N{HORIZONTAL ELLIPSIS}" not in printed(CellGrid(columns(False, False), [(cell, cell)]))
 
 
 def test_records_are_listed_below_their_heading_and_not_at_all_where_there_are_none(printed):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cfmkit.designing import limits, sqp_program
-from cfmkit.designing.sqp_program import Rows, SeenPoint
+from cfmkit.designing.sqp_program import LimitRows, SeenPoint
 from cfmkit.designing.starts import NEVER, Clock, Stage, done
 from cfmkit.designing.variables import at_bounds, rounded
 from cfmkit.families.base import Run
@@ -34,8 +34,8 @@ class Disc:
             (x - 2.0) ** 2 + (y - 1.0) ** 2,
             np.array([2.0 * (x - 2.0), 2.0 * (y - 1.0)]) if sloped else None,
             [
-                Rows("disc", disc, np.array([[-2.0 * x, -2.0 * y]]) if sloped else None, lambda: ["rim"]),
-                Rows("line", line, np.array([[-1.0]]) if sloped else None, lambda: ["edge"]),
+                LimitRows("disc", disc, np.array([[-2.0 * x, -2.0 * y]]) if sloped else None, lambda: ["rim"]),
+                LimitRows("line", line, np.array([[-1.0]]) if sloped else None, lambda: ["edge"]),
             ],
         )
 
@@ -85,11 +85,11 @@ def test_limits_that_contradict_each_other_give_way_by_the_least_amount() -> Non
 
 def test_missed_limits_are_told_the_worst_first_each_with_its_worst_row() -> None:
     rows = [
-        Rows("a", np.array([0.1, -0.2]), about=lambda: ["a0", "a1"]),
-        Rows("b", np.array([-0.5]), about=lambda: ["b0"]),
-        Rows("a", np.array([-0.3]), about=lambda: ["a2"]),
-        Rows("c", np.array([-1e-6])),
-        Rows("d", np.zeros(0)),
+        LimitRows("a", np.array([0.1, -0.2]), about=lambda: ["a0", "a1"]),
+        LimitRows("b", np.array([-0.5]), about=lambda: ["b0"]),
+        LimitRows("a", np.array([-0.3]), about=lambda: ["a2"]),
+        LimitRows("c", np.array([-1e-6])),
+        LimitRows("d", np.zeros(0)),
     ]
     assert [(one.name, one.about) for one in limits.missed(rows, 1e-4)] == [("b", "b0"), ("a", "a2")]
     assert limits.worst(rows) == 0.5
@@ -97,7 +97,9 @@ def test_missed_limits_are_told_the_worst_first_each_with_its_worst_row() -> Non
 
 
 def test_rows_near_zero_hold_a_design_unless_nothing_moves_them() -> None:
-    rows = [Rows("a", np.array([1e-4, 1e-4, 0.5]), np.array([[1.0], [0.0], [1.0]]), lambda: ["moved", "fixed", "far"])]
+    rows = [
+        LimitRows("a", np.array([1e-4, 1e-4, 0.5]), np.array([[1.0], [0.0], [1.0]]), lambda: ["moved", "fixed", "far"])
+    ]
     assert list(limits.held(rows, 1e-3)) == ["a: moved"]
 
 

@@ -18,7 +18,7 @@ from cfmkit.elastica.continuation import (
     points_at_bifurcation,
 )
 from cfmkit.elastica.continuation.decisions import decided
-from cfmkit.elastica.continuation.state import BranchEnd, Leg, Problem, Resume, Stop, Stretch, Trail
+from cfmkit.elastica.continuation.state import BranchEnd, Leg, PathProblem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Spot
 from cfmkit.elastica.kernels.status_codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
@@ -27,14 +27,14 @@ from cfmkit.elastica.model.layout import Layout
 ASKED = (1e-3, 2e-3, 3e-3)  # [m]; the mean beam length is 0.1 m
 
 
-def problem(asked: tuple[float, ...] = ASKED, **control: Any) -> Problem:
+def problem(asked: tuple[float, ...] = ASKED, **control: Any) -> PathProblem:
     """Return a cantilever whose guided end is moved across it."""
     nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0, guided(np.pi / 2))}
     network = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3, axial=True))})
-    return Problem(Layout(network, Displacement("b", np.pi / 2, np.array(asked))), Mesh(2, 1), Control(**control))
+    return PathProblem(Layout(network, Displacement("b", np.pi / 2, np.array(asked))), Mesh(2, 1), Control(**control))
 
 
-def trail(of: Problem, *places: tuple[float, int, int]) -> Trail:
+def trail(of: PathProblem, *places: tuple[float, int, int]) -> Trail:
     """Return a path through places: the drive, the number of the requested point or -1, the unstable directions."""
     made = Trail.begun(of)
     for drive, asked, unstable in places:
@@ -42,12 +42,12 @@ def trail(of: Problem, *places: tuple[float, int, int]) -> Trail:
     return made
 
 
-def spot(of: Problem, drive: float, unstable: int = 0) -> Spot:
+def spot(of: PathProblem, drive: float, unstable: int = 0) -> Spot:
     y = np.full(of.solver.size, 0.1 * drive)
     return Spot(y, drive, of.solver.unit.copy(), unstable)
 
 
-def leg(of: Problem, code: int, path: Trail, toward: BranchEnd | None = None) -> Leg:
+def leg(of: PathProblem, code: int, path: Trail, toward: BranchEnd | None = None) -> Leg:
     return Leg(code, path, spot(of, path.drive), toward)
 
 

@@ -34,7 +34,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.vibration import Masses, frequencies
+from cfmkit.elastica.vibration import NetworkMasses, frequencies
 from cfmkit.elastica.vibration.linearised import Linearisation
 from cfmkit.errors import InputError
 
@@ -43,7 +43,7 @@ RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12
 PER_LENGTH = DENSITY * WIDTH * THICKNESS
 UNIT = np.sqrt(RIGIDITY / (PER_LENGTH * LENGTH**4)) / (2 * np.pi)  # [Hz]: of a beam it counts as beta^2 with beta L
 TINY = np.array([1e-9])
-WHOLE = Masses({"x": DENSITY})
+WHOLE = NetworkMasses({"x": DENSITY})
 
 
 def beam(end: Support = FREE, axial: bool = False, shear: bool = False, pin: bool = False) -> Network:
@@ -78,7 +78,7 @@ def test_a_cantilever_with_a_mass_at_its_tip_has_those_of_the_closed_form() -> N
     """1 + cos cosh + r x (cos sinh - sin cosh) = 0 with the ratio r of the mass to that of the beam."""
     ratio = 0.7
     betas = roots(lambda x: 1 / np.cosh(x) + np.cos(x) + ratio * x * (np.cos(x) * np.tanh(x) - np.sin(x)), 4)
-    masses = Masses({"x": DENSITY}, {"tip": (ratio * PER_LENGTH * LENGTH, 0.0)})
+    masses = NetworkMasses({"x": DENSITY}, {"tip": (ratio * PER_LENGTH * LENGTH, 0.0)})
     found = frequencies(under(1e-9, beam()), masses, 4).free[-1]
     assert found == pytest.approx(UNIT * betas**2, rel=1e-7)
 
@@ -88,7 +88,7 @@ def test_a_flywheel_on_a_light_beam_turns_and_swings_as_two_masses_do() -> None:
     mass, inertia = 0.5, 2e-3
     stiffness = RIGIDITY * np.array([[12 / LENGTH**3, -6 / LENGTH**2], [-6 / LENGTH**2, 4 / LENGTH]])
     squares = np.linalg.eigvals(stiffness / np.array([[mass], [inertia]]))
-    found = frequencies(under(1e-9, beam()), Masses({"x": 1e-3}, {"tip": (mass, inertia)}), 2).free[-1]
+    found = frequencies(under(1e-9, beam()), NetworkMasses({"x": 1e-3}, {"tip": (mass, inertia)}), 2).free[-1]
     assert found == pytest.approx(np.sqrt(np.sort(squares)) / (2 * np.pi), rel=1e-6)
 
 
@@ -211,7 +211,7 @@ def test_stiffness_is_that_of_the_tangent_of_the_path(seed: int) -> None:
         point, count = len(path) - 1, path.solver.n_free
         tangent, _ = path.solver.tangent_at(path.points.y[point], float(path.points.drive[point]))
         wanted = np.linalg.inv(-tangent)[:count, :count]
-        found = Linearisation(path, Masses(dict.fromkeys(net.beams, 1.0)), 3).at([point])
+        found = Linearisation(path, NetworkMasses(dict.fromkeys(net.beams, 1.0)), 3).at([point])
         own, tied = found.free, found.tied[0][:, found.free]
         n = len(own)
         system = np.zeros((n + len(tied),) * 2)
@@ -234,8 +234,8 @@ def test_a_curved_thin_arch_keeps_its_frequencies_when_it_is_cut_in_three() -> N
         return trace(Network(nodes, beams), Loading((force,), np.array([1.0])))
 
     whole, cut = arch(1), arch(3)
-    one = frequencies(whole, Masses({"b0": DENSITY}), 5, [len(whole) - 1]).free[0]
-    other = frequencies(cut, Masses(dict.fromkeys(("b0", "b1", "b2"), DENSITY)), 5, [len(cut) - 1]).free[0]
+    one = frequencies(whole, NetworkMasses({"b0": DENSITY}), 5, [len(whole) - 1]).free[0]
+    other = frequencies(cut, NetworkMasses(dict.fromkeys(("b0", "b1", "b2"), DENSITY)), 5, [len(cut) - 1]).free[0]
     assert one == pytest.approx(other, rel=1e-6)
 
 
@@ -244,7 +244,7 @@ def test_a_spring_and_a_mass_swing_as_they_should() -> None:
     stiffness = 3 * RIGIDITY / LENGTH**3
     net = beam()
     sprung = Network(net.nodes, net.beams, springs=(SlideSpring("tip", np.pi / 2, 10 * stiffness),))
-    found = frequencies(under(1e-9, sprung), Masses({"x": 1e-3}, {"tip": (1.0, 0.0)}), 1).free[-1, 0]
+    found = frequencies(under(1e-9, sprung), NetworkMasses({"x": 1e-3}, {"tip": (1.0, 0.0)}), 1).free[-1, 0]
     assert found == pytest.approx(np.sqrt(11 * stiffness) / (2 * np.pi), rel=1e-6)
 
 
@@ -293,13 +293,13 @@ def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> Non
 def test_masses_must_be_known_and_positive() -> None:
     path = under(1e-9, beam())
     with pytest.raises(InputError, match="no density is given of the beams x"):
-        frequencies(path, Masses({}), 1)
+        frequencies(path, NetworkMasses({}), 1)
     with pytest.raises(InputError, match="'there', which is not a node"):
-        frequencies(path, Masses({"x": 1.0}, {"there": (1.0, 0.0)}), 1)
+        frequencies(path, NetworkMasses({"x": 1.0}, {"there": (1.0, 0.0)}), 1)
     with pytest.raises(InputError, match="must be positive"):
-        Masses({"x": 0.0})
+        NetworkMasses({"x": 0.0})
     with pytest.raises(InputError, match="must not be negative"):
-        Masses({"x": 1.0}, {"tip": (-1.0, 0.0)})
+        NetworkMasses({"x": 1.0}, {"tip": (-1.0, 0.0)})
     with pytest.raises(InputError, match="at least one frequency"):
         frequencies(path, WHOLE, 0)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from metrics_support import BARE, LOOP, SAW, curve, reason, value
 
-from cfmkit.metrics import Frame, definitions, measure
+from cfmkit.metrics import MeasuringFrame, definitions, measure
 
 BY_HAND = {
     "force_mean": 10.0,
@@ -27,12 +27,14 @@ BY_HAND = {
 @pytest.mark.parametrize("metric", BY_HAND)
 def test_metrics_of_five_points_by_hand(metric):
     saw = curve(([0, 1, 2, 3, 4], [8, 10, 9, 11, 12]), stress=[0, 10, 20, 50, 40])
-    assert value(metric, saw, Frame(target=12.0, allowable_stress=100.0)) == pytest.approx(BY_HAND[metric], rel=1e-14)
+    assert value(metric, saw, MeasuringFrame(target=12.0, allowable_stress=100.0)) == pytest.approx(
+        BY_HAND[metric], rel=1e-14
+    )
 
 
 def test_every_metric_of_the_table_has_a_value_on_a_complete_loop():
     loop = curve(([0, 1, 2], [10, 12, 14]), ([2, 1, 0], [13, 11, 9]), stress=[0, 1, 2, 2, 1, 0])
-    found = measure(loop, Frame(target=12.0, allowable_stress=9.0))
+    found = measure(loop, MeasuringFrame(target=12.0, allowable_stress=9.0))
     assert [name for name, item in found.items() if item.value is None] == []
     # what needs data of the material, a time or a curve is measured where these are given (test_metrics_longterm,
     # test_target_curve)
@@ -43,12 +45,14 @@ def test_every_metric_of_the_table_has_a_value_on_a_complete_loop():
 def test_rms_to_target_is_taken_at_places_uniform_in_displacement_without_the_start():
     ramp = curve(([0, 0.001, 1], [-1e6, 0.001, 1]))  # F = u beyond a run-in that is over before the first place
     places = np.arange(1, 101) / 100
-    assert value("rms_to_target", ramp, Frame(target=0.25)) == pytest.approx(math.sqrt(np.mean((places - 0.25) ** 2)))
+    assert value("rms_to_target", ramp, MeasuringFrame(target=0.25)) == pytest.approx(
+        math.sqrt(np.mean((places - 0.25) ** 2))
+    )
 
 
 def test_sampling_does_not_weigh_in_rms_to_target():
     dense = np.concatenate([np.linspace(0, 0.1, 1000), np.linspace(0.11, 1, 7)])
-    target = Frame(target=3.0)
+    target = MeasuringFrame(target=3.0)
     assert value("rms_to_target", curve((dense, 2 + dense)), target) == pytest.approx(
         value("rms_to_target", curve(([0, 1], [2, 3])), target), rel=1e-12
     )
@@ -63,11 +67,11 @@ def test_a_linear_force_leaves_the_band_where_its_slope_says(metric, width):
 
 def test_a_band_ends_at_the_first_exit_although_the_force_comes_back():
     bump = curve(([0, 1, 2, 3, 4], [10, 10, 10, 12, 10]))
-    assert value("band_range_5pct", bump, Frame(reference=1.0)) == pytest.approx(2.25)  # 10.5 at u = 2.25
+    assert value("band_range_5pct", bump, MeasuringFrame(reference=1.0)) == pytest.approx(2.25)  # 10.5 at u = 2.25
 
 
 def test_a_reference_pose_on_the_last_sample_is_allowed():
-    assert value("band_range_5pct", SAW, Frame(reference=4.0)) == pytest.approx(0.6)  # 11.4 at u = 3.4
+    assert value("band_range_5pct", SAW, MeasuringFrame(reference=4.0)) == pytest.approx(0.6)  # 11.4 at u = 3.4
 
 
 def test_range_95_takes_the_first_place_that_reaches_the_force_at_the_end_of_the_window():
@@ -126,7 +130,7 @@ def usable(of, frame=BARE, window=None):
 
 def test_usable_stroke_runs_from_band_to_band():
     # enters 95 at 0.95; leaves 105 at 3.25
-    assert usable(HUMP, Frame(target=100.0)) == pytest.approx((0.95, 3.25, 2.30))
+    assert usable(HUMP, MeasuringFrame(target=100.0)) == pytest.approx((0.95, 3.25, 2.30))
 
 
 def test_usable_stroke_without_a_target_is_around_the_mean_in_the_window():
@@ -136,41 +140,43 @@ def test_usable_stroke_without_a_target_is_around_the_mean_in_the_window():
 
 def test_the_allowable_stress_cuts_the_usable_stroke():
     stressed = curve(([0, 1, 2, 3, 4], [100] * 5), stress=[0, 10, 20, 30, 40])
-    assert usable(stressed, Frame(target=100.0, allowable_stress=25.0)) == pytest.approx((0, 2.5, 2.5))
+    assert usable(stressed, MeasuringFrame(target=100.0, allowable_stress=25.0)) == pytest.approx((0, 2.5, 2.5))
 
 
 def test_the_valid_intervals_cut_the_usable_stroke():
     flat = curve(([0, 1, 2, 3, 4], [100] * 5))
-    assert usable(flat, Frame(target=100.0, valid=((0.0, 1.0), (1.5, 3.75)))) == pytest.approx((1.5, 3.75, 2.25))
+    assert usable(flat, MeasuringFrame(target=100.0, valid=((0.0, 1.0), (1.5, 3.75)))) == pytest.approx(
+        (1.5, 3.75, 2.25)
+    )
 
 
 def test_every_branch_must_keep_the_band():
     loop = curve(([0, 4], [100, 100]), ([4, 3, 0], [80, 100, 100]))
-    assert usable(loop, Frame(target=100.0)) == pytest.approx((0, 3.25, 3.25))
+    assert usable(loop, MeasuringFrame(target=100.0)) == pytest.approx((0, 3.25, 3.25))
 
 
 def test_a_mechanism_that_is_usable_nowhere_has_stroke_zero_and_no_ends():
     far = curve(([0, 1], [1, 2]))
-    assert value("usable_stroke", far, Frame(target=100.0)) == 0
-    assert "no part of the travel" in reason("usable_start", far, Frame(target=100.0))
+    assert value("usable_stroke", far, MeasuringFrame(target=100.0)) == 0
+    assert "no part of the travel" in reason("usable_start", far, MeasuringFrame(target=100.0))
 
 
 def test_a_step_right_through_the_band_between_two_samples_is_usable_there():
-    assert usable(curve(([0, 1], [0, 200])), Frame(target=100.0)) == pytest.approx((0.475, 0.525, 0.05))
+    assert usable(curve(([0, 1], [0, 200])), MeasuringFrame(target=100.0)) == pytest.approx((0.475, 0.525, 0.05))
 
 
 def test_a_fold_is_usable_only_where_all_its_states_are():
     # forward to 3 at 100 N, back to 1 at 50 N, forward again at 100 N: nothing between 1 and 3 can be relied on
     fold = curve(([0, 3, 3, 1, 1, 6], [100, 100, 50, 50, 100, 100]))
-    assert usable(fold, Frame(target=100.0)) == pytest.approx((3, 6, 3))
+    assert usable(fold, MeasuringFrame(target=100.0)) == pytest.approx((3, 6, 3))
 
 
 def test_a_fold_is_unusable_as_far_as_its_bad_states_reach():
     # leaves the band at 3, wanders back to 0.5 and returns into it at 2: all of 0.5 to 3 is lost
     fold = curve(([0, 3, 3, 0.5, 2, 2, 4], [100, 100, 50, 50, 50, 100, 100]))
-    assert usable(fold, Frame(target=100.0)) == pytest.approx((3, 4, 1))
+    assert usable(fold, MeasuringFrame(target=100.0)) == pytest.approx((3, 4, 1))
 
 
 def test_a_valid_interval_beyond_the_travel_is_cut_to_it():
     flat = curve(([1, 2, 3], [100] * 3))
-    assert usable(flat, Frame(target=100.0, valid=((-5.0, 9.0),))) == pytest.approx((1, 3, 2))
+    assert usable(flat, MeasuringFrame(target=100.0, valid=((-5.0, 9.0),))) == pytest.approx((1, 3, 2))

@@ -9,7 +9,7 @@ from metrics_support import BARE, LOOP, SAW, curve, reason, value
 
 from cfmkit.curves import Curve
 from cfmkit.errors import UsageError
-from cfmkit.metrics import BranchTrace, Frame, Window, as_json, evaluate, measure, restrict, traces
+from cfmkit.metrics import BranchTrace, MeasuringFrame, Window, as_json, evaluate, measure, restrict, traces
 from cfmkit.results import Quantity, Result, Status
 
 
@@ -84,8 +84,8 @@ def test_points_without_equilibrium_in_the_window_leave_no_statistics_but_their_
     broken = curve(([0, 1, 2, 3], [np.nan, 10, 10, 10]))
     assert "1 of 4 points" in reason("force_mean", broken)
     assert value("force_mean", broken, window=(1, 3)) == 10
-    assert usable(broken, Frame(target=10.0)) == pytest.approx((1, 3, 2))
-    assert value("band_range_5pct", broken, Frame(reference=2.0)) == 2
+    assert usable(broken, MeasuringFrame(target=10.0)) == pytest.approx((1, 3, 2))
+    assert value("band_range_5pct", broken, MeasuringFrame(reference=2.0)) == 2
     assert value("range_95", broken) == 2
 
 
@@ -106,8 +106,8 @@ def test_without_a_branch_the_worst_counts(metric, worst):
 
 def test_the_worst_mean_is_the_farthest_from_the_target_or_else_the_smallest():
     assert value("force_mean", LOOP) == 11
-    assert value("force_mean", LOOP, Frame(target=11.4)) == 12
-    assert value("force_mean", LOOP, Frame(target=11.6)) == 11
+    assert value("force_mean", LOOP, MeasuringFrame(target=11.4)) == 12
+    assert value("force_mean", LOOP, MeasuringFrame(target=11.6)) == 11
 
 
 def test_branches_that_come_back_later_are_gathered():

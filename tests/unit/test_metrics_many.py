@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cfmkit.curves import Curve
-from cfmkit.metrics import Frame, Window
+from cfmkit.metrics import MeasuringFrame, Window
 from cfmkit.metrics.evaluation import survey
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import ManyWindows, Spread, metric_of, metrics_of
@@ -32,7 +32,7 @@ def alone(motion, efforts, window, name):
     path = np.concatenate([motion, *(motion[::-1] for _ in efforts[1:])])
     effort = np.concatenate([efforts[0], *(one[::-1] for one in efforts[1:])])
     branch = np.repeat(["load", "unload"][: len(efforts)], len(motion))
-    frame = Frame(target=10.0, valid=((0.05, float(motion[-1])),))
+    frame = MeasuringFrame(target=10.0, valid=((0.05, float(motion[-1])),))
     view = survey(Curve(path, effort, branch, np.ones(len(path), bool)), frame, window)
     definition = DEFINED[name]
     value = view.worst(definition, view.each(definition)).value

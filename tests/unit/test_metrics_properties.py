@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.curves import Column, Curve
-from cfmkit.metrics import BranchTrace, Frame, Window, measure, restrict
+from cfmkit.metrics import BranchTrace, MeasuringFrame, Window, measure, restrict
 from cfmkit.metrics.traces import TOLERANCE, _folded
 
 PROPERTY = settings(deadline=None, max_examples=60)
@@ -65,7 +65,7 @@ def same(found, expected, factor=1.0):
     return found == pytest.approx(expected * factor, rel=1e-9, abs=1e-9)
 
 
-FRAME = Frame(target=64.0, allowable_stress=3.0)
+FRAME = MeasuringFrame(target=64.0, allowable_stress=3.0)
 WINDOWS = st.tuples(st.floats(0, 0.45), st.floats(0.55, 1))
 
 
@@ -76,7 +76,7 @@ def test_a_force_twice_as_large_doubles_forces_and_areas_and_leaves_ratios_and_r
     window = Window(part[0] * end, part[1] * end)
     plain = numbers(build(sides), FRAME, window)
     scaled = [(motion, effort * factor) for motion, effort in sides]
-    more = numbers(build(scaled), Frame(target=64.0 * factor, allowable_stress=3.0), window)
+    more = numbers(build(scaled), MeasuringFrame(target=64.0 * factor, allowable_stress=3.0), window)
     for name, item in measure(build(sides), FRAME, window).items():
         power = factor if item.dimension in ("force", "energy") else 1.0
         assert same(more[name], plain[name], power), name
@@ -86,7 +86,7 @@ def test_a_force_twice_as_large_doubles_forces_and_areas_and_leaves_ratios_and_r
 @given(loops(), FACTOR, WINDOWS)
 def test_a_travel_twice_as_long_doubles_lengths_and_areas_and_leaves_forces_and_ratios(sides, factor, part):
     end = sides[0][0][-1]
-    frame = Frame(target=64.0)
+    frame = MeasuringFrame(target=64.0)
     plain = measure(build(sides, extra=False), frame, Window(part[0] * end, part[1] * end))
     longer = [(motion * factor, effort) for motion, effort in sides]
     window = Window(part[0] * end * factor, part[1] * end * factor)
@@ -125,7 +125,7 @@ def test_the_order_of_the_branches_changes_nothing(sides, part):
 @given(loops(), WINDOWS, st.lists(st.floats(0.01, 0.99), min_size=1, max_size=6))
 def test_points_added_on_a_piecewise_linear_curve_change_neither_extremes_nor_areas_nor_lengths(sides, part, places):
     window = Window(part[0] * sides[0][0][-1], part[1] * sides[0][0][-1])
-    frame = Frame(target=64.0)
+    frame = MeasuringFrame(target=64.0)
     finer = []
     for motion, effort in sides:
         more = np.union1d(motion, np.array(places) * motion[-1])
@@ -139,7 +139,7 @@ def test_points_added_on_a_piecewise_linear_curve_change_neither_extremes_nor_ar
 @PROPERTY
 @given(loops())
 def test_the_opposite_sign_convention_gives_the_same_ripple_ranges_and_deviations(sides):
-    frame, mirror = Frame(target=64.0), Frame(target=-64.0)
+    frame, mirror = MeasuringFrame(target=64.0), MeasuringFrame(target=-64.0)
     plain = numbers(build(sides, extra=False), frame)
     other = numbers(build([(motion, -effort) for motion, effort in sides], extra=False), mirror)
     for name in ("force_ripple", "half_band", "deviation_from_mean", "deviation_from_target", "force_sd", *LENGTHS):
@@ -192,7 +192,7 @@ def test_wider_bands_contain_narrower_ones_and_nothing_is_longer_than_the_travel
 @PROPERTY
 @given(loops(), st.floats(0.01, 0.5))
 def test_the_force_inside_the_usable_stroke_keeps_the_band_and_just_outside_it_does_not(sides, band):
-    found = numbers(build(sides, extra=False), Frame(target=64.0, band=band))
+    found = numbers(build(sides, extra=False), MeasuringFrame(target=64.0, band=band))
     assume(found["usable_stroke"] > 1e-6)
     start, end, travel = found["usable_start"], found["usable_end"], sides[0][0][-1]
     for motion, effort in sides:

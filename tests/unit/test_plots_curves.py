@@ -8,7 +8,7 @@ from plot_support import axes, data_lines, loop_curve
 
 from cfmkit.curves import Curve
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.line_diagram import Limit, Region
+from cfmkit.plots.line_diagram import Limit, MarkedRange
 from cfmkit.plots.style import png
 
 
@@ -94,7 +94,7 @@ def test_zero_force_is_on_the_picture(effort):
 
 
 def test_levels_and_regions_stand_where_they_should():
-    look = CurveLook(levels=(Limit(42.0, "theory"),), regions=(Region(0.0, 0.004, "corner"),))
+    look = CurveLook(levels=(Limit(42.0, "theory"),), regions=(MarkedRange(0.0, 0.004, "corner"),))
     ax = plot_curve(loop_curve(), axes(), look)
     (level,) = (line for line in ax.lines if line.get_transform() != ax.transData and len(set(line.get_ydata())) == 1)
     assert set(level.get_ydata()) == {42.0}

@@ -29,7 +29,7 @@ from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed import search
 from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure, joints, kink, mirrored, spread
-from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.search import Ranges
 from cfmkit.families.slider_crank.printed.sizing import rotations, sized
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -118,7 +118,7 @@ def test_both_sides_are_found_stable_and_on_the_side_asked_for(unloaded: float) 
     """Straight, nearly straight, kinked either way; the energy is at a minimum by independent elements, too."""
     for side in (1, -1):
         found = strip_chain(0.977 * MM, unloaded=unloaded).press(np.array([2.0, 10.0]) * MM, side)
-        assert found.ending is Ending.COMPLETE
+        assert found.ending is PressingEnd.COMPLETE
         assert found.side == side
         assert recheck(found.path, elements=24).stable.all()
 
@@ -142,7 +142,7 @@ def test_the_side_of_a_straight_chain_hardly_matters_at_first() -> None:
 def test_a_chain_that_begins_late_on_its_other_side_says_from_where() -> None:
     """With a large kink the other branch begins with a snap."""
     found = strip_chain(0.977 * MM, unloaded=0.60).press(np.linspace(0.0, 20.0, 41) * MM, -1)
-    assert found.ending is Ending.STARTS_LATE
+    assert found.ending is PressingEnd.STARTS_LATE
     assert "mm on only" in found.message
     assert found.travel[0] > 0
 
@@ -207,7 +207,7 @@ def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> N
         return place if path.drive[index] < 6.5 * MM else place + np.array([0.0, -40.0 * MM])
 
     found = replace(chain, knee=knee).press(travel)
-    assert found.ending is Ending.CROSSES
+    assert found.ending is PressingEnd.CROSSES
     assert "between 6 and 7 mm" in found.message
     np.testing.assert_allclose(found.travel, travel[:7])
     np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
@@ -215,7 +215,7 @@ def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> N
 
 def test_pressing_beyond_all_reason_is_not_complete() -> None:
     found = strip_chain().press(np.array([1.0, 400.0]) * MM)
-    assert found.ending is not Ending.COMPLETE
+    assert found.ending is not PressingEnd.COMPLETE
     assert len(found.travel) <= 1
 
 

@@ -102,7 +102,7 @@ def test_every_dimension_with_a_unit_has_a_field_type() -> None:
         item.dimensions[0]
         for name in units.__all__
         for item in get_args(getattr(units, name))
-        if isinstance(item, units.Quantity)
+        if isinstance(item, units.UnitField)
     }
     assert names == set(DIMENSIONS) - {"count", "text"}
 

@@ -17,7 +17,7 @@ from cfmkit.families.vcfm.build import parts
 from cfmkit.families.vcfm.findings import extreme_sums
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.longest_window import longest_window
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
@@ -108,9 +108,9 @@ def test_laws_are_the_same_for_one_leaf_and_for_many():
 
 def test_forces_scale_with_width_modulus_and_size():
     travel, strip = np.linspace(0.1, 6, 50), leaf()
-    wide = VBeam(Strip(35.0, strip.angle, 1.0, 12.0, 1477.0, 0.3))
-    stiff = VBeam(Strip(35.0, strip.angle, 1.0, 6.0, 2954.0, 0.3))
-    large = VBeam(Strip(70.0, strip.angle, 2.0, 12.0, 1477.0, 0.3))
+    wide = VBeam(LeafStrip(35.0, strip.angle, 1.0, 12.0, 1477.0, 0.3))
+    stiff = VBeam(LeafStrip(35.0, strip.angle, 1.0, 6.0, 2954.0, 0.3))
+    large = VBeam(LeafStrip(70.0, strip.angle, 2.0, 12.0, 1477.0, 0.3))
     once = VBeam(strip).force(travel)
     assert wide.force(travel) == pytest.approx(2 * once, rel=1e-12)
     assert stiff.force(travel) == pytest.approx(2 * once, rel=1e-12)
@@ -118,7 +118,7 @@ def test_forces_scale_with_width_modulus_and_size():
 
 
 def test_a_diamond_without_angle_is_a_parallel_guide():
-    flat = Strip(25.0, 0.0, 1.0, 10.0, 1477.0, 0.3)
+    flat = LeafStrip(25.0, 0.0, 1.0, 10.0, 1477.0, 0.3)
     assert Diamond(flat).stiffness == pytest.approx(12 * flat.bending / 25.0**3, rel=6e-3)
 
 

@@ -21,7 +21,7 @@ from cfmkit.cli.options import (
     flag,
     option,
 )
-from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, Grid, Paragraph, Span, TextLine, Written, columns
+from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, CellGrid, Paragraph, Span, TextLine, Written, columns
 from cfmkit.errors import ExitCode, visible
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.metric_changes import Comparison
+    from cfmkit.studies.metric_changes import BatchComparison
 
 PLACE = 26
 EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
@@ -183,7 +183,7 @@ def _page(found: BatchResult, written: Written, more: Sequence[str], everything:
     reused = f", {count} reused" if count else ""
     yield TextLine((Span(message(entries), LABEL),), f"{written.seconds:.2f} s{reused}")
     yield BLANK
-    yield Grid(columns(True, True, True, True), [_row(one) for one in entries], gap=2)
+    yield CellGrid(columns(True, True, True, True), [_row(one) for one in entries], gap=2)
     yield BLANK
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
@@ -198,7 +198,7 @@ def _page(found: BatchResult, written: Written, more: Sequence[str], everything:
         yield Paragraph("written", file, GOOD)
 
 
-def _changes(compared: Comparison, everything: bool) -> Iterator[Block]:
+def _changes(compared: BatchComparison, everything: bool) -> Iterator[Block]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
     beyond = compared.beyond
     told = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"

@@ -10,7 +10,7 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measured_data_options import Measuring, data_record
 from cfmkit.cli.options import FigureChoice, Quiet, argument, flag, option
-from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
+from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -121,7 +121,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
     yield written.block(everything)
 
 
-def _numbers(report: MeasureReport) -> Grid:
+def _numbers(report: MeasureReport) -> CellGrid:
     """Return the table of what matters most: per branch, raw and filtered."""
     from cfmkit.cli.run_numbers import words
 
@@ -130,7 +130,7 @@ def _numbers(report: MeasureReport) -> Grid:
     for name in _shown(report):
         raw, smooth = report.numbers.raw[name], report.numbers.filtered.get(name)
         rows.append((f"  {words(name)}", _short(raw), _short(smooth) if smooth else ""))
-    return Grid(tuple(map(GridColumn, heads)), rows)
+    return CellGrid(tuple(map(GridColumn, heads)), rows)
 
 
 def _shown(report: MeasureReport) -> list[str]:

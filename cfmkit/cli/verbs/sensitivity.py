@@ -14,7 +14,7 @@ from cfmkit.cli.page_blocks import (
     BLANK,
     FAINT,
     LABEL,
-    Grid,
+    CellGrid,
     GridColumn,
     Paragraph,
     Span,
@@ -270,7 +270,7 @@ def _page(found: Findings, written: Written, everything: bool) -> Iterator[Block
     yield written.block(everything)
 
 
-def _yields(found: Findings, share: Yield) -> Grid:
+def _yields(found: Findings, share: Yield) -> CellGrid:
     wanted = found.setup.block.min_yield
     bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
     ok = None if wanted is None else share.value >= wanted
@@ -278,7 +278,7 @@ def _yields(found: Findings, share: Yield) -> Grid:
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
         limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
         rows.append((f"  {spaced(outcome.metric)}", _share(one), Span(limits, FAINT), ""))
-    return Grid(columns(True, True, True, True), rows)
+    return CellGrid(columns(True, True, True, True), rows)
 
 
 def _share(one: Yield) -> str:
@@ -303,12 +303,12 @@ def _rank(item: tuple[str, dict[str, IndexLine]]) -> float:
     return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
 
 
-def _ranking(found: Findings, each: dict[str, dict[str, IndexLine]], everything: bool) -> Grid:
+def _ranking(found: Findings, each: dict[str, dict[str, IndexLine]], everything: bool) -> CellGrid:
     indices = [name for name in SHOWN[found.setup.method] if any(name in lines for lines in each.values())]
     heads = (GridColumn(), *(GridColumn(spaced(name), wraps=False) for name in indices))
     shown = list(each.items())[: None if everything else MOST_PARAMETERS]
     rows = [(f"    {parameter}", *(_index(lines.get(name)) for name in indices)) for parameter, lines in shown]
-    return Grid(heads, rows)
+    return CellGrid(heads, rows)
 
 
 def _index(line: IndexLine | None) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, WithReport, argument, flag, option
-from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written, line
+from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written, line
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -205,12 +205,12 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     if data["proposals"]:
         yield BLANK
         rows = [_row(str(number), one, data) for number, one in enumerate(data["proposals"], 1)]
-        yield Grid(tuple(GridColumn(head, False) for head in HEADS), rows, gap=2, indented=True)
+        yield CellGrid(tuple(GridColumn(head, False) for head in HEADS), rows, gap=2, indented=True)
     if data["near_misses"]:
         yield BLANK
         yield line("misses one wish", LABEL)
         near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
-        yield Grid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
+        yield CellGrid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
     for number, one in enumerate(data["proposals"], 1):
         if one["finer_deviation"] is not None:
             yield Paragraph("verified" if number == 1 else "", f"{number} {one['family']}: {one['notes'][0]}")
@@ -218,7 +218,7 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     if silent:
         yield BLANK
         yield line("nothing of these families", LABEL)
-        yield Grid((GridColumn("", False), GridColumn()), [_silent(one) for one in silent], gap=2, indented=True)
+        yield CellGrid((GridColumn("", False), GridColumn()), [_silent(one) for one in silent], gap=2, indented=True)
     for one in data["warnings"]:
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
     yield BLANK

@@ -14,7 +14,7 @@ from cfmkit.cli.page_blocks import (
     FAINT,
     GOOD,
     LABEL,
-    Grid,
+    CellGrid,
     Paragraph,
     Span,
     Written,
@@ -186,7 +186,7 @@ def _page(
     reused = f", {records.reused} from the journal" if records.reused else ""
     yield title(records.work.study.spec, f"{records.finished} points in {written.seconds:.2f} s{reused}")
     yield BLANK
-    yield Grid(columns(True, True, True), list(_numbers(records, data, everything)))
+    yield CellGrid(columns(True, True, True), list(_numbers(records, data, everything)))
     yield BLANK
     if code is ExitCode.REQUIREMENT_MISSED:
         yield Paragraph("missed", "no point meets every requirement", BAD)

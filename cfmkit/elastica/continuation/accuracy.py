@@ -8,7 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Solver
 
 
@@ -18,7 +18,7 @@ def largest_force(trail: Trail) -> FloatArray:
     return forces
 
 
-def estimate(problem: Problem, trail: Trail) -> float:
+def estimate(problem: PathProblem, trail: Trail) -> float:
     """Return the largest of `errors` at up to three points: middle, last, and where the forces are largest."""
     count = len(trail.points)
     if not count:
@@ -31,7 +31,7 @@ def estimate(problem: Problem, trail: Trail) -> float:
     return max(errors(problem, trail, sorted(chosen), float(forces[hardest])))
 
 
-def errors(problem: Problem, trail: Trail, indices: list[int], largest: float) -> list[float]:
+def errors(problem: PathProblem, trail: Trail, indices: list[int], largest: float) -> list[float]:
     """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
 
     `largest` is the path's largest force. Infinite where the finer mesh has no equilibrium nearby.

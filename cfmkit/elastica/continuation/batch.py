@@ -26,7 +26,7 @@ _CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that ar
 
 
 @dataclass(frozen=True)
-class Outcome:
+class NetworkOutcome:
     """What came of one network.
 
     Attributes
@@ -63,7 +63,7 @@ def trace_many(
     control: Control | None = None,
     collect: Callable[[Path], Any] = requested,
     workers: int = 1,
-) -> Iterator[Outcome]:
+) -> Iterator[NetworkOutcome]:
     """Yield one outcome for each network, in their order; nothing but the collected values is kept.
 
     Parameters
@@ -113,17 +113,17 @@ class _Packed:
     values: list[Any]
     arrays: tuple[FloatArray, FloatArray, Any] | None
 
-    def outcomes(self) -> Iterator[Outcome]:
+    def outcomes(self) -> Iterator[NetworkOutcome]:
         """Yield the outcomes."""
         end = 0
         for (status, message), value in zip(self.said, self.values, strict=True):
             if self.arrays is not None and value is not None:
                 begin, end = end, end + value
                 value = Requested(*(array[begin:end] for array in self.arrays))
-            yield Outcome(status, message, value)
+            yield NetworkOutcome(status, message, value)
 
 
-def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> _Packed:
+def _outcomes(networks: list[Any], one: Callable[[Any], NetworkOutcome]) -> _Packed:
     found = [one(network) for network in networks]
     said, values = [(each.status, each.message) for each in found], [each.value for each in found]
     rows = [value for value in values if value is not None]
@@ -137,9 +137,9 @@ def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> _Packed:
 
 def _outcome(
     network: Network | Callable[[], Network], drive: Drive, control: Control | None, collect: Callable[[Path], Any]
-) -> Outcome:
+) -> NetworkOutcome:
     try:
         path = trace(network() if callable(network) else network, drive, control)
     except CfmError as error:
-        return Outcome("INVALID", str(error), None)
-    return Outcome(path.status.name, path.message, collect(path))
+        return NetworkOutcome("INVALID", str(error), None)
+    return NetworkOutcome(path.status.name, path.message, collect(path))

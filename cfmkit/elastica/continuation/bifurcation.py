@@ -23,7 +23,7 @@ from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
@@ -39,7 +39,7 @@ _NEAR = 1e-4  # share of the drive's range from which the next requested point i
 _SHORTER = 0.25  # of a step that passed what was not resolved, for the next
 
 
-def crossed(problem: Problem, trail: Trail) -> Move:
+def crossed(problem: PathProblem, trail: Trail) -> Move:
     """Handle a change of inertia between the last two points."""
     natural = trail.stretch.natural
     begun = -2 if natural else _last_step_before(trail)
@@ -78,7 +78,7 @@ def crossed(problem: Problem, trail: Trail) -> Move:
     return _parted(problem, trail, found, one, other, unreported) if natural else Resume(trail, other)
 
 
-def _unresolved(problem: Problem, trail: Trail, other: Spot) -> Move:
+def _unresolved(problem: PathProblem, trail: Trail, other: Spot) -> Move:
     """Look again with a shorter step at what changed the inertia, or tell that it is not known."""
     before, after = trail.unstable(-2), trail.unstable(-1)
     if after > before and _may_be_shorter(problem, trail) and not trail.stuck(problem):
@@ -90,7 +90,7 @@ def _unresolved(problem: Problem, trail: Trail, other: Spot) -> Move:
     return Resume(trail, other)
 
 
-def _on_one_path(problem: Problem, found: Singular, one: Spot, beyond: Spot) -> bool:
+def _on_one_path(problem: PathProblem, found: Singular, one: Spot, beyond: Spot) -> bool:
     """Tell whether a path goes straight on through a singular point that was found between two of its points.
 
     A slightly imperfect part has a sharp corner there instead, and behind it a path of its own that is unstable.
@@ -115,7 +115,7 @@ def _last_step_before(trail: Trail) -> int:
     return index
 
 
-def _at_it(problem: Problem, trail: Trail, index: int, spot: Spot | None, other: Spot | None) -> bool:
+def _at_it(problem: PathProblem, trail: Trail, index: int, spot: Spot | None, other: Spot | None) -> bool:
     """Tell whether one of the last two points lies at the bifurcation between them, for the fine mesh.
 
     It has another inertia there than on this mesh, or hardly any determinant compared with the other one.
@@ -145,7 +145,7 @@ def _without_last_but_one(trail: Trail) -> Trail | None:
     return replace(back.with_last(last, name), visited={**trail.visited, place: times})
 
 
-def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot, unreported: Trail) -> Move:
+def _parted(problem: PathProblem, trail: Trail, found: Singular, one: Spot, other: Spot, unreported: Trail) -> Move:
     """Go on behind a bifurcation between `one` and the last point `other`, where the control says.
 
     `unreported` is the path without the word of it, for where it is to be looked at again.
@@ -176,7 +176,7 @@ def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: S
     return Resume(trail, left, 0.5 * abs(left.drive - found.spot.drive))
 
 
-def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spot) -> Resume:
+def _past(problem: PathProblem, trail: Trail, found: Singular, one: Spot, clear: Spot) -> Resume:
     """Stay on the path behind a bifurcation between `one` and the last point; go on from `clear`, there or beyond."""
     last = trail.points.take([-1])
     trail = points_at_bifurcation.opening(problem, trail.up_to(-1), found, one, None, trail.branch)
@@ -188,7 +188,7 @@ def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spo
     return Resume(trail, clear)
 
 
-def _clear_of(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
+def _clear_of(problem: PathProblem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
     """Return a point behind a bifurcation from which the path can be followed on: `other` if it is far enough.
 
     Near a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
@@ -208,7 +208,7 @@ def _clear_of(problem: Problem, trail: Trail, found: Singular, one: Spot, other:
     return other if near is None else near
 
 
-def _sure(problem: Problem, trail: Trail, one: Spot, other: Spot, found: Singular) -> bool:
+def _sure(problem: PathProblem, trail: Trail, one: Spot, other: Spot, found: Singular) -> bool:
     """Tell whether a bifurcation was found before and now between points so near that its branch would be found too.
 
     Or as near as steps lead.
@@ -218,7 +218,7 @@ def _sure(problem: Problem, trail: Trail, one: Spot, other: Spot, found: Singula
     return close and known is not None and abs(known.spot.drive - found.spot.drive) <= near
 
 
-def _not_beyond(problem: Problem, trail: Trail, found: Singular, left: Spot, forward: float) -> Spot:
+def _not_beyond(problem: PathProblem, trail: Trail, found: Singular, left: Spot, forward: float) -> Spot:
     """Return the entry of a branch, moved back before the next requested point where it lies beyond that.
 
     Away from a bifurcation a branch opens like the square root of the distance.
@@ -236,7 +236,7 @@ def _not_beyond(problem: Problem, trail: Trail, found: Singular, left: Spot, for
     return near if solver.pose_change(near.y, start) > 0.3 * solver.pose_change(guess, start) else left
 
 
-def _may_be_shorter(problem: Problem, trail: Trail) -> bool:
+def _may_be_shorter(problem: PathProblem, trail: Trail) -> bool:
     """Tell whether the last step may have passed a sharp corner, and ended on another path."""
     return trail.stretch.natural and trail.last_step > _FINEST * problem.span
 
@@ -248,7 +248,7 @@ def _again(trail: Trail) -> Resume:
     return Resume(back, back.spot(-1), _SHORTER * trail.last_step)
 
 
-def _no_branch(problem: Problem, trail: Trail, found: Singular) -> Stop:
+def _no_branch(problem: PathProblem, trail: Trail, found: Singular) -> Stop:
     """End at a bifurcation without a stable branch nearby: the mechanism jumps there."""
     place = found.spot.drive * problem.unit
     message = f"no stable equilibrium near {place:.6g}: it jumps to a distant one there"
@@ -263,7 +263,7 @@ def _along(trail: Trail, spot: Spot) -> Spot:
     return replace(spot, tangent=-spot.tangent) if float((weights * came) @ spot.tangent) < 0 else spot
 
 
-def past_corner(problem: Problem, trail: Trail, spot: Spot, requested: int) -> tuple[Trail, Move | None]:
+def past_corner(problem: PathProblem, trail: Trail, spot: Spot, requested: int) -> tuple[Trail, Move | None]:
     """Go past a bifurcation where the march along the primary path stalled; None where there is none.
 
     On the fine mesh the path is followed up to a requested point just before the bifurcation, then across it.
@@ -291,7 +291,7 @@ def past_corner(problem: Problem, trail: Trail, spot: Spot, requested: int) -> t
     return trail, None if back is None else crossed(problem, back)
 
 
-def _taken_back(problem: Problem, trail: Trail, place: float) -> Trail | None:
+def _taken_back(problem: PathProblem, trail: Trail, place: float) -> Trail | None:
     """Return the path up to well before a place, and a point behind it, if there is a bifurcation between."""
     points, names = trail.points, trail.branches
     last = len(names) - 1
@@ -309,7 +309,7 @@ def _taken_back(problem: Problem, trail: Trail, place: float) -> Trail | None:
     return replace(behind, events=events)
 
 
-def _before(problem: Problem, trail: Trail) -> tuple[Trail, Spot] | None:
+def _before(problem: PathProblem, trail: Trail) -> tuple[Trail, Spot] | None:
     """Return the path up to the last point that is before the bifurcation on the fine mesh too, and that point."""
     for back in range(1, min(len(trail.points) - trail.stretch.begun, _BACK) + 1):
         if trail.points.unstable[-back] != trail.points.unstable[-1]:
@@ -323,7 +323,7 @@ def _before(problem: Problem, trail: Trail) -> tuple[Trail, Spot] | None:
     return None
 
 
-def _on_fine(problem: Problem, trail: Trail, spot: Spot, drive: float) -> Spot | None:
+def _on_fine(problem: PathProblem, trail: Trail, spot: Spot, drive: float) -> Spot | None:
     """Return the equilibrium of the fine mesh at a drive, if it is near, solved on this mesh if that is possible."""
     fine = problem.fine
     wide = fine.solve(fine.expand(spot.y), drive)

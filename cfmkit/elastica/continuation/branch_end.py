@@ -16,7 +16,7 @@ from cfmkit.elastica.outcome.path import Event, PathStatus
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
@@ -30,7 +30,7 @@ _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
 
 def predicted_end(
-    problem: Problem, trail: Trail, other: Spot, before: int, sense: float, onto: str
+    problem: PathProblem, trail: Trail, other: Spot, before: int, sense: float, onto: str
 ) -> tuple[BranchEnd | None, bool]:
     """Return where the path that was left becomes stable again: there the branch may rejoin it. Or None.
 
@@ -66,13 +66,13 @@ def predicted_end(
     return end_at(problem, closing, beyond, onto), trail.closed
 
 
-def end_at(problem: Problem, place: Singular, beyond: Spot, onto: str) -> BranchEnd:
+def end_at(problem: PathProblem, place: Singular, beyond: Spot, onto: str) -> BranchEnd:
     """Return the end of a branch at a singular point of the path that it joins; spots are of the fine mesh."""
     reduced = problem.fine.reduce
     return BranchEnd(place.spot.drive, reduced(place.spot).y, reduced(beyond), place.before, place.after, onto)
 
 
-def _fine_before(problem: Problem, points: Points) -> Spot | None:
+def _fine_before(problem: PathProblem, points: Points) -> Spot | None:
     """Return the last of some points that is as stable on the fine mesh: near a bifurcation it may not be."""
     fine = problem.fine
     for k in reversed(range(len(points))):
@@ -82,12 +82,12 @@ def _fine_before(problem: Problem, points: Points) -> Spot | None:
     return None
 
 
-def _place(problem: Problem, trail: Trail, one: Spot, other: Spot) -> Singular | None:
+def _place(problem: PathProblem, trail: Trail, one: Spot, other: Spot) -> Singular | None:
     """Return the singular point between two equilibria, without its null vector."""
     return points_at_bifurcation.located(problem, trail, one, other, vector=False)
 
 
-def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
+def _room(problem: PathProblem, trail: Trail, place: float, sense: float) -> float:
     """Return how far from a bifurcation to go on, in one sense: not beyond the next requested point away from it."""
     ahead, span = (trail.stretch.targets - place) * sense, problem.span
     nearest = ahead[ahead > points_at_bifurcation.NEAR_BIFURCATION * span].min(initial=np.inf)
@@ -95,7 +95,7 @@ def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
 
 
 def up_to_ends(
-    problem: Problem, trail: Trail, spot: Spot, left: FloatArray, numbers: Any
+    problem: PathProblem, trail: Trail, spot: Spot, left: FloatArray, numbers: Any
 ) -> tuple[FloatArray, Any, BranchEnd | None]:
     """Return the values still to be reached and their numbers, on a branch up to just before an end that is known.
 
@@ -113,7 +113,7 @@ def up_to_ends(
     return left, numbers, toward
 
 
-def rejoined(problem: Problem, trail: Trail, spot: Spot, end: BranchEnd | None) -> Move:
+def rejoined(problem: PathProblem, trail: Trail, spot: Spot, end: BranchEnd | None) -> Move:
     """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch.
 
     A drive that turns back there stays on the branch.
@@ -138,7 +138,7 @@ def rejoined(problem: Problem, trail: Trail, spot: Spot, end: BranchEnd | None) 
     return Resume(trail.with_spot(start, -1), start)
 
 
-def stepped_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> Move | None:
+def stepped_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int) -> Move | None:
     """Step over the end of a branch onto the path that it joins there: a small change for a small advance; or None."""
     span, fine = problem.span, problem.fine
     end = next((end for end in trail.ends if abs(end.drive - spot.drive) <= BEFORE_END * span), None)
@@ -164,7 +164,7 @@ def stepped_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> 
     return None
 
 
-def _clear(problem: Problem, trail: Trail, wide: Spot, advance: float) -> Spot | None:
+def _clear(problem: PathProblem, trail: Trail, wide: Spot, advance: float) -> Spot | None:
     """Return a point further along the path of the fine mesh: near the end of a branch steps lead back onto it."""
     fine, room = problem.fine, 0.5 * problem.nearest_target(trail.ahead, wide.drive)
     away = float(np.sign(advance)) * min(_CLEAR * problem.span, room)
@@ -178,7 +178,7 @@ def _clear(problem: Problem, trail: Trail, wide: Spot, advance: float) -> Spot |
     return trail.settled(fine.reduce(third)) if moved <= problem.reach(abs(away)) else None
 
 
-def closed_behind(problem: Problem, trail: Trail) -> Trail | None:
+def closed_behind(problem: PathProblem, trail: Trail) -> Trail | None:
     """Return the path with the end of its last branch, found by going back along the path that it joined.
 
     Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability; a
@@ -216,7 +216,7 @@ def closed_behind(problem: Problem, trail: Trail) -> Trail | None:
     return replace(trail, branches=tuple(branches), events=(*events, closing))
 
 
-def relabelled(problem: Problem, trail: Trail, primary: Trail) -> Trail:
+def relabelled(problem: PathProblem, trail: Trail, primary: Trail) -> Trail:
     """Return the path with the points of a branch that lie on the primary path named so: its end was stepped over.
 
     `primary` is the same network followed without leaving the primary path. Where exactly the branch ended is not

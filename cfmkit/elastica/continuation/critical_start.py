@@ -19,7 +19,7 @@ from cfmkit.elastica.equilibrium.meshed_network import Spot
 from cfmkit.elastica.outcome.path import Event
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
 
 _JUST = 1e-10  # share of the prestress or the constant loads that the start is just critical at
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start
@@ -28,7 +28,7 @@ _BEFORE = 0.9  # share of the way to the first requested point up to which it is
 _STRAIGHT = 1e-3  # share of the way to the first requested point after which a path that goes straight on is met
 
 
-def left(problem: Problem, trail: Trail, spot: Spot) -> Resume | None:
+def left(problem: PathProblem, trail: Trail, spot: Spot) -> Resume | None:
     """Leave a critical start, near `spot`, that no march got away from; None where that cannot be."""
     far = np.abs(trail.points.drive).max(initial=0.0) > _NEAR * problem.span
     if not _done_before(problem) or 0.0 in trail.pinned or far:
@@ -54,7 +54,7 @@ def left(problem: Problem, trail: Trail, spot: Spot) -> Resume | None:
     return Resume(trail, near, 0.5 * abs(near.drive))
 
 
-def left_again(problem: Problem, trail: Trail) -> Resume | None:
+def left_again(problem: PathProblem, trail: Trail) -> Resume | None:
     """Leave a critical start from which a march went straight on, unstable; None where it was not so."""
     control = problem.control
     if control.branch != "stable" or control.through_folds or not len(trail.points) or not trail.events:
@@ -67,7 +67,7 @@ def left_again(problem: Problem, trail: Trail) -> Resume | None:
     return left(problem, only, only.spot(0))
 
 
-def _done_before(problem: Problem) -> bool:
+def _done_before(problem: PathProblem) -> bool:
     """Tell whether anything was done to a network before: one that is critical at rest is rigid, or loose."""
     network = problem.layout.network
     if problem.ramp:
@@ -75,7 +75,7 @@ def _done_before(problem: Problem) -> bool:
     return bool(network.springs or network.loads or problem.layout.held)
 
 
-def _sides(problem: Problem, start: Spot, goal: float) -> list[Spot | None]:
+def _sides(problem: PathProblem, start: Spot, goal: float) -> list[Spot | None]:
     """Return equilibria on both sides of the start, before the first requested point, where the drive leads there.
 
     Both are equally far from it, as far as possible. The side that the control asks for comes first.

@@ -21,13 +21,13 @@ from cfmkit.elastica.kernels.status_codes import DENIED, DONE, INERTIA, NO_START
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _NEARBY = 0.01  # share of the drive's range within which a march stalls at the same place again
 
 
-def decided(problem: Problem, leg: Leg, fresh: bool) -> Move:
+def decided(problem: PathProblem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
     trail, requested = leg.trail, leg.trail.requested
     away = critical_start.left_again(problem, trail) if fresh else None
@@ -41,7 +41,7 @@ def decided(problem: Problem, leg: Leg, fresh: bool) -> Move:
     return Stop(move.trail) if problem.first_only and move.trail.first is not None else move
 
 
-def _after(problem: Problem, leg: Leg, requested: int) -> Move:
+def _after(problem: PathProblem, leg: Leg, requested: int) -> Move:
     """Return where to go on after a march that ended early, or on a branch."""
     trail, spot, code, control = leg.trail, leg.spot, leg.code, problem.control
     regained = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
@@ -64,7 +64,7 @@ def _after(problem: Problem, leg: Leg, requested: int) -> Move:
     return ending.stop(problem, trail, code)
 
 
-def _got_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> Move:
+def _got_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int) -> Move:
     """Return where to go on after a march by the drive that stalled."""
     fold = limit_point.is_near(problem, trail)
     if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:

@@ -12,7 +12,7 @@ from cfmkit.elastica.kernels.status_codes import FULL, LONG, OUTSIDE
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
 
 _NO_START = (
     "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
@@ -26,24 +26,24 @@ _CRITICAL = (
 _SINGULAR = 1e10  # condition of a tangent that is singular but for rounding
 
 
-def without_start(problem: Problem, trail: Trail, share: float) -> Trail:
+def without_start(problem: PathProblem, trail: Trail, share: float) -> Trail:
     """Return a path without any point, and why; `share` of the constant loads was reached."""
     text = _CRITICAL if share == 1.0 else _NO_START.format(share)
     return trail.stopped(PathStatus.NO_START, text if _loaded(problem) else _RIGID, trail.ending.too_long)
 
 
-def _loaded(problem: Problem) -> bool:
+def _loaded(problem: PathProblem) -> bool:
     """Tell whether anything is done to a network before the drive begins."""
     network = problem.layout.network
     return bool(network.loads or problem.layout.held or network.springs)
 
 
-def stop(problem: Problem, trail: Trail, code: int) -> Stop:
+def stop(problem: PathProblem, trail: Trail, code: int) -> Stop:
     """Stop where a march ended early."""
     return Stop(_stopped(problem, trail, code))
 
 
-def _stopped(problem: Problem, trail: Trail, code: int) -> Trail:
+def _stopped(problem: PathProblem, trail: Trail, code: int) -> Trail:
     where = f"at {trail.drive * problem.unit:.6g}" if len(trail.points) else "at rest"
     if code == LONG:
         return trail.stopped(PathStatus.LOST, f"a segment is too long for its load {where}", too_long=True)
@@ -68,7 +68,7 @@ def _rigid(trail: Trail) -> bool:
     return not np.linalg.cond(tangent) < _SINGULAR
 
 
-def inaccurate(problem: Problem, trail: Trail, error: float, count: int) -> Trail:
+def inaccurate(problem: PathProblem, trail: Trail, error: float, count: int) -> Trail:
     """Return the path with a word about its error; its status stays if that says already why the path ended."""
     share = f"{count} of {len(trail.points)} points"
     text = f"the tolerance of {problem.control.tolerance:.3g} was not reached: error {error:.3g}, {share}"

@@ -20,14 +20,14 @@ from cfmkit.elastica.model.shapes import Bent
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Problem
+    from cfmkit.elastica.continuation.state import PathProblem
 
 _KICK = 1e-5  # of the mode, to difference its states
 _DEGREE = 14  # of the polynomials that the rotations are given as,
 _PLACES = 32  # from so many places of a beam
 
 
-def imperfect(network: Network, first: tuple[Problem, Singular] | None, size: float) -> tuple[Network, str]:
+def imperfect(network: Network, first: tuple[PathProblem, Singular] | None, size: float) -> tuple[Network, str]:
     """Return the network with a mode of this size [m] in its shapes, and the sentence that names it.
 
     `first` is the first bifurcation of the primary path of the perfect network, and the problem that it is one of.

@@ -15,7 +15,7 @@ from cfmkit.elastica.outcome.path import PathStatus
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import BranchEnd, Move, Problem
+    from cfmkit.elastica.continuation.state import BranchEnd, Move, PathProblem
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _HOPS = 60  # decisions on one path
@@ -31,17 +31,17 @@ class Followed:
     ----------
     share : float
         Of the constant loads and displacements that was reached.
-    first : (Problem, Singular) or None
+    first : (PathProblem, Singular) or None
         The first bifurcation at which stability is lost, and the problem that it is one of: the drive's, or that of
         the way to the prestress or the constant loads.
     """
 
     trail: Trail
     share: float
-    first: tuple[Problem, Singular] | None
+    first: tuple[PathProblem, Singular] | None
 
 
-def follow(problem: Problem) -> Followed:
+def follow(problem: PathProblem) -> Followed:
     """Follow a path from rest to the last requested point, or to where it ends, and name the branches."""
     begun = start.started(problem, Trail.begun(problem), _way)
     trail = _named(problem, _followed(problem, begun))
@@ -49,12 +49,12 @@ def follow(problem: Problem) -> Followed:
     return Followed(trail, begun.share, first)
 
 
-def _way(problem: Problem, branch: str) -> Trail:
+def _way(problem: PathProblem, branch: str) -> Trail:
     """Follow a path that begins on a branch."""
     return _named(problem, _followed(problem, start.started(problem, Trail.begun(problem, branch), _way)))
 
 
-def _followed(problem: Problem, begun: start.Start) -> Trail:
+def _followed(problem: PathProblem, begun: start.Start) -> Trail:
     """Return the path from where it starts: the loop that applies the moves that decisions come to."""
     trail = begun.trail
     if begun.spot is None:
@@ -81,12 +81,12 @@ def _followed(problem: Problem, begun: start.Start) -> Trail:
     return trail
 
 
-def _complete(problem: Problem, move: Resume) -> bool:
+def _complete(problem: PathProblem, move: Resume) -> bool:
     """Tell whether all points of the stretch are done that is being followed."""
     return not move.fresh and move.trail.requested >= len(move.trail.stretch.targets)
 
 
-def _named(problem: Problem, trail: Trail) -> Trail:
+def _named(problem: PathProblem, trail: Trail) -> Trail:
     """Return a path with the end of its last branch, where it was stepped over or is known from behind only."""
     if trail.closed or trail.ending.too_long or not trail.stretch.natural or set(trail.branches) <= {PRIMARY}:
         return trail
@@ -99,7 +99,7 @@ def _named(problem: Problem, trail: Trail) -> Trail:
     return branch_end.relabelled(problem, trail, _way(primary, PRIMARY))
 
 
-def march(problem: Problem, move: Resume) -> Leg:
+def march(problem: PathProblem, move: Resume) -> Leg:
     """March once: predictor and corrector, in compiled code, up to where a decision is needed."""
     trail, spot, stretch, control = move.trail, move.spot, move.trail.stretch, problem.control
     requested = int(stretch.targets[0] == 0.0) if move.fresh else trail.requested
@@ -122,7 +122,7 @@ def march(problem: Problem, move: Resume) -> Leg:
 
 
 def ahead(
-    problem: Problem, trail: Trail, spot: Spot, requested: int
+    problem: PathProblem, trail: Trail, spot: Spot, requested: int
 ) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
     """Return the values of the drive still to be reached and their numbers among those requested, and a branch's end.
 
@@ -142,7 +142,7 @@ def ahead(
     return left, np.append(numbers, -1), toward
 
 
-def _first_step(problem: Problem, move: Resume, requested: int) -> float:
+def _first_step(problem: PathProblem, move: Resume, requested: int) -> float:
     """Return the first step of a march, with the sign of the way to go if it is by the drive."""
     stretch, first = move.trail.stretch, problem.control.first_step
     along = float(stretch.targets[requested] - move.spot.drive)
@@ -156,7 +156,7 @@ def _first_step(problem: Problem, move: Resume, requested: int) -> float:
     return float(np.sign(along)) * min(abs(along), _FIRST * problem.span, move.step)
 
 
-def _next(problem: Problem, leg: Leg, fresh: bool) -> Move:
+def _next(problem: PathProblem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
     trail = leg.trail
     if leg.code == DONE and trail.requested == len(problem.values) and not (fresh and trail.events):

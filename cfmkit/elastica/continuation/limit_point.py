@@ -17,14 +17,14 @@ from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT
 from cfmkit.elastica.kernels.status_codes import INERTIA
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _WELL = 1e-3  # share of the drive's range before a limit point at which the arc length takes over
 _ROOM = 60  # points in which a limit point is found
 
 
-def is_near(problem: Problem, trail: Trail) -> bool:
+def is_near(problem: PathProblem, trail: Trail) -> bool:
     """Tell whether a march by the drive stalled at a limit point: along the arc it turns back, stability is lost."""
     if not problem.control.through_folds:
         return False
@@ -38,7 +38,7 @@ def is_near(problem: Problem, trail: Trail) -> bool:
     return bool(points.drive_rate[-1] * spot.tangent[-1] < 0.0) and changed % 2 == 1
 
 
-def around(problem: Problem, trail: Trail) -> Resume:
+def around(problem: PathProblem, trail: Trail) -> Resume:
     """Go on by the arc length, from a little before the last point."""
     trail = trail.up_to(_well_before(problem, trail) + 1)
     start, stop = one_way(problem.values.tolist(), trail.requested)
@@ -66,19 +66,19 @@ def one_way(values: list[float], requested: int) -> tuple[int, int]:
     return start, len(values)
 
 
-def by_the_drive(problem: Problem, trail: Trail, first: int, step: float = np.inf) -> Resume:
+def by_the_drive(problem: PathProblem, trail: Trail, first: int, step: float = np.inf) -> Resume:
     """Let the drive take over again, with a requested point. What was found before does not hold."""
     stretch = Stretch(problem.values, True, first, len(trail.points) - 1, trail.stretch.before_fold)
     cleared = replace(trail, stretch=stretch, visited={}, again_at=np.nan, without_branch=None, closed=True, ends=())
     return Resume(cleared, cleared.spot(-1), step)
 
 
-def first_step(problem: Problem) -> float:
+def first_step(problem: PathProblem) -> float:
     """Return the first step along the arc."""
     return 0.02 * min(problem.span, 1.0)
 
 
-def back_to_the_drive(problem: Problem, move: Move) -> Move:
+def back_to_the_drive(problem: PathProblem, move: Move) -> Move:
     """Let the drive take over again where it goes on towards its last point and the path is as stable as before."""
     trail = move.trail
     if not isinstance(move, Resume) or trail.stretch.natural or not trail.events:
@@ -105,7 +105,7 @@ def _last_step(trail: Trail) -> float:
     return float(lengths[1] - lengths[0] if lengths[1] > lengths[0] else lengths[1])
 
 
-def _clear_of(problem: Problem, move: Resume, place: float, reach: float) -> Resume | None:
+def _clear_of(problem: PathProblem, move: Resume, place: float, reach: float) -> Resume | None:
     """Go on so far behind a limit point that a march by the drive may start from there; None if there is no point."""
     trail, spot = move.trail, move.spot
     if abs(spot.drive - place) >= reach:
@@ -121,7 +121,7 @@ def _clear_of(problem: Problem, move: Resume, place: float, reach: float) -> Res
     return Resume(trail, trail.spot(-1))
 
 
-def fine_spots(problem: Problem, trail: Trail, first: int) -> tuple[Spot | None, Spot | None]:
+def fine_spots(problem: PathProblem, trail: Trail, first: int) -> tuple[Spot | None, Spot | None]:
     """Return a point and the last one on the fine mesh, solved for along the chord between them.
 
     Near a limit point there may be none at the same drive.
@@ -144,14 +144,14 @@ def _next(trail: Trail, place: float) -> int:
     return int(ahead.argmax())
 
 
-def _along(problem: Problem, trail: Trail, index: int) -> Spot:
+def _along(problem: PathProblem, trail: Trail, index: int) -> Spot:
     """Return a point with its tangent in the sense of the drive."""
     spot = trail.spot(index)
     _, stop = one_way(problem.values.tolist(), trail.requested)
     return replace(spot, tangent=spot.tangent * np.sign(problem.values[stop - 1] - spot.drive))
 
 
-def _well_before(problem: Problem, trail: Trail) -> int:
+def _well_before(problem: PathProblem, trail: Trail) -> int:
     """Return the index of a point a little before the last; nothing was requested or happened between."""
     points, drives = trail.points, trail.points.drive
     index = len(points) - 1

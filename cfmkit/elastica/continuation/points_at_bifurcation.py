@@ -19,7 +19,7 @@ from cfmkit.elastica.equilibrium.meshed_network import Spot
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import BranchEnd, Problem, Trail
+    from cfmkit.elastica.continuation.state import BranchEnd, PathProblem, Trail
 
 NEAR_BIFURCATION = 1e-5  # share of the drive's range
 _AT = 3e-11  # and within which a point is at the bifurcation, whose place is known to about 1e-11
@@ -29,7 +29,7 @@ _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is predict
 
 
 def located(
-    problem: Problem, trail: Trail, one: Spot, other: Spot, fold: bool = False, vector: bool = True
+    problem: PathProblem, trail: Trail, one: Spot, other: Spot, fold: bool = False, vector: bool = True
 ) -> Singular | None:
     """Return the singular point between two equilibria: as exactly as the tolerance asks, or a requested point.
 
@@ -46,7 +46,7 @@ def located(
     return locate(problem.fine, one, other, natural, 0.0, fold, vector)
 
 
-def count(problem: Problem, trail: Trail, place: float, start: float) -> int:
+def count(problem: PathProblem, trail: Trail, place: float, start: float) -> int:
     """Return how many of the points still requested, one after the other, lie between a start and a bifurcation.
 
     Or at it: a little behind it counts as well.
@@ -57,7 +57,7 @@ def count(problem: Problem, trail: Trail, place: float, start: float) -> int:
     return int(outside.argmax()) if outside.any() else len(outside)
 
 
-def passed(problem: Problem, trail: Trail, goal: float) -> Trail | None:
+def passed(problem: PathProblem, trail: Trail, goal: float) -> Trail | None:
     """Return the path with a point behind a bifurcation at the drive `goal`, to which no step led; None without one.
 
     The path is predicted from its last two points, on the fine mesh, and compared as far behind that drive as they are
@@ -79,7 +79,7 @@ def passed(problem: Problem, trail: Trail, goal: float) -> Trail | None:
     return trail.with_spot(trail.settled_or_given(fine.reduce(found)), -1)
 
 
-def opening(problem: Problem, trail: Trail, found: Singular, one: Spot, wide: Spot | None, name: str) -> Trail:
+def opening(problem: PathProblem, trail: Trail, found: Singular, one: Spot, wide: Spot | None, name: str) -> Trail:
     """Return the path with the requested points up to a bifurcation on it, and at it, behind it, on the branch.
 
     `one` is on the path before it, `wide` on the branch, both on the fine mesh; without a branch the path goes on.
@@ -100,7 +100,7 @@ def opening(problem: Problem, trail: Trail, found: Singular, one: Spot, wide: Sp
     return trail
 
 
-def closing(problem: Problem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail:
+def closing(problem: PathProblem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail:
     """Return the path with the requested points where a branch ends: on it up to there, behind it where it leads."""
     for _ in range(count(problem, trail, end.drive, spot.drive)):
         value = float(trail.ahead[0])
@@ -115,7 +115,7 @@ def closing(problem: Problem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail
 
 
 def _with_requested(
-    problem: Problem, trail: Trail, start: FloatArray, change: FloatArray, value: float, unstable: int
+    problem: PathProblem, trail: Trail, start: FloatArray, change: FloatArray, value: float, unstable: int
 ) -> Trail:
     """Return the path with the next requested point, solved on the fine mesh if that leads where it is predicted."""
     y, solver, fine = start + change, trail.solver, problem.fine

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.state import PRIMARY, Problem, Trail
+from cfmkit.elastica.continuation.state import PRIMARY, PathProblem, Trail
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
 from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver, Spot
 from cfmkit.elastica.kernels.status_codes import DONE, LONG, SHORT, STALLED
@@ -30,7 +30,7 @@ _SOFTER = (3.0, 1.0, 0.3, 0.1)  # times as thick, with the same bending stiffnes
 _ENOUGH = 16  # segments of a beam with which such a way is found
 _STEP, _TURN = 0.25, 0.35  # first step, as a share of them; largest change of a pose in a step
 
-Follow = Callable[[Problem, str], Trail]
+Follow = Callable[[PathProblem, str], Trail]
 """Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.joined_marches.follow`."""
 
 
@@ -48,7 +48,7 @@ class Start:
         Of the constant loads and displacements that was reached.
     code : int
         That of a march.
-    ramp : (Problem, Singular) or None
+    ramp : (PathProblem, Singular) or None
         The way to the prestress or the constant loads and the first bifurcation on it, if only that was looked for.
     """
 
@@ -56,10 +56,10 @@ class Start:
     spot: Spot | None
     share: float
     code: int
-    ramp: tuple[Problem, Singular] | None = None
+    ramp: tuple[PathProblem, Singular] | None = None
 
 
-def started(problem: Problem, trail: Trail, follow: Follow) -> Start:
+def started(problem: PathProblem, trail: Trail, follow: Follow) -> Start:
     """Return where a path starts."""
     if problem.begin is not None:
         return Start(trail, problem.begin, 1.0, DONE)
@@ -87,7 +87,7 @@ def started(problem: Problem, trail: Trail, follow: Follow) -> Start:
     return replace(loaded, code=LONG) if coarse else loaded
 
 
-def _by_stretching(problem: Problem, follow: Follow) -> Spot | None:
+def _by_stretching(problem: PathProblem, follow: Follow) -> Spot | None:
     """Return a stable equilibrium under the constant loads and displacements near that of beams that stretch; or None.
 
     A straight beam that does not stretch has no way to where both of its ends are held closer together: its rotations
@@ -95,7 +95,7 @@ def _by_stretching(problem: Problem, follow: Follow) -> Spot | None:
     """
     network, drive = problem.layout.network, problem.layout.drive
     control = replace(problem.control, branch="stable")
-    soft = Problem(Layout(_softer(network, _SOFTER[0]), drive), problem.mesh, control)
+    soft = PathProblem(Layout(_softer(network, _SOFTER[0]), drive), problem.mesh, control)
     spot = started(soft, Trail.begun(soft), follow).spot
     for factor in _SOFTER[1:]:
         if spot is None:
@@ -117,7 +117,7 @@ def _softer(network: Network, factor: float) -> Network:
     return Network(network.nodes, beams, network.links, network.springs, network.loads)
 
 
-def _loaded(problem: Problem, trail: Trail, spot: Spot, indifferent: bool, follow: Follow) -> Start:
+def _loaded(problem: PathProblem, trail: Trail, spot: Spot, indifferent: bool, follow: Follow) -> Start:
     """Apply the constant loads and displacements to a network at rest, its springs tight."""
     solver = problem.solver
     model = assemble_model(problem.layout, solver.cut, solver.table, LOADS)
@@ -134,10 +134,10 @@ def _loaded(problem: Problem, trail: Trail, spot: Spot, indifferent: bool, follo
     return Start(trail, Spot(points.y[-1], 0.0, spot.tangent), 1.0, DONE)
 
 
-def _along(problem: Problem, trail: Trail, what: str, begin: Spot, follow: Follow) -> Start | None:
+def _along(problem: PathProblem, trail: Trail, what: str, begin: Spot, follow: Follow) -> Start | None:
     """Follow the path to the prestress or the loads through its bifurcations; None where that leads nowhere."""
     control = replace(problem.control, through_folds=False, first_step=None)
-    ramp = Problem(problem.layout, problem.mesh, control, problem.first_only, what, begin)
+    ramp = PathProblem(problem.layout, problem.mesh, control, problem.first_only, what, begin)
     way = follow(ramp, trail.branch)
     ending = way.ending
     if ending.too_long:
@@ -163,9 +163,9 @@ def _along(problem: Problem, trail: Trail, what: str, begin: Spot, follow: Follo
     return Start(trail, Spot(way.points.y[-1], 0.0, problem.solver.unit.copy()), 1.0, DONE)
 
 
-def ends_of_branch(problem: Problem, trail: Trail, follow: Follow) -> Trail:
+def ends_of_branch(problem: PathProblem, trail: Trail, follow: Follow) -> Trail:
     """Return the path with the end of the branch that it starts on: where the straight way becomes stable again."""
-    primary = Problem(problem.layout, problem.mesh, replace(problem.control, branch="primary"))
+    primary = PathProblem(problem.layout, problem.mesh, replace(problem.control, branch="primary"))
     spot = problem.solver.tightened() if problem.ramp else started(primary, Trail.begun(primary), follow).spot
     other = None if spot is None else problem.solver.solve(spot.y, 0.0)
     sense = float(np.sign(next(value for value in trail.stretch.targets if value)))

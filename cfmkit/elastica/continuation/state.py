@@ -1,7 +1,7 @@
 """What is followed, the path so far, and the moves that decisions come to: all of them values.
 
-A decision is a function of a `Problem` and a `Trail`; it returns a move, or None where it has nothing to say. Nothing
-is changed in place, so that a decision can be tried, judged and dropped.
+A decision is a function of a `PathProblem` and a `Trail`; it returns a move, or None where it has nothing to say.
+Nothing is changed in place, so that a decision can be tried, judged and dropped.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _NEARBY = 0.01  # share of the drive's range within which a place counts as the 
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class PathProblem:
     """What is followed, on which mesh, and how.
 
     Attributes
@@ -96,10 +96,10 @@ class Problem:
         """SI value of one unit of the drive."""
         return 1.0 if self.ramp else self.layout.scales.drive
 
-    def on_primary(self) -> Problem:
+    def on_primary(self) -> PathProblem:
         """Return the same problem, never to leave the primary path."""
         control = replace(self.control, branch="primary")
-        return Problem(self.layout, self.mesh, control, ramp=self.ramp, begin=self.begin)
+        return PathProblem(self.layout, self.mesh, control, ramp=self.ramp, begin=self.begin)
 
     def options(self, trail: Trail, spot: Spot, step: float) -> MarchOptions:
         """Return the options of a march from a point."""
@@ -217,7 +217,7 @@ class Trail:
     ending: Ending = field(default_factory=Ending)
 
     @classmethod
-    def begun(cls, problem: Problem, branch: str = PRIMARY) -> Trail:
+    def begun(cls, problem: PathProblem, branch: str = PRIMARY) -> Trail:
         """Return a path without any point yet."""
         none = Points.none(problem.solver.size)
         return cls(problem.solver, Stretch(problem.values), none, branch=branch, closed=branch == PRIMARY)
@@ -279,7 +279,7 @@ class Trail:
         visited = {**self.visited, place: self.visited.get(place, 0) + 1}
         return replace(self, visited=visited, again_at=again_at)
 
-    def stuck(self, problem: Problem) -> bool:
+    def stuck(self, problem: PathProblem) -> bool:
         """Tell whether the path was taken up for the second time near where it is."""
         return bool(abs(self.drive - self.again_at) <= _NEARBY * problem.span)
 
@@ -303,7 +303,7 @@ class Trail:
         return self.settled(spot) or replace(spot, tangent=self.solver.unit.copy())
 
 
-def fine_spot(problem: Problem, trail: Trail, index: int) -> Spot | None:
+def fine_spot(problem: PathProblem, trail: Trail, index: int) -> Spot | None:
     """Return a stored point, solved again on the fine mesh."""
     fine = problem.fine
     return fine.solve(fine.expand(trail.points.y[index]), float(trail.points.drive[index]))

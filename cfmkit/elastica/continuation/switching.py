@@ -18,7 +18,7 @@ from cfmkit.elastica.continuation.state import fine_spot
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
     from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 
@@ -50,7 +50,7 @@ def descend(solver: ExpandedSolver, saddle: Spot, sign: int) -> Spot | None:
     return None
 
 
-def first_of_several(problem: Problem, trail: Trail, found: Singular, one: Spot) -> tuple[Trail, Singular]:
+def first_of_several(problem: PathProblem, trail: Trail, found: Singular, one: Spot) -> tuple[Trail, Singular]:
     """Return the first of several bifurcations, if the others are well behind it, and the path up to between them."""
     advance = trail.drive - found.spot.drive
     between = _ahead(problem, trail, found, one, float(np.copysign(_APART * problem.span, advance)))
@@ -63,7 +63,7 @@ def first_of_several(problem: Problem, trail: Trail, found: Singular, one: Spot)
 
 
 def switched(
-    problem: Problem, trail: Trail, found: Singular, one: Spot, forward: float
+    problem: PathProblem, trail: Trail, found: Singular, one: Spot, forward: float
 ) -> tuple[Singular, Spot | None]:
     """Return an equilibrium on the stable branch behind a bifurcation on the fine mesh, or None.
 
@@ -85,7 +85,7 @@ def switched(
     return found, None
 
 
-def _ahead(problem: Problem, trail: Trail, found: Singular, one: Spot, advance: float) -> Spot | None:
+def _ahead(problem: PathProblem, trail: Trail, found: Singular, one: Spot, advance: float) -> Spot | None:
     """Return the equilibrium on the path so far behind a bifurcation, on the fine mesh."""
     start = well_before(problem, trail, found, abs(advance)) or one
     if start.drive == found.spot.drive:
@@ -103,7 +103,7 @@ def _opens(fine: ExpandedSolver, found: Singular, wide: Spot) -> bool:
     return 0.3 < fine.pose_change(near.y, start.y) / fine.pose_change(wide.y, start.y) < 0.7
 
 
-def well_before(problem: Problem, trail: Trail, found: Singular, room: float) -> Spot | None:
+def well_before(problem: PathProblem, trail: Trail, found: Singular, room: float) -> Spot | None:
     """Return the last point but two or earlier that is so far before a bifurcation, on the fine mesh."""
     far = np.flatnonzero(np.abs(trail.points.drive[:-2] - found.spot.drive) >= room)
     return fine_spot(problem, trail, int(far[-1])) if len(far) else None

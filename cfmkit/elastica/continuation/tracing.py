@@ -15,7 +15,7 @@ from cfmkit.elastica.model.layout import Layout
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.outcome.path import Path
 
@@ -63,10 +63,10 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 class Attempt:
     """A path on one mesh, with its estimated error; `first`: see `joined_marches.Followed`."""
 
-    problem: Problem
+    problem: PathProblem
     trail: Trail
     error: float
-    first: tuple[Problem, Singular] | None
+    first: tuple[PathProblem, Singular] | None
 
     def path(self) -> Path:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
@@ -101,7 +101,7 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     from cfmkit.elastica.continuation import ending  # loads the compiler, as do the next ones
     from cfmkit.elastica.continuation.accuracy import estimate
     from cfmkit.elastica.continuation.joined_marches import follow
-    from cfmkit.elastica.continuation.state import Problem
+    from cfmkit.elastica.continuation.state import PathProblem
     from cfmkit.elastica.kernels.status_codes import STALLED
     from cfmkit.elastica.outcome.path import PathStatus
 
@@ -109,7 +109,7 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     mesh, borne = first_mesh(layout, control.tolerance), -1.0
     before: Trail | None = None
     for round_ in range(_ROUNDS):
-        problem = Problem(layout, mesh, control, first_only)
+        problem = PathProblem(layout, mesh, control, first_only)
         followed = follow(problem)
         trail, last = followed.trail, round_ == _ROUNDS - 1
         if trail.ending.too_long and before is not None and not _further(problem, trail, before):
@@ -130,12 +130,12 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     return Attempt(problem, trail, error, followed.first)
 
 
-def _early(problem: Problem, trail: Trail) -> bool:
+def _early(problem: PathProblem, trail: Trail) -> bool:
     """Tell whether a path ended in the first part of the drive's range."""
     return not len(trail.points) or abs(trail.drive) < _EARLY * problem.span
 
 
-def _further(problem: Problem, trail: Trail, before: Trail) -> bool:
+def _further(problem: PathProblem, trail: Trail, before: Trail) -> bool:
     """Tell whether shorter segments lead any further: a path pulled straight is only followed nearer to its end."""
     from cfmkit.elastica.continuation.uncondensed import pulled_straight
 

@@ -17,7 +17,7 @@ from cfmkit.elastica.continuation.state import Resume
 from cfmkit.elastica.equilibrium.uncondensed_system import UncondensedSolver
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.continuation.state import PathProblem, Trail
 
 _STRAIGHT = 1e3  # largest dimensionless force of beams that are not pulled straight
 _SHORT = 1e-4  # share of the drive's range that is a short step
@@ -34,7 +34,7 @@ def pulled_straight(trail: Trail) -> bool:
     return bool(np.abs(forces).max(initial=0.0) > _STRAIGHT)
 
 
-def uncondensed(problem: Problem, trail: Trail, wrong: int = 0) -> Resume | None:
+def uncondensed(problem: PathProblem, trail: Trail, wrong: int = 0) -> Resume | None:
     """Go on with nothing condensed out; None where the path does so already, is only judged, or pulled straight.
 
     The last points that are `wrong` are taken back, and short steps before: what they led to may be a limit point, not
@@ -50,7 +50,7 @@ def uncondensed(problem: Problem, trail: Trail, wrong: int = 0) -> Resume | None
     return Resume(trail, trail.spot(-1), 0.5 * step)
 
 
-def _may_be_shorter(problem: Problem, trail: Trail) -> bool:
+def _may_be_shorter(problem: PathProblem, trail: Trail) -> bool:
     """Tell whether a path ends with a short step on its branch, in which nothing happened that was reported."""
     if len(trail.points) < 3 or trail.branches[-2] != trail.branch:
         return False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.model import HALVES, TABLE_COLUMNS, Model
+from cfmkit.elastica.kernels.model import HALVES, TABLE_COLUMNS, DiscreteNetwork
 from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
 from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
@@ -56,7 +56,7 @@ class Grid:
     beam_of_step, piece : (steps,) int arrays
         The beam that a step is on, and the smooth piece of it; pieces count through all beams.
     segment_step, beam_segment : int arrays
-        As in `cfmkit.elastica.kernels.model.Model`.
+        As in `cfmkit.elastica.kernels.model.DiscreteNetwork`.
     """
 
     edges: FloatArray
@@ -145,7 +145,7 @@ def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
 
 
 def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
-    """Return what the drifts and kicks of all steps take, dimensionless: see `cfmkit.elastica.kernels.model.Model`.
+    """Return what the drifts and kicks of all steps take, dimensionless, as in `kernels.model.DiscreteNetwork`.
 
     `known` is the table of the layout that this one took fits over from: the rows of beams that are neither plain nor
     changed are taken over too.
@@ -188,7 +188,7 @@ def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
 
 
 def si_rows(layout: Layout, name: str, left: FloatArray, right: FloatArray, where: tuple[float, float]) -> Any:
-    """Return the rows of steps on one smooth piece of a beam in SI, (n, rows, columns): see `Model.table`.
+    """Return the rows of steps on one smooth piece of a beam in SI, (n, rows, columns): see `DiscreteNetwork.table`.
 
     left, right: parameters (n, 1) at the ends of the steps; where: a parameter on the piece and the fraction of the
     arc length there.
@@ -248,13 +248,13 @@ def _strip_columns(
     return columns
 
 
-def model(layout: Layout, mesh: Mesh, ramp: str = "") -> Model:
+def model(layout: Layout, mesh: Mesh, ramp: str = "") -> DiscreteNetwork:
     """Return the network's arrays; see `assemble_model`."""
     cut = grid(layout, mesh)
     return assemble_model(layout, cut, table(layout, cut), ramp)
 
 
-def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Model:
+def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> DiscreteNetwork:
     """Return the network's arrays for given tables.
 
     `ramp` names what a share of takes the place of the drive, at one the whole of it: the PRESTRESS of springs while
@@ -270,7 +270,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
     if ramp == PRESTRESS:
         load_value[:], line[:] = 0.0, 0.0
         springs = _relaxed(layout, springs)
-    return Model(
+    return DiscreteNetwork(
         table=values,
         segment_step=cut.segment_step,
         segment_turn=segment_turns(values, cut.segment_step),

@@ -14,7 +14,7 @@ from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.kernels.model import Model
+    from cfmkit.elastica.kernels.model import DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
     from cfmkit.elastica.model.layout import Layout
 
@@ -162,7 +162,7 @@ class Solver:
         self.layout, self.mesh, self.tolerance, self.ramped = layout, mesh, tolerance, ramped
         self.cut = grid(layout, mesh)
         self.table = table(layout, self.cut)
-        self.model: Model = self._build()
+        self.model: DiscreteNetwork = self._build()
         self.n_free = self._count_free()
         self.n_beams = len(self.model.beam_end)
         self.n_dofs = len(self.model.slot)
@@ -185,7 +185,7 @@ class Solver:
         fine.limits = np.array([tolerance, float(ITERATIONS)])
         return fine
 
-    def _build(self) -> Model:
+    def _build(self) -> DiscreteNetwork:
         return assemble_model(self.layout, self.cut, self.table, self.ramped)
 
     def _count_free(self) -> int:
@@ -212,7 +212,7 @@ class Solver:
         drive: float,
         border: FloatArray | None = None,
         target: float | None = None,
-        model: Model | None = None,
+        model: DiscreteNetwork | None = None,
     ) -> Spot | None:
         """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default.
 
@@ -236,7 +236,7 @@ class Solver:
         return h[:, : self.n].copy(), h[:, self.n].copy()
 
     def march(
-        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: Model | None = None
+        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: DiscreteNetwork | None = None
     ) -> tuple[int, Points]:
         """Follow the path from `spot`; return why the march ended and its points.
 

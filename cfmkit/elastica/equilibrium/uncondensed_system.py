@@ -16,13 +16,13 @@ from cfmkit.elastica.equilibrium.meshed_network import Points, Solver, Spot
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.meshed_network import MarchOptions
-    from cfmkit.elastica.kernels.model import Model
+    from cfmkit.elastica.kernels.model import DiscreteNetwork
 
 
 class ExpandedSolver(Solver):
     """Equilibria with the inside of the beams among the global unknowns; slower, and regular in more cases."""
 
-    def _build(self) -> Model:
+    def _build(self) -> DiscreteNetwork:
         plain = assemble_model(self.layout, self.cut, self.table, self.ramped)
         self.plain_free = self.layout.plan.n_free
         segments = len(plain.segment_step) - 1
@@ -127,7 +127,7 @@ class UncondensedSolver(Solver):
         drive: float,
         border: FloatArray | None = None,
         target: float | None = None,
-        model: Model | None = None,
+        model: DiscreteNetwork | None = None,
     ) -> Spot | None:
         """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default."""
         if model is not None:
@@ -137,7 +137,7 @@ class UncondensedSolver(Solver):
         return None if found is None else self._reduced(found)
 
     def march(
-        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: Model | None = None
+        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: DiscreteNetwork | None = None
     ) -> tuple[int, Points]:
         """Follow the path from `spot`; return why the march ended and its points."""
         if model is not None:

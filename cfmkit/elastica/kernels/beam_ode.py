@@ -9,7 +9,7 @@ Reissner (1972)]:
 
 by the arc length; w is a dead load per reference length. The equations are integrated by the symmetric splitting of
 `cfmkit.elastica.kernels.splitting`, from a table that does not depend on the state: see
-`cfmkit.elastica.kernels.model.Model`.
+`cfmkit.elastica.kernels.model.DiscreteNetwork`.
 
 Derivatives are those of the discrete solution. That by the rotation at the start follows from the others, since the
 whole segment may be turned together with its force.

@@ -20,7 +20,7 @@ from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.elastica.kernels.model import DesignSlopes, Model
+    from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
 
 _Pair = ctypes.c_int64 * 2
@@ -92,7 +92,7 @@ _whole = struct.Struct("q").pack
 
 
 def solve(
-    m: Model,
+    m: DiscreteNetwork,
     n_free: int,
     y: Any,
     state: Any,
@@ -107,14 +107,16 @@ def solve(
     return _solver(_numbers(SOLVE, n_free, target), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
-def solve_each(m: Model, n_free: int, ys: Any, drives: Any, limits: Any, changes: Any, scratch: WorkSpace) -> None:
+def solve_each(
+    m: DiscreteNetwork, n_free: int, ys: Any, drives: Any, limits: Any, changes: Any, scratch: WorkSpace
+) -> None:
     """Solve at several drives; see `cfmkit.elastica.kernels.newton.solve_each`."""
     arrays = (limits, ys, drives, drives, drives, changes, drives)
     _solver(_numbers(EACH, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
 def march(
-    m: Model,
+    m: DiscreteNetwork,
     n_free: int,
     y: Any,
     drive: float,
@@ -129,26 +131,32 @@ def march(
     return _solver(_numbers(MARCH, n_free, drive), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
-def forces(m: Model, n_free: int, ys: Any, drives: Any, out: Any, scratch: WorkSpace) -> None:
+def forces(m: DiscreteNetwork, n_free: int, ys: Any, drives: Any, out: Any, scratch: WorkSpace) -> None:
     """Set residual forces and spring energy at points; see `cfmkit.elastica.kernels.observe.forces`."""
     arrays = (drives, ys, drives, drives, drives, out, drives)
     _solver(_numbers(FORCES, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
-def tangent(m: Model, n_free: int, y: Any, drive: float, scratch: WorkSpace) -> None:
+def tangent(m: DiscreteNetwork, n_free: int, y: Any, drive: float, scratch: WorkSpace) -> None:
     """Set the first matrix of the work space to the Jacobian; see `cfmkit.elastica.kernels.observe.tangent`."""
     arrays = (y, y[None], y, y, y, _NONE, y)
     _solver(_numbers(TANGENT, n_free, drive), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
-def states(m: Model, n_free: int, ys: Any, drives: Any, out: Any) -> None:
+def states(m: DiscreteNetwork, n_free: int, ys: Any, drives: Any, out: Any) -> None:
     """Set the states along all beams at points, real or complex; see `cfmkit.elastica.kernels.observe.states`."""
     door = _doors["complex_states" if ys.dtype.kind == "c" else "states"]
     door(_whole(n_free), m.block, objects((ys, drives, out)))
 
 
 def slopes(
-    m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, outs: tuple[Any, Any], scratch: WorkSpace
+    m: DiscreteNetwork,
+    design: DesignSlopes,
+    n_free: int,
+    ys: Any,
+    drives: Any,
+    outs: tuple[Any, Any],
+    scratch: WorkSpace,
 ) -> bool:
     """Set the derivatives of solutions; see `cfmkit.elastica.kernels.design_derivatives.slopes`."""
     room = slope_space(m, design, len(scratch[0]) - 1)
@@ -156,13 +164,15 @@ def slopes(
     return _doors["slopes"](_whole(n_free), m.block, design.block, given, scratch.block, objects(flat(room)))[0] == 1
 
 
-def row_slopes(m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+def row_slopes(m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
     """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.output_slopes.row_slopes`."""
     room = np.zeros(9 * dys.shape[2])
     _doors["row_slopes"](_whole(n_free), m.block, design.block, objects((ys, drives, dys, out, room)))
 
 
-def held_slopes(m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+def held_slopes(
+    m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any
+) -> None:
     """Set the derivatives of forces; see `cfmkit.elastica.kernels.output_slopes.held_slopes`."""
     room = held_slope_space(m)
     given = objects((ys, drives, dys, out, *flat(room)))

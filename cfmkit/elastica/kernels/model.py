@@ -56,7 +56,7 @@ class _ModelArrays(NamedTuple):
     spring_value: Any
 
 
-class Model(Packed, _ModelArrays):
+class DiscreteNetwork(Packed, _ModelArrays):
     """A network, discretised.
 
     Attributes
@@ -175,7 +175,7 @@ class DesignSlopes(Packed, _DesignSlopesArrays):
     )
 
 
-Arrays = TypeVar("Arrays", Model, DesignSlopes)
+Arrays = TypeVar("Arrays", DiscreteNetwork, DesignSlopes)
 
 
 def in_order(arrays: Arrays) -> Arrays:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfmkit.elastica.kernels.model import DesignSlopes, Model
+from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
 from cfmkit.elastica.kernels.packing import complexes, floats
 from cfmkit.elastica.kernels.workspace import HELD_SLOPES, MARCHING, SLOPES, SOLVING
 
@@ -16,11 +16,38 @@ SOLVE, MARCH, FORCES, TANGENT, EACH = range(5)
 _SOLVER = (floats(2), floats(1), floats(1), floats(1), floats(2), floats(1))
 
 DOORS: dict[str, tuple[Any, ...]] = {
-    "solver": (WHOLE, WHOLE, REAL, Model.kinds, floats(1), _SOLVER, SOLVING, MARCHING),
-    "states": (WHOLE, Model.kinds, floats(2), floats(1), floats(3)),
-    "complex_states": (WHOLE, Model.kinds, complexes(2), complexes(1), complexes(3)),
-    "slopes": (WHOLE, Model.kinds, DesignSlopes.kinds, floats(2), floats(1), (floats(3), floats(2)), SOLVING, SLOPES),
-    "row_slopes": (WHOLE, Model.kinds, DesignSlopes.kinds, floats(2), floats(1), floats(3), floats(3), floats(1)),
-    "held_slopes": (WHOLE, Model.kinds, DesignSlopes.kinds, floats(2), floats(1), floats(3), floats(3), HELD_SLOPES),
+    "solver": (WHOLE, WHOLE, REAL, DiscreteNetwork.kinds, floats(1), _SOLVER, SOLVING, MARCHING),
+    "states": (WHOLE, DiscreteNetwork.kinds, floats(2), floats(1), floats(3)),
+    "complex_states": (WHOLE, DiscreteNetwork.kinds, complexes(2), complexes(1), complexes(3)),
+    "slopes": (
+        WHOLE,
+        DiscreteNetwork.kinds,
+        DesignSlopes.kinds,
+        floats(2),
+        floats(1),
+        (floats(3), floats(2)),
+        SOLVING,
+        SLOPES,
+    ),
+    "row_slopes": (
+        WHOLE,
+        DiscreteNetwork.kinds,
+        DesignSlopes.kinds,
+        floats(2),
+        floats(1),
+        floats(3),
+        floats(3),
+        floats(1),
+    ),
+    "held_slopes": (
+        WHOLE,
+        DiscreteNetwork.kinds,
+        DesignSlopes.kinds,
+        floats(2),
+        floats(1),
+        floats(3),
+        floats(3),
+        HELD_SLOPES,
+    ),
 }
 """Arguments of each function of `cfmkit.elastica.kernels.entry_points`."""

@@ -11,7 +11,7 @@ from cfmkit.elastica.kernels.packing import Packed, complexes, floats, objects
 from cfmkit.elastica.kernels.status_codes import KEPT
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.kernels.model import DesignSlopes, Model
+    from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
 
 SOLVING = (
     floats(2),  # system, with the drive's column and the bordering row
@@ -100,7 +100,7 @@ def work_space(n: int, beams: int, dofs: int, segments: int) -> WorkSpace:
     )
 
 
-def slope_space(m: Model, design: DesignSlopes, n: int) -> Any:
+def slope_space(m: DiscreteNetwork, design: DesignSlopes, n: int) -> Any:
     """Return room for the derivatives of solutions with n unknowns z by all variables, in the order of `SLOPES`."""
     count, beams, dofs = len(design.moves), len(m.beam_end), len(m.slot)
     most, wide = int(np.diff(design.first).max(initial=0)), int(np.diff(m.beam_segment).max(initial=0))
@@ -117,7 +117,7 @@ def slope_space(m: Model, design: DesignSlopes, n: int) -> Any:
     )
 
 
-def held_slope_space(m: Model) -> Any:
+def held_slope_space(m: DiscreteNetwork) -> Any:
     """Return room for the derivatives of forces on degrees of freedom, in the order of `HELD_SLOPES`."""
     beams, dofs = len(m.beam_end), len(m.slot)
     return (

@@ -154,7 +154,7 @@ class Bundle:
         """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
 
         powers (m, n), shares (n, 5): see `cfmkit.elastica.equilibrium.mesh.Grid.rows`; what the table holds:
-        `cfmkit.elastica.kernels.model.Model`.
+        `cfmkit.elastica.kernels.model.DiscreteNetwork`.
         """
         if self._compliances is None:
             g = self.length

@@ -156,7 +156,7 @@ class Layout:
 
     @cached_property
     def units(self) -> Any:
-        """Factors that make the columns of a table dimensionless, (6,): see `cfmkit.elastica.kernels.model.Model`.
+        """Factors that make the columns of a table dimensionless, (6,), as in `kernels.model.DiscreteNetwork`.
 
         Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.model.HALVES`.
         """

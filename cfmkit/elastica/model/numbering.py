@@ -42,7 +42,7 @@ class NumberingPlan:
     pins : dict
         (beam, side) and names of pinned nodes to the rotation that they have of their own.
     place_dof : (n, 4) int array
-        As in `cfmkit.elastica.kernels.model.Model`.
+        As in `cfmkit.elastica.kernels.model.DiscreteNetwork`.
     place_node, place_master, place_offset : (n,) int arrays
         Node and master of an attachment, GROUND for places on the ground; its beam's end, 2 beam + side, or NOWHERE.
     ground_of : dict

@@ -28,7 +28,7 @@ X, Y, TURN, MOMENT, H, V, ENERGY = range(7)
 
 
 @dataclass(frozen=True)
-class Rows:
+class SampledRows:
     """Where the rows of a sampling lie on one beam: row index, parameter, and the step that begins there."""
 
     index: Any
@@ -53,16 +53,16 @@ class Sampler:
         count = len(self.cut.edges) + segments
         self.states = np.empty((len(points), count, 7))
         self.drive = points.drive
-        self._rows: dict[int, Rows] = {}
+        self._rows: dict[int, SampledRows] = {}
         compiled.states(self.model, solver.n_free, np.ascontiguousarray(points.y), points.drive, self.states)
 
-    def rows(self, beam: int) -> Rows:
+    def rows(self, beam: int) -> SampledRows:
         """Return the rows of a beam in order; segment boundaries occur twice."""
         if beam not in self._rows:
             self._rows[beam] = self._rows_of(beam)
         return self._rows[beam]
 
-    def _rows_of(self, beam: int) -> Rows:
+    def _rows_of(self, beam: int) -> SampledRows:
         cut = self.cut
         index, t, step = [], [], []
         for segment in range(cut.beam_segment[beam], cut.beam_segment[beam + 1]):
@@ -70,7 +70,7 @@ class Sampler:
             index += [int(k) + segment for k in range(first, last + 1)]
             t += [*cut.edges[first:last, 0].tolist(), float(cut.edges[last - 1, 1])]
             step += [*range(first, last), last - 1]
-        return Rows(np.array(index), np.array(t), np.array(step))
+        return SampledRows(np.array(index), np.array(t), np.array(step))
 
     def energy(self) -> FloatArray:
         """Return the strain energy of all beams at every point."""
@@ -107,7 +107,7 @@ class Sampler:
                 own[start : start + panel + 1] += _CLOSED * (rows.t[start + panel] - rows.t[start])
         return own * speed
 
-    def at(self, beam: int, rows: Rows, start: Any, t: FloatArray, points: Any) -> FloatArray:
+    def at(self, beam: int, rows: SampledRows, start: Any, t: FloatArray, points: Any) -> FloatArray:
         """Return states (k, 7) at parameters t (k,) of a beam, each integrated from the row number `start` (k,)."""
         from cfmkit.elastica.kernels import compiled
 
@@ -134,7 +134,7 @@ class Sampler:
         return own[0] + np.outer(self.drive[points], own[1])
 
     def step_table(self, beam: int, step: Any, left: FloatArray, right: FloatArray) -> Any:
-        """Return the table of `elastica.kernels.model.Model` from one parameter (k,) to another, on steps (k,)."""
+        """Return the table of a `DiscreteNetwork` from one parameter (k,) to another, on steps (k,)."""
         cut, name = self.cut, list(self.layout.network.beams)[beam]
         out, pieces = np.empty((len(step), ROWS, len(self.layout.units))), cut.piece[step]
         for piece in sorted(set(pieces.tolist())):

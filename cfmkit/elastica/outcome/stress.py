@@ -16,7 +16,7 @@ from cfmkit.elastica.outcome.sections import along_beam, sections, stress_slopes
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.outcome.sections import Rows, Sampler, Sections
+    from cfmkit.elastica.outcome.sections import SampledRows, Sampler, Sections
 
 STENCIL = 9
 _TO_POLYNOMIAL = np.linalg.inv(np.vander(np.arange(float(STENCIL)) - STENCIL // 2, increasing=True))
@@ -74,7 +74,7 @@ def signed_extremes(sampler: Sampler, beam: int, axial: bool) -> StressExtremes:
     return StressExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, t, humps.first)))
 
 
-def windows(sampler: Sampler, rows: Rows) -> Any:
+def windows(sampler: Sampler, rows: SampledRows) -> Any:
     """Return for every row of a beam the first row of the stencil around it, on its own segment.
 
     Within a segment the rows are evenly spaced and the stress is smooth.
@@ -122,7 +122,7 @@ def _combined(found: Sections, bends: FloatArray, pulls: FloatArray) -> FloatArr
     return bends[..., None] * found.bending_stress[:, None] + pulls[..., None] * found.axial_stress[:, None]
 
 
-def _highest(sampler: Sampler, rows: Rows, stress: FloatArray) -> Humps:
+def _highest(sampler: Sampler, rows: SampledRows, stress: FloatArray) -> Humps:
     """Return the highest hump of stresses (n, q, rows), by interpolation around several samples.
 
     Of two humps of nearly one height the lower one may have the higher sample; where two segments meet, each has a

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.mesh import Grid
-    from cfmkit.elastica.kernels.model import Model
+    from cfmkit.elastica.kernels.model import DiscreteNetwork
 
 STEP = 1e-30
 _WHOLE = ("place_dof", "slot", "load_place", "load_follows", "spring_place", "spring_kind", "beam_end")
@@ -74,7 +74,7 @@ class ComplexSteps:
             found.append(stepped)
         return found
 
-    def arrays(self, model: Model, cut: Grid, every: bool = False) -> DesignSlopes:
+    def arrays(self, model: DiscreteNetwork, cut: Grid, every: bool = False) -> DesignSlopes:
         """Return the derivatives of a model's arrays; with `every` each beam is paired with every variable.
 
         Raises
@@ -121,7 +121,7 @@ class ComplexSteps:
         )
         return in_order(design)
 
-    def _model(self, k: int, layout: Layout, model: Model, cut: Grid) -> Model:
+    def _model(self, k: int, layout: Layout, model: DiscreteNetwork, cut: Grid) -> DiscreteNetwork:
         """Return the arrays for variable k, except the table."""
         stepped = assemble_model(layout, cut, model.table)
         for name in _WHOLE:
@@ -131,7 +131,7 @@ class ComplexSteps:
         return stepped
 
 
-def _stack(stepped: list[Model], name: str, model: Model) -> FloatArray:
+def _stack(stepped: list[DiscreteNetwork], name: str, model: DiscreteNetwork) -> FloatArray:
     """Return the derivatives of one array by all variables."""
     own = np.asarray(getattr(model, name))
     return np.ascontiguousarray(

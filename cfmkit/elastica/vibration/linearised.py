@@ -21,7 +21,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
-    from cfmkit.elastica.vibration.masses import Masses
+    from cfmkit.elastica.vibration.masses import NetworkMasses
 
 _MOST = 4000  # unknowns: dense matrices of this size take 130 MB each, and half a minute per pose
 
@@ -60,7 +60,7 @@ class Linearisation:
     ----------
     path : Path
         Its equilibria.
-    masses : Masses
+    masses : NetworkMasses
         What its parts weigh.
     modes : int
         How many of the lowest modes are to be right.
@@ -69,7 +69,9 @@ class Linearisation:
         or None for its rotation.
     """
 
-    def __init__(self, path: Path, masses: Masses, modes: int, hold: tuple[str, float | None] | None = None) -> None:
+    def __init__(
+        self, path: Path, masses: NetworkMasses, modes: int, hold: tuple[str, float | None] | None = None
+    ) -> None:
         """Sample the beams."""
         self.path, self.masses, self.hold, self.layout = path, masses, hold, path.layout
         names = list(self.layout.network.beams)

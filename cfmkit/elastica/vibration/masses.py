@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Masses:
+class NetworkMasses:
     """Masses of a network.
 
     Parameters
@@ -40,4 +40,4 @@ class Masses:
         object.__setattr__(self, "nodes", MappingProxyType(dict(self.nodes)))
 
 
-__all__ = ["Masses"]
+__all__ = ["NetworkMasses"]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.linearised import Linearised
-    from cfmkit.elastica.vibration.masses import Masses
+    from cfmkit.elastica.vibration.masses import NetworkMasses
 
 _AT_ONCE = 16  # points whose matrices are in memory together: some megabytes
 _TIED = 1e-10  # share of the largest row from which a constraint counts: a straight beam's along itself is rounding
@@ -57,7 +57,7 @@ class Frequencies:
 
 def frequencies(
     path: Path,
-    masses: Masses,
+    masses: NetworkMasses,
     count: int,
     points: Any = None,
     hold: tuple[str, float | None] | None = None,
@@ -68,7 +68,7 @@ def frequencies(
     ----------
     path : Path
         The equilibria.
-    masses : Masses
+    masses : NetworkMasses
         Density of every beam, masses of nodes. Sections rotate with inertia where they shear, too.
     count : int
         How many frequencies, at least 1.

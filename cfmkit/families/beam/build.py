@@ -26,7 +26,7 @@ import numpy as np
 from cfmkit import elastica as engine
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.vibration.masses import Masses
+from cfmkit.elastica.vibration.masses import NetworkMasses
 from cfmkit.families.beam.parts.spec import HELD
 from cfmkit.specs.units import between
 
@@ -124,7 +124,7 @@ class Assembly:
         drive = self.spec.mechanism.drive
         return drive.reference if drive.kind == "loads" else float(self.parallel)
 
-    def masses(self) -> Masses | None:
+    def masses(self) -> NetworkMasses | None:
         """Return what the parts weigh; None where a density is not known."""
         mechanism = self.spec.mechanism
         # stages in series have the names of the first, with a number behind a dot
@@ -135,7 +135,7 @@ class Assembly:
         if len(density) < len(materials):
             return None
         nodes = {name: mechanism.nodes[name.split(".")[0]] for name in self.network.nodes}
-        return Masses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
+        return NetworkMasses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
 
     def hold(self) -> tuple[str, float | None]:
         """Return what stands still while the drive is held: a node, along a direction [rad] or turned (None)."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots import dimensions as draw
-from cfmkit.plots.dimensions import Dimension
+from cfmkit.plots.dimensions import DrawingSymbol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 DIMENSIONS = (
-    Dimension(
+    DrawingSymbol(
         "n1 ... n5", "mechanism.nodes.NAME.at", "[x, y] of a node; support: clamped, pinned, guided (along `direction`)"
     ),
-    Dimension(
+    DrawingSymbol(
         "b1 ... b4", "mechanism.beams.NAME", "a beam from node `start` to node `end`; at a free node beams join rigidly"
     ),
-    Dimension("u", "from 0 to 1 along a beam", "arc length from its start, over its length"),
-    Dimension(
+    DrawingSymbol("u", "from 0 to 1 along a beam", "arc length from its start, over its length"),
+    DrawingSymbol(
         "eta(u)", "mechanism.beams.NAME.shape", "direction of the unloaded beam: coefficients c0 + c1 u + c2 u^2 + ..."
     ),
-    Dimension("c0", "mechanism.beams.NAME.shape.coefficients", "direction at its start, from x; c1 and c2 bend it"),
-    Dimension("L", "mechanism.beams.NAME.shape.length", "along the beam; default: what fits between its nodes"),
-    Dimension("w, t", "mechanism.thickness, .width", "in the plane, out of it (w and t in the paper of Lan)"),
-    Dimension(
+    DrawingSymbol("c0", "mechanism.beams.NAME.shape.coefficients", "direction at its start, from x; c1 and c2 bend it"),
+    DrawingSymbol("L", "mechanism.beams.NAME.shape.length", "along the beam; default: what fits between its nodes"),
+    DrawingSymbol("w, t", "mechanism.thickness, .width", "in the plane, out of it (w and t in the paper of Lan)"),
+    DrawingSymbol(
         "F, d", "mechanism.drive", "node that is moved (or loaded) and its direction; analysis.travel says how far"
     ),
-    Dimension("mirror", "mechanism.copies", "equal parts that share the load: a mirror image, legs, layers"),
+    DrawingSymbol("mirror", "mechanism.copies", "equal parts that share the load: a mirror image, legs, layers"),
 )
 
 LEAF = "#0072B2"

@@ -18,7 +18,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.rounding import vanishing
@@ -83,7 +83,7 @@ def curve(result: Result) -> Figure:
     end = window_of(solution)[1]
     reached = float(solution.motion.max())
     if limit is not None and limit < reached:
-        regions.append(Region(limit, reached, f"allowable stress reached at {value_text(limit, 'length')}"))
+        regions.append(MarkedRange(limit, reached, f"allowable stress reached at {value_text(limit, 'length')}"))
     nominal = result.values["nominal_force"].value
     if nominal is not None and start is not None and result.spec.analysis.window is not None:  # type: ignore[attr-defined]
         levels.append(Limit(0.95 * nominal, f"0.95 F_d: from {value_text(start, 'length')}"))

@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle, mark
+from cfmkit.export.contours import (
+    TOLERANCE,
+    Contour,
+    Curve2D,
+    Drawing,
+    DrawnDimension,
+    Region,
+    Sheet,
+    Smooth,
+    circle,
+    mark,
+)
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -164,7 +175,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     )
 
 
-def _dimensions(assembly: Assembly) -> Iterator[Dimension]:
+def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
     """Yield where the driven node is from the first one that is held."""
     nodes = assembly.network.nodes
     driven = assembly.spec.mechanism.drive.node
@@ -175,7 +186,7 @@ def _dimensions(assembly: Assembly) -> Iterator[Dimension]:
     words = f"{driven} from {held}"
     for along, distance in (("x", end[0] - start[0]), ("y", end[1] - start[1])):
         if abs(distance) > ROUGH:
-            yield Dimension(words, start, end, "x" if along == "x" else "y")
+            yield DrawnDimension(words, start, end, "x" if along == "x" else "y")
 
 
 def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:

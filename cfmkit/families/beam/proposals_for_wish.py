@@ -25,7 +25,7 @@ from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
-from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
 from cfmkit.stock.spec import MaterialSpec
@@ -93,12 +93,12 @@ def _followed(name: str) -> Kept:
     return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, space)
 
 
-def propose(wish: Wish, run: Run) -> Offer:
+def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return rescaled shapes that do what is wished as far as bending goes, those that fill the room least first."""
     if wish.kind == "torque":
-        return Offer(reason="the kept shapes are pushed: they give a force, no torque")
+        return FamilyOffer(reason="the kept shapes are pushed: they give a force, no torque")
     if wish.adjustable is not None:
-        return Offer(reason="the force of a network of beams is fixed: nothing adjusts it")
+        return FamilyOffer(reason="the force of a network of beams is fixed: nothing adjusts it")
     found: list[Candidate] = []
     missed: list[tuple[float, str, dict[str, str]]] = []
     for kept in kept_shapes():
@@ -111,9 +111,9 @@ def propose(wish: Wish, run: Run) -> Offer:
                 else:
                     missed.append(one)
     if found:
-        return Offer(tuple(_varied(found)[:OFFERED]))
+        return FamilyOffer(tuple(_varied(found)[:OFFERED]))
     _, reason, nearest = min(missed, key=lambda one: one[0])
-    return Offer(reason=reason, nearest=nearest)
+    return FamilyOffer(reason=reason, nearest=nearest)
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots import dimensions as draw
-from cfmkit.plots.dimensions import Dimension
+from cfmkit.plots.dimensions import DrawingSymbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 DIMENSIONS = (
-    Dimension("l", "mechanism.brace_length", "brace, from the slider's pin to the roller's axis"),
-    Dimension("x0", "mechanism.rest_half_width", "half the distance of the roller axes with the springs at rest"),
-    Dimension("r", "mechanism.roller_radius", "radius of a roller"),
-    Dimension("K", "mechanism.springs", "stiffness of all springs together: {stiffness, count} or a list"),
-    Dimension("A", "mechanism.profile.force_constant", "what the profile is cut for: the force is F = 4 K A"),
-    Dimension("s", "analysis.travel", "displacement of the slider, from 0 to mechanism.profile.stroke"),
-    Dimension(
+    DrawingSymbol("l", "mechanism.brace_length", "brace, from the slider's pin to the roller's axis"),
+    DrawingSymbol("x0", "mechanism.rest_half_width", "half the distance of the roller axes with the springs at rest"),
+    DrawingSymbol("r", "mechanism.roller_radius", "radius of a roller"),
+    DrawingSymbol("K", "mechanism.springs", "stiffness of all springs together: {stiffness, count} or a list"),
+    DrawingSymbol("A", "mechanism.profile.force_constant", "what the profile is cut for: the force is F = 4 K A"),
+    DrawingSymbol("s", "analysis.travel", "displacement of the slider, from 0 to mechanism.profile.stroke"),
+    DrawingSymbol(
         "mu", "mechanism.rolling_friction", "rolling resistance over roller radius; it makes load differ from unload"
     ),
 )

@@ -15,7 +15,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
@@ -108,20 +108,20 @@ def loop(result: Result) -> Figure:
     return loop_figure(result, look, "force over travel of the slider")
 
 
-def regions(solution: Solution) -> list[Region]:
+def regions(solution: Solution) -> list[MarkedRange]:
     """Return the parts of the displacement in which the mechanism does not work as intended."""
     found, origin = [], solution.origin
     asked, reached = solution.assembly.spec.analysis.travel, float(solution.travel[-1])
     corner = min(solution.corner_travel, reached)
     if corner > 0:
-        found.append(Region(origin, origin + corner, f"on the corner: first {value_text(corner, 'length')}"))
+        found.append(MarkedRange(origin, origin + corner, f"on the corner: first {value_text(corner, 'length')}"))
     slack = np.flatnonzero(solution.elongation < -1e-12)
     if len(slack) and float(solution.travel[slack[-1]]) > corner:
         end = float(solution.travel[slack[-1]])
-        found.append(Region(origin, origin + end, f"springs slack: first {value_text(end, 'length')}"))
+        found.append(MarkedRange(origin, origin + end, f"springs slack: first {value_text(end, 'length')}"))
     if asked and asked > reached * (1 + 1e-9):
         text = f"the profile ends at {value_text(origin + reached, 'length')}"
-        found.append(Region(origin + reached, origin + asked, text))
+        found.append(MarkedRange(origin + reached, origin + asked, text))
     return found
 
 
@@ -194,7 +194,7 @@ def curvature(result: Result) -> Figure:
     if profile.corner:
         first = f": the first {value_text(solution.corner_travel, 'length')} of travel"
         text = f"undercut{first if solution.corner_travel > 0 else ''}"
-        found.append(Region(float(x[0]), profile.corner.first_contact, text))
+        found.append(MarkedRange(float(x[0]), profile.corner.first_contact, text))
     scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
     series = [Series(radius, "roller path", BLUE, prefer=0.5), Series(flank, "cam", GREY, dashed=True, prefer=0.15)]
     heading = Heading.of(result, "is the roller small enough for its path?")
@@ -275,7 +275,7 @@ def undercut(result: Result) -> Figure:
     view = scene(solution)
     _roller_on_corner(solution, whole, view)
     _cut_away(solution, detail, view)
-    region = Region(solution.origin, solution.origin + solution.corner_travel, "on the corner")
+    region = MarkedRange(solution.origin, solution.origin + solution.corner_travel, "on the corner")
     look = CurveLook(levels=(Limit(force, value_text(force, "force")),), regions=(region,))
     plot_curve(start_curve(solution, 3.0 * solution.corner_travel), costs, look).set_ylabel("")
     return figure

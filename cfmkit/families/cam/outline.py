@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Dimension, Drawing, Edge, Line, Sheet, Smooth
+from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Drawing, DrawnDimension, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.build import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm, rate
 from cfmkit.families.no_mechanism import CannotBuild
@@ -62,16 +62,18 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
     )
 
 
-def _dimensions(profiles: Profiles, plate: Plate) -> Iterator[Dimension]:
+def _dimensions(profiles: Profiles, plate: Plate) -> Iterator[DrawnDimension]:
     """Yield the main lengths of the plate, and where the rollers start."""
     right, left = (flank_edge(profile).points for profile in profiles)
-    yield Dimension("cam", (0.0, float(right[0, 1])), (0.0, float(right[-1, 1])), "y")
-    yield Dimension("top", (-float(left[-1, 0]), float(left[-1, 1])), (float(right[-1, 0]), float(right[-1, 1])), "x")
+    yield DrawnDimension("cam", (0.0, float(right[0, 1])), (0.0, float(right[-1, 1])), "y")
+    yield DrawnDimension(
+        "top", (-float(left[-1, 0]), float(left[-1, 1])), (float(right[-1, 0]), float(right[-1, 1])), "x"
+    )
     if half := 0.5 * tab_width(plate, profiles):
         floor = float(min(right[0, 1], left[0, 1])) - plate.base_height
-        yield Dimension("tab", (-half, floor), (half, floor), "x")
+        yield DrawnDimension("tab", (-half, floor), (half, floor), "x")
     x0 = [profile.path.law.rest_half_width for profile in profiles]
-    yield Dimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
+    yield DrawnDimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
 
 
 def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:

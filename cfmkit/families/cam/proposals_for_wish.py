@@ -19,7 +19,7 @@ from cfmkit.families.cam.bounding_box import depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.spec import CamSpec, Springs
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
 
@@ -53,12 +53,12 @@ RESERVE, FLAT_RESERVE = 0.97, 0.9
 """Shares of room and ripple that closed forms may fill: they leave out the plate's margins, and friction squared."""
 
 
-def propose(wish: Wish, run: Run) -> Offer:
+def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return cams that the closed forms say are worth designing, the smallest and the flattest first."""
     if wish.kind == "torque":
-        return Offer(reason="a cam with rollers gives a force at its slider, no torque")
+        return FamilyOffer(reason="a cam with rollers gives a force at its slider, no torque")
     if wish.adjustable is not None:
-        return Offer(reason="the force of a cam is fixed by its springs: nothing adjusts it")
+        return FamilyOffer(reason="the force of a cam is fixed by its springs: nothing adjusts it")
     draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
     found = _sized(wish, draw)
     fitting = found["fits"] & found["flat"] & found["lossless"]
@@ -73,8 +73,8 @@ def propose(wish: Wish, run: Run) -> Offer:
             break
     if not candidates:
         depth = "" if wish.depth is None else f" within a depth of {mm(wish.depth)}"
-        return Offer(reason=f"no steel spring of this force and stretch fits between the rollers{depth}")
-    return Offer(tuple(candidates))
+        return FamilyOffer(reason=f"no steel spring of this force and stretch fits between the rollers{depth}")
+    return FamilyOffer(tuple(candidates))
 
 
 def _sized(wish: Wish, draw: FloatArray) -> dict[str, Any]:
@@ -182,10 +182,10 @@ def _written(
     return Candidate(variant, spec, design=True, promise=area + size["ripple"] / wish.ripple)
 
 
-def _out_of_reach(wish: Wish, found: dict[str, Any]) -> Offer:
+def _out_of_reach(wish: Wish, found: dict[str, Any]) -> FamilyOffer:
     """Return why no proportions fit, and the nearest wish that some would: one key changed at a time."""
     if not found["there"].any():
-        return Offer(reason="no cam of this travel has a path that its roller can follow within such a room")
+        return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such a room")
     nearest: dict[str, str] = {}
     flat = found["flat"] & found["lossless"]
     if flat.any():
@@ -199,4 +199,4 @@ def _out_of_reach(wish: Wish, found: dict[str, Any]) -> Offer:
         nearest["ripple"] = percent(float(found["ripple"][roomy].min()) / FLAT_RESERVE)
         if wish.hysteresis is not None:
             nearest["hysteresis"] = percent(float(found["hysteresis"][roomy].min()) / RESERVE)
-    return Offer(reason=reason, nearest=nearest)
+    return FamilyOffer(reason=reason, nearest=nearest)

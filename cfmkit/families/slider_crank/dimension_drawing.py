@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots import dimensions as draw
-from cfmkit.plots.dimensions import Dimension
+from cfmkit.plots.dimensions import DrawingSymbol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DIMENSIONS = (
-    Dimension("r1", "mechanism.crank_length", "crank, from the pivot to the crank pin"),
-    Dimension("r2", "mechanism.coupler_length", "coupler, from the crank pin to the slider pin"),
-    Dimension("e", "mechanism.offset", "height of the slider pin's way above the pivot"),
-    Dimension(
+    DrawingSymbol("r1", "mechanism.crank_length", "crank, from the pivot to the crank pin"),
+    DrawingSymbol("r2", "mechanism.coupler_length", "coupler, from the crank pin to the slider pin"),
+    DrawingSymbol("e", "mechanism.offset", "height of the slider pin's way above the pivot"),
+    DrawingSymbol(
         "x_in", "mechanism.stretched_position", "place of the slider where crank and coupler are in line; instead of r2"
     ),
-    Dimension(
+    DrawingSymbol(
         "theta", "analysis.angle", "crank angle from the slider's way; mechanism.unloaded_angle: springs at rest"
     ),
-    Dimension("K1", "mechanism.springs.pivot", "torsion spring at the pivot (K_RA)"),
-    Dimension("K2", "mechanism.springs.crank_pin", "torsion spring between crank and coupler (K_RB)"),
-    Dimension("K3", "mechanism.springs.slider_pin", "torsion spring between coupler and slider (K_RC)"),
-    Dimension("K_P", "mechanism.springs.slider", "spring along the slider's way (K_PC)"),
-    Dimension(
+    DrawingSymbol("K1", "mechanism.springs.pivot", "torsion spring at the pivot (K_RA)"),
+    DrawingSymbol("K2", "mechanism.springs.crank_pin", "torsion spring between crank and coupler (K_RB)"),
+    DrawingSymbol("K3", "mechanism.springs.slider_pin", "torsion spring between coupler and slider (K_RC)"),
+    DrawingSymbol("K_P", "mechanism.springs.slider", "spring along the slider's way (K_PC)"),
+    DrawingSymbol(
         "T, F",
         "analysis.drive: torque or force",
         "what drives: a torque at the crank, or a force that pushes the slider in",

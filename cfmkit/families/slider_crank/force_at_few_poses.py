@@ -13,7 +13,7 @@ from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_ang
 from cfmkit.families.slider_crank.printed.assembly import elasticity
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
 from cfmkit.families.slider_crank.printed.model import chain_of
-from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.solution import Solution
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
     except CannotBuild:
         return None
     pressed = chain.press(places, 0, spec.analysis.accuracy)
-    if pressed.ending is not Ending.COMPLETE:
+    if pressed.ending is not PressingEnd.COMPLETE:
         return None
     model = "lumped" if spec.fidelity == "lumped" else "beam"
     ends = float(places[0]), float(places[-1])

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.slider_crank.bounding_box import PIN
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
 
@@ -89,19 +89,19 @@ TURNED = (
 OFFERED = 24
 
 
-def propose(wish: Wish, run: Run) -> Offer:
+def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return linkages at sizes that fit the room, to be given springs, flexures or a strip by the family's design."""
     return _of_torque(wish) if wish.kind == "torque" else _of_force(wish)
 
 
-def _of_torque(wish: Wish) -> Offer:
+def _of_torque(wish: Wish) -> FamilyOffer:
     if wish.depth is not None:
-        return Offer(
+        return FamilyOffer(
             reason="springs at pins have no size here, and no depth: wish a room without one",
             nearest={"room": " x ".join(mm(side) for side in wish.room[:2])},
         )
     found = [_turned(wish, *one) for one in TURNED]
-    return Offer(tuple(one for one in found if one is not None))
+    return FamilyOffer(tuple(one for one in found if one is not None))
 
 
 def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: float) -> Candidate | None:
@@ -146,21 +146,21 @@ def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     return spec.replace(keys | {"analysis.angle" if name == "angle" else "analysis.travel": ends})
 
 
-def _of_force(wish: Wish) -> Offer:
+def _of_force(wish: Wish) -> FamilyOffer:
     if wish.adjustable is not None:
-        return Offer(reason="the force of a slider-crank is fixed by its springs: nothing adjusts it")
+        return FamilyOffer(reason="the force of a slider-crank is fixed by its springs: nothing adjusts it")
     found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
     if found:
-        return Offer(tuple(_varied(found)[:OFFERED]))
+        return FamilyOffer(tuple(_varied(found)[:OFFERED]))
     fits = [printed_size(wish, lengths) for lengths in PUSHED]
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
         less = wish.target * (wish.depth or max(wish.room)) / wide
-        return Offer(reason=f"a strip would have to be {mm(wide)} wide", nearest={"force": f"about {less:.2g} N"})
+        return FamilyOffer(reason=f"a strip would have to be {mm(wide)} wide", nearest={"force": f"about {less:.2g} N"})
     need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
     scale = max(need[0] / wish.room[0], need[1] / wish.room[1])
     longest = wish.travel / scale
-    return Offer(
+    return FamilyOffer(
         reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it",
         nearest={"room": " x ".join(mm(side) for side in need), "travel": f"about {mm(longest)}"},
     )

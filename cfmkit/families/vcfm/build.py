@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.springs import Coils, Diamond, StraightSpring, UShape, folded
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 
@@ -46,7 +46,7 @@ class Parts:
     half_beams: int
 
     @property
-    def strip(self) -> Strip:
+    def strip(self) -> LeafStrip:
         """One leaf of the snap-through structure."""
         return self.leaf.strip
 
@@ -77,10 +77,10 @@ class Parts:
         return float(self.leaf.balance)
 
 
-def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> Strip:
+def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> LeafStrip:
     """Return a leaf of a specification; of the springs only the diamond's are inclined."""
     angle = 0.0 if leaf.structure in ("folded", "straight", "u-shape") else leaf.angle
-    return Strip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
+    return LeafStrip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
 
 
 def share_of(positive: Positive) -> float:
@@ -117,7 +117,7 @@ def coils(springs: BoughtSprings) -> Coils:
     return Coils(springs.count * springs.rate, springs.count * springs.initial_tension)
 
 
-def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
+def _springs(strip: LeafStrip, positive: Positive, share: float) -> Spring:
     kinds: dict[str, Callable[[], Spring]] = {
         "diamond": lambda: Diamond(strip, share),
         "folded": lambda: folded(strip, share),
@@ -127,7 +127,7 @@ def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
     return kinds[positive.structure]()
 
 
-_LEAVES: dict[str, Callable[[Strip, Any], Leaf]] = {
+_LEAVES: dict[str, Callable[[LeafStrip, Any], Leaf]] = {
     "v-beam": lambda strip, _about: VBeam(strip),
     "cosine": lambda strip, _about: CosineLeaf(strip),
     "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),

@@ -30,7 +30,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
 from cfmkit.families.vcfm.model import LawSampler, rest_of
 from cfmkit.families.vcfm.spring_choice import with_bought_springs
@@ -129,17 +129,17 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
     return sizes
 
 
-def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
+def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> LeafStrip:
     """Return a leaf of the diamond: as long as its stress at the end of the linear region and full preload allows."""
     made, positive = spec.mechanism.material, spec.mechanism.flexures
     deflection = 0.5 * (float(onset_and_exit(leaf)[1]) + target.preload_stroke)
     e, t, tilt = made.modulus, positive.thickness, positive.angle
     length = sqrt(3.0 * e * t * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
-    side = Strip(length, tilt, t, 1.0, e, made.poisson)
+    side = LeafStrip(length, tilt, t, 1.0, e, made.poisson)
     return replace(side, width=float(target.level / target.height / Diamond(side, share_of(positive)).stiffness))
 
 
-def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
+def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
     """Raise if the leaves would rather buckle out of the plane."""
     if leaf.width >= SQUAT * leaf.thickness:
         return
@@ -182,8 +182,8 @@ ROOM = 1.02
 class DesignSizes:
     """The leaves of a design, and the end of the linear region [m]."""
 
-    leaf: Strip
-    side: Strip
+    leaf: LeafStrip
+    side: LeafStrip
     linear: tuple[float, float]
 
 

@@ -7,23 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots import dimensions as draw
-from cfmkit.plots.dimensions import Dimension
+from cfmkit.plots.dimensions import DrawingSymbol
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DIMENSIONS = (
-    Dimension(
+    DrawingSymbol(
         "L2", "mechanism.bistable.length", "between the ends of a leaf; half_beams says how many leaves there are"
     ),
-    Dimension("theta2", "mechanism.bistable.angle", "of a leaf from the direction across the motion"),
-    Dimension("t2, b2", "mechanism.bistable.thickness, .width", "of a leaf in the plane, out of it"),
-    Dimension("h", "L2 sin(theta2): metric rise", "how far the shuttle goes until the leaves lie across"),
-    Dimension("L1", "mechanism.positive.length", "of a leaf of the spring, here a diamond of two chains"),
-    Dimension("theta1", "mechanism.positive.angle", "of a leaf of the diamond from the direction across the motion"),
-    Dimension("t1, b1", "mechanism.positive.thickness, .width", "of a leaf of the spring in the plane, out of it"),
-    Dimension("dr", "analysis.preloads", "preload: how far the spring's far end is moved against the shuttle"),
-    Dimension("d", "analysis.travel", "displacement of the shuttle"),
+    DrawingSymbol("theta2", "mechanism.bistable.angle", "of a leaf from the direction across the motion"),
+    DrawingSymbol("t2, b2", "mechanism.bistable.thickness, .width", "of a leaf in the plane, out of it"),
+    DrawingSymbol("h", "L2 sin(theta2): metric rise", "how far the shuttle goes until the leaves lie across"),
+    DrawingSymbol("L1", "mechanism.positive.length", "of a leaf of the spring, here a diamond of two chains"),
+    DrawingSymbol(
+        "theta1", "mechanism.positive.angle", "of a leaf of the diamond from the direction across the motion"
+    ),
+    DrawingSymbol("t1, b1", "mechanism.positive.thickness, .width", "of a leaf of the spring in the plane, out of it"),
+    DrawingSymbol("dr", "analysis.preloads", "preload: how far the spring's far end is moved against the shuttle"),
+    DrawingSymbol("d", "analysis.travel", "displacement of the shuttle"),
 )
 
 BLOCK, LEAF, SPRING = "#D9DEE3", "#0072B2", "#D55E00"

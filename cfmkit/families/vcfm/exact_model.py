@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.leaves.springs import Coils
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
 
 
-def section(strip: Strip, thickness: Any = None, wide: bool = False) -> Any:
+def section(strip: LeafStrip, thickness: Any = None, wide: bool = False) -> Any:
     """Return the engine's section of a leaf; `wide`: its curling across the width is hindered."""
     from cfmkit.elastica import Section
 

@@ -17,7 +17,7 @@ from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.stress_map import StressView, stress_map_figure
@@ -77,10 +77,10 @@ def force(result: Result) -> Figure:
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
 
 
-def _beyond(solution: Solution) -> tuple[Region, ...]:
+def _beyond(solution: Solution) -> tuple[MarkedRange, ...]:
     """Return the part of the travel where the leaves have straightened again."""
     end, last = solution.character.linear[1], float(solution.nominal.travel[-1])
-    return (Region(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
+    return (MarkedRange(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
 
 
 def split(result: Result) -> Figure:
@@ -98,7 +98,7 @@ def split(result: Result) -> Figure:
     found = list(_beyond(solution))
     low, _ = solution.character.linear
     if np.isfinite(low):
-        found.insert(0, Region(push.travel[0], low, "not yet buckled"))
+        found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
     diagram = Diagram(push.travel, TRAVEL, Scale("force", "force"), series, (), found)
     subject = f"leaves and spring, preload {value_text(push.preload, 'length')}"
     return diagram_figure(Heading.of(result, subject), [diagram])

@@ -14,7 +14,7 @@ from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.build import spring_room
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, overrated
 from cfmkit.specs.units import format_short
 from cfmkit.specs.units.windows import Share
@@ -48,10 +48,10 @@ def check_guide(spec: VcfmSpec) -> None:
         )
 
 
-def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: float) -> Strip:
+def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: float) -> LeafStrip:
     """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
     made, rise = spec.mechanism.material, target.height
-    leaf = Strip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
+    leaf = LeafStrip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
     width = target.level / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
     return replace(leaf, width=float(width))
 
@@ -111,7 +111,7 @@ def _stroke_for(rise: float, thickness: float) -> float:
     return 4.0 * rise / 3.0 * sqrt(free)
 
 
-def followable_stroke(rise: float, leaf: Strip) -> dict[str, str]:
+def followable_stroke(rise: float, leaf: LeafStrip) -> dict[str, str]:
     """Return the stroke from which on exact leaves buckle without a jump; nothing where that is not what is wrong."""
     if rise >= SNAPPING * leaf.thickness:
         return {}

@@ -18,7 +18,7 @@ from cfmkit.families.findings import TOO_SOFT
 from cfmkit.families.vcfm.build import RIM, share_of
 from cfmkit.families.vcfm.findings import PRESSED, ROUNDING, returns
 from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
-from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import (
     FLAT_BUCKLED_ABOVE,
@@ -146,9 +146,9 @@ class Slab:
 
         modulus = column("modulus", mechanism.material.modulus)
 
-        def strip(kind: str, part: Any) -> Strip:
+        def strip(kind: str, part: Any) -> LeafStrip:
             sizes = {name: column(f"{kind}.{name}", getattr(part, name)) for name in _SIZES}
-            return Strip(**sizes, youngs_modulus=modulus, poisson_ratio=mechanism.material.poisson)
+            return LeafStrip(**sizes, youngs_modulus=modulus, poisson_ratio=mechanism.material.poisson)
 
         side, leaf_strip = strip("spring", mechanism.flexures), strip("leaf", mechanism.bistable)
         share, points = share_of(mechanism.flexures), spec.analysis.points

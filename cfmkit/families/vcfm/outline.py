@@ -18,8 +18,8 @@ from cfmkit.export.contours import (
     Arc,
     Contour,
     Curve2D,
-    Dimension,
     Drawing,
+    DrawnDimension,
     Edge,
     Line,
     Region,
@@ -102,14 +102,14 @@ def _box(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
-def _dimensions(spec: VcfmSpec) -> Iterator[Dimension]:
+def _dimensions(spec: VcfmSpec) -> Iterator[DrawnDimension]:
     """Yield the span and the rise of a leaf, and the shuttle's width."""
     about, half = spec.mechanism.bistable, 0.5 * spec.mechanism.frame.shuttle_width
     strip = strip_of(about, spec.mechanism.material)
     reach, rise = float(strip.reach), float(strip.rise)
-    yield Dimension("rise h", (half, 0.0), (half + reach, -rise), "y")
-    yield Dimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
-    yield Dimension("shuttle", (-half, 0.0), (half, 0.0), "x")
+    yield DrawnDimension("rise h", (half, 0.0), (half + reach, -rise), "y")
+    yield DrawnDimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
+    yield DrawnDimension("shuttle", (-half, 0.0), (half, 0.0), "x")
 
 
 def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:

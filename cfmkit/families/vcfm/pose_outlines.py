@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.leaves.v_beam import VBeam, critical_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import Bistable
 
@@ -233,12 +233,12 @@ def _cosine(leaf: CosineLeaf, travel: float) -> FloatArray:
     return _to_ends(np.arctan(turn), np.full(POINTS, length / POINTS), (float(leaf.strip.reach), rise - travel))
 
 
-def bent_leaf(strip: Strip, travel: float, critical: float | None = None, free: bool = False) -> FloatArray:
+def bent_leaf(strip: LeafStrip, travel: float, critical: float | None = None, free: bool = False) -> FloatArray:
     """Return the centre line of a straight leaf bent into an S, buckled under `critical` [N] where that is given.
 
     Parameters
     ----------
-    strip : Strip
+    strip : LeafStrip
         The leaf.
     travel : float
         Of its far end towards the flat pose [m].
@@ -285,7 +285,7 @@ def _to_ends(angles: FloatArray, steps: FloatArray, end: tuple[float, float]) ->
     return found
 
 
-def u_chain(strip: Strip, radius: float, compression: float) -> FloatArray:
+def u_chain(strip: LeafStrip, radius: float, compression: float) -> FloatArray:
     """Return the centre line of one U-shaped chain from the clamped end (0, 0) up to the guided one.
 
     The moment is linear across the motion, about the chain's centroid [Castigliano].

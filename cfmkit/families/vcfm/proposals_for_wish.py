@@ -14,7 +14,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.spec import VcfmSpec
-from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:
@@ -49,10 +49,10 @@ LITTLE = 0.02
 OFFERED = 20
 
 
-def propose(wish: Wish, run: Run) -> Offer:
+def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return mechanisms that the closed forms say are worth designing, the smallest first."""
     if wish.kind == "torque":
-        return Offer(reason="leaves that snap through give a force at their shuttle, no torque")
+        return FamilyOffer(reason="leaves that snap through give a force at their shuttle, no torque")
     found: list[Candidate] = []
     closest: tuple[float, dict[str, float]] | None = None
     for block in wish.materials or ({"name": "pom"},):
@@ -69,9 +69,9 @@ def propose(wish: Wish, run: Run) -> Offer:
                     Candidate(variant, spec, True, "cfmkit.families.vcfm.proposals_for_wish:finish", float(promise))
                 )
     if found:
-        return Offer(tuple(_varied(sorted(found, key=lambda one: one.promise))[:OFFERED]))
+        return FamilyOffer(tuple(_varied(sorted(found, key=lambda one: one.promise))[:OFFERED]))
     if closest is None:
-        return Offer(
+        return FamilyOffer(
             reason=f"no leaf as thin as {mm(wish.thinnest)} or thicker, too wide to buckle out of the plane, has "
             "this travel, force and adjustment within the stress"
         )
@@ -173,7 +173,7 @@ def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, floa
     return over
 
 
-def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> Offer:
+def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> FamilyOffer:
     """Return which side of the room is too small for the design that comes nearest, and the room that it needs."""
     sides = dict(zip(("across", "along", "depth"), wish.room, strict=False))
     need = {name: mm(side * max(1.0, over[name])) for name, side in sides.items()}
@@ -183,7 +183,7 @@ def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> Offer:
     nearest = {"room": " x ".join(need.values())}
     if worst == "depth":
         nearest["force"] = f"{wish.target / excess:.3g} N"
-    return Offer(reason=reason, nearest=nearest)
+    return FamilyOffer(reason=reason, nearest=nearest)
 
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:

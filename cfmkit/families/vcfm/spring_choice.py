@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.families.vcfm.exact_model import ExactSampler
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
     from cfmkit.families.vcfm.spec import BoughtSprings, VcfmDesign, VcfmSpec
     from cfmkit.stock.springs.catalogue import Offer
 
@@ -46,7 +46,7 @@ TRIED = 12
 
 
 @dataclass(frozen=True)
-class Around:
+class LeavesAroundSprings:
     """Leaves around bought springs.
 
     Attributes
@@ -55,7 +55,7 @@ class Around:
         As a specification has them.
     target : VcfmDesign
         With the rise and the preload that follow from their rate, and the force that is left to it.
-    leaf : Strip
+    leaf : LeafStrip
         One leaf.
     linear : (float, float)
         Where the leaves' stiffness is constant [m].
@@ -63,7 +63,7 @@ class Around:
 
     springs: BoughtSprings
     target: VcfmDesign
-    leaf: Strip
+    leaf: LeafStrip
     linear: tuple[float, float]
 
     @property
@@ -104,13 +104,15 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
         if target.rise is not None:
             thickness_for(target)  # what the largest rise does not allow no spring does
         tried = [_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
-        fitting = sorted((one for one in tried if isinstance(one, Around)), key=lambda one: one.rank(target))
+        fitting = sorted(
+            (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
+        )
         missed = [one for one in tried if isinstance(one, Miss)]
         if not target.refine and fitting:
             return _made(spec, target, fitting[0])
         for one in fitting[:TRIED]:
             found = _fitted(spec, target, one)
-            if isinstance(found, Around):
+            if isinstance(found, LeavesAroundSprings):
                 return _made(spec, target, found)
             missed.append(found)
     except Infeasible as problem:
@@ -150,7 +152,9 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
             yield BoughtSprings.model_validate(known), offer
 
 
-def _around(spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None) -> Around | Miss:
+def _around(
+    spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None
+) -> LeavesAroundSprings | Miss:
     """Return the leaves around some springs by closed forms, or what the springs miss."""
     label, law = f"{springs.count} x {springs.name or 'the spring'}", coils(springs)
     left = target.level - law.tension
@@ -190,11 +194,11 @@ def _around(spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: O
     while leaf.width < SQUAT * leaf.thickness and target.leaf_length is None:
         length *= 1.02  # narrower leaves buckle out of the plane; a longer leaf has to be wider
         leaf = sized_leaf(spec, own, thickness, length)
-    found = Around(springs, own, leaf, onset_and_exit(leaf))
+    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf))
     return _missed(spec, target, found, offer) or found
 
 
-def _missed(spec: VcfmSpec, target: VcfmDesign, found: Around, offer: Offer | None) -> Miss | None:
+def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
     """Return what springs miss with the leaves around them; None where they fit."""
     springs, leaf, own = found.springs, found.leaf, found.target
     most = float(found.linear[1]) + own.preload_stroke
@@ -216,7 +220,7 @@ def _missed(spec: VcfmSpec, target: VcfmDesign, found: Around, offer: Offer | No
     return None
 
 
-def _written(spec: VcfmSpec, found: Around) -> VcfmSpec:
+def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
     """Return the spec with springs and leaves written into its mechanism."""
     leaf = found.leaf
     return spec.replace(
@@ -231,7 +235,7 @@ def _written(spec: VcfmSpec, found: Around) -> VcfmSpec:
     )
 
 
-def _fitted(spec: VcfmSpec, target: VcfmDesign, found: Around) -> Around | Miss:
+def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
@@ -274,7 +278,7 @@ def _rest(sampler: ExactSampler, wide: float, preload: float) -> float:
     return float(back[pushed[0]]) if len(pushed) else preload
 
 
-def _made(spec: VcfmSpec, target: VcfmDesign, found: Around) -> Design:
+def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Design:
     """Return the design with an analysis that shows what was requested."""
     own = found.target
     note = f"{found.label}: the rise of the leaves follows from their rate, {mm(own.height)}"

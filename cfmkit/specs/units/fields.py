@@ -53,7 +53,7 @@ Bare = BareInt | BareFloat
 
 
 @dataclass(frozen=True)
-class Quantity:
+class UnitField:
     """The annotation that makes a float field read, check and write units.
 
     `dimensions` holds one name, or several where the text decides.
@@ -181,7 +181,7 @@ class Place(float):
         return PLACE.json_schema({})
 
 
-PLACE = Quantity(PLACES)
+PLACE = UnitField(PLACES)
 
 
 def _read_place(value: Any) -> Place:
@@ -210,7 +210,7 @@ class _OpenQuantity:
         return {"type": ["number", "string"], "examples": ["5 %", "140 mm", 0.05]}
 
 
-def quantity(dimension: str) -> Quantity:
+def quantity(dimension: str) -> UnitField:
     """Return the annotation for a float of that dimension: ``Annotated[float, quantity("length")]``.
 
     Raises
@@ -218,7 +218,7 @@ def quantity(dimension: str) -> Quantity:
     KeyError
         If there is no such dimension.
     """
-    return Quantity((dimension_of(dimension).name,))
+    return UnitField((dimension_of(dimension).name,))
 
 
 def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.errors import InputError, QuantityError
-from cfmkit.specs.units.fields import PLACES, Place, Quantity, plain_schema, write_place
+from cfmkit.specs.units.fields import PLACES, Place, UnitField, plain_schema, write_place
 from cfmkit.specs.units.quantities import format_quantity
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Share(Place):
 
 
 @dataclass(frozen=True)
-class _WindowEnd(Quantity):
+class _WindowEnd(UnitField):
     """Text such as ``2 mm``, ``3 deg`` or ``100 %`` of the travel; a plain number is a length."""
 
     def read(self, value: Any) -> tuple[float, str]:

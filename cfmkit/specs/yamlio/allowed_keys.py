@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 from pydantic import BaseModel
 
-from cfmkit.specs.units.fields import PLACE, MetricValue, Place, Quantity
+from cfmkit.specs.units.fields import PLACE, MetricValue, Place, UnitField
 from cfmkit.specs.units.quantities import example, needed
 
 if TYPE_CHECKING:
@@ -43,11 +43,11 @@ class Slot:
         return get_origin(self.kind) or self.kind
 
     @property
-    def quantity(self) -> Quantity | None:
+    def quantity(self) -> UnitField | None:
         """The quantity, if a number with a unit is meant."""
         if self.kind is Place:
             return PLACE
-        return next((item for item in self.metadata if isinstance(item, Quantity)), None)
+        return next((item for item in self.metadata if isinstance(item, UnitField)), None)
 
     @property
     def choices(self) -> tuple[Any, ...]:

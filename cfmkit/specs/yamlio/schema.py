@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.specs.units.fields import Quantity
+from cfmkit.specs.units.fields import UnitField
 from cfmkit.specs.units.quantities import format_quantity
 from cfmkit.specs.units.table import UNITLESS
 
@@ -49,4 +49,4 @@ def _default(node: dict[str, Any], value: Any) -> Any:
 def _bounds_as_text(node: dict[str, Any], dimension: str) -> None:
     bounds = {name: node.pop(name) for name in _BOUNDS if name in node}
     if bounds:
-        node["x-allowed"] = Quantity((dimension.split(" ")[0],)).limits(bounds)
+        node["x-allowed"] = UnitField((dimension.split(" ")[0],)).limits(bounds)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.families import family, names
 from cfmkit.families.base import Run, function_named
-from cfmkit.families.wishes import Offer
+from cfmkit.families.wishes import FamilyOffer
 from cfmkit.store.identity import code_stamp, stable_hash
 from cfmkit.studies.suggest.proposal import Proposal, ProposalJob, made
 from cfmkit.studies.suggest.verification import unverified, verified
@@ -41,7 +41,7 @@ class Answered:
     """What one family had to say: how many candidates it named and how many were made, or why there are none."""
 
     family: str
-    offer: Offer
+    offer: FamilyOffer
     made: int = 0
 
 
@@ -165,11 +165,11 @@ def _indexed(item: tuple[int, ProposalJob]) -> Proposal:
     return made(item[1])
 
 
-def _asked(name: str, wish: Wish, run: Run) -> Offer:
+def _asked(name: str, wish: Wish, run: Run) -> FamilyOffer:
     record = family(name)
     if record.propose is None:
-        return Offer()
-    offer: Offer = function_named(record.propose)(wish, run)
+        return FamilyOffer()
+    offer: FamilyOffer = function_named(record.propose)(wish, run)
     return offer
 
 

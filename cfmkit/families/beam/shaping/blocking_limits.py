@@ -10,7 +10,7 @@ from cfmkit.designing.variables import at_bounds
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.goals import Flattest
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, met
 from cfmkit.families.beam.shaping.sqp_program import Shaping
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.specs.units import format_short
@@ -46,7 +46,7 @@ class Blocked:
     freed: Found | None
 
 
-def blocked(task: Task, found: Iterable[Found], plan: Plan) -> Blocked:
+def blocked(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
     """Return what blocks, judged from the designs that miss the limits least."""
     best = sorted(found, key=lambda one: one.violation)[:MOST]
     missed = missed_by(task, best[0])
@@ -67,7 +67,7 @@ def blocked(task: Task, found: Iterable[Found], plan: Plan) -> Blocked:
     return Blocked(missed, nearest, None)
 
 
-def _given(task: Task, found: Found, plan: Plan, give: tuple[str, ...]) -> Found:
+def _given(task: Task, found: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
     """Return a design that meets all limits but some, and misses those as little as possible."""
     rest = [met(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)]
     return met(task, rest[0], task.orders[-1], plan, give, 0.98)

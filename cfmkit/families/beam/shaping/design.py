@@ -14,7 +14,7 @@ from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
 from cfmkit.families.beam.shaping.blocking_limits import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import Plan, finished, widened
+from cfmkit.families.beam.shaping.search import StartBudget, finished, widened
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
@@ -43,7 +43,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         return Design(None, Status.INVALID, problem)
     spec = with_stretch_and_shear(spec)
     task = task_of(spec, wanted)
-    plan = Plan(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
+    plan = StartBudget(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
     result = explored(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
     tables = {"starts": lambda: starts_table(task, result)}
     best = _best(spec, task, result, plan)
@@ -147,7 +147,7 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
     )
 
 
-def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | Design:
+def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
     candidates = [(one, result.audits.get(index)) for index, one in ranked(task, result.found)]
     if not candidates:
@@ -186,7 +186,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
     return fallback
 
 
-def _nothing(result: Explored, plan: Plan) -> Design:
+def _nothing(result: Explored, plan: StartBudget) -> Design:
     if result.lost:
         return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(result.lost)}")
     if result.missing or plan.late():

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.designing.sqp_program import Rows
+    from cfmkit.designing.sqp_program import LimitRows
     from cfmkit.families.beam.shaping.response import View
 
 
@@ -27,7 +27,7 @@ SIDES = {
 }
 
 
-def stress(view: View) -> list[Rows]:
+def stress(view: View) -> list[LimitRows]:
     """Signed extremes of the stress of each beam at every pose but rest, against the allowable stress."""
     task = view.response.variables.task
     allowed = task.limits.stress
@@ -37,17 +37,17 @@ def stress(view: View) -> list[Rows]:
     return [_extremes(view, "stress", part, slice(1, None), (allowed, allowed), allowed) for part in parts]
 
 
-def envelope(view: View) -> list[Rows]:
+def envelope(view: View) -> list[LimitRows]:
     """Extremes of the centre lines before loading."""
     return _inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
 
 
-def deformed_envelope(view: View) -> list[Rows]:
+def deformed_envelope(view: View) -> list[LimitRows]:
     """Extremes of the centre lines at every pose."""
     return _inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
 
 
-def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[Rows]:
+def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[LimitRows]:
     size = view.response.variables.task.size
     if box is None:
         return []
@@ -55,7 +55,7 @@ def _inside(view: View, name: str, box: tuple[float, float, float, float] | None
     return [_extremes(view, name, axis, which, most, size) for axis, most in ends.items()]
 
 
-def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> Rows:
+def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> LimitRows:
     """Return (most - largest value along each beam) / unit at some poses, of the value and of its negative."""
     lines = view.response.state.lines
     found = [np.zeros(0)] * len(lines)
@@ -78,7 +78,7 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
     return view.rows(name, values, lambda: np.concatenate([one.reshape(-1, one.shape[-1]) for one in by]), about)
 
 
-def length_ratio(view: View) -> list[Rows]:
+def length_ratio(view: View) -> list[LimitRows]:
     """Length over chord of the beams whose shape varies."""
     task = view.response.variables.task
     if task.limits.length_ratio is None:
@@ -90,7 +90,7 @@ def length_ratio(view: View) -> list[Rows]:
     return [view.rows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
 
 
-def slenderness(view: View) -> list[Rows]:
+def slenderness(view: View) -> list[LimitRows]:
     """Length over the largest thickness of every beam."""
     task = view.response.variables.task
     if task.limits.slenderness is None:
@@ -102,7 +102,7 @@ def slenderness(view: View) -> list[Rows]:
     return [view.rows("min_slenderness", values, lambda: slopes, lambda: list(many))]
 
 
-def radius(view: View) -> list[Rows]:
+def radius(view: View) -> list[LimitRows]:
     """Signed extremes of the curvature of the beams whose shape varies, before loading."""
     variables = view.response.variables
     least = variables.task.limits.radius
@@ -126,7 +126,7 @@ def radius(view: View) -> list[Rows]:
     return found
 
 
-def clearance(view: View) -> list[Rows]:
+def clearance(view: View) -> list[LimitRows]:
     """Gap of every pair of beams, and of every beam with itself, before loading and under load."""
     task = view.response.variables.task
     if task.limits.clearance is None:
@@ -143,7 +143,7 @@ def clearance(view: View) -> list[Rows]:
     return found
 
 
-def force(view: View) -> list[Rows]:
+def force(view: View) -> list[LimitRows]:
     """Mean force over the window, against a least value and a target."""
     limits, weights = view.response.variables.task.limits, view.poses.mean
     mean = float(weights @ view.response.state.force)
@@ -164,7 +164,7 @@ def force(view: View) -> list[Rows]:
     return [view.rows("force", values, slopes, lambda: [about for _, _, about in rows])]
 
 
-LIMITS: dict[str, Callable[[View], list[Rows]]] = {
+LIMITS: dict[str, Callable[[View], list[LimitRows]]] = {
     "stress": stress,
     "envelope": envelope,
     "deformed_envelope": deformed_envelope,

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.designing.starts import Stage, done
 from cfmkit.families.beam.shaping.audit import Audit, audited
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, searched, widened
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, searched, widened
 from cfmkit.families.beam.shaping.variables import Variables
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class OneStart:
 
     task: Task
     seed: int
-    plan: Plan
+    plan: StartBudget
 
     def __call__(self, index: int) -> dict[str, Any]:
         """Return the record; empty where there is nothing."""
@@ -39,7 +39,7 @@ class OneWidening:
 
     task: Task
     designs: dict[int, Found]
-    plan: Plan
+    plan: StartBudget
 
     def __call__(self, index: int) -> dict[str, Any]:
         """Return the record."""
@@ -71,12 +71,12 @@ class Explored:
     audits: Mapping[int, Audit] = field(default_factory=dict)
 
 
-def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run: Run) -> Explored:
+def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: str, run: Run) -> Explored:
     """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows.
 
     Parameters
     ----------
-    task, plan : Task and Plan
+    task, plan : Task and StartBudget
         What is shaped, and how much is tried.
     counts : (int, int)
         Starts, and how many of the best are widened.
@@ -108,7 +108,7 @@ def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: 
     run.progress(share[0] + (share[1] - share[0]) * len(records) / max(1, count), text)
 
 
-def _record(found: Found | None, plan: Plan) -> dict[str, Any]:
+def _record(found: Found | None, plan: StartBudget) -> dict[str, Any]:
     record = {} if found is None else asdict(replace(found, x=found.x.tolist()))
     return {"found": record, "late": plan.late()}
 

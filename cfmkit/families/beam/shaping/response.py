@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.designing.sqp_program import Rows
+from cfmkit.designing.sqp_program import LimitRows
 from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.variables import Length, lengths
@@ -226,9 +226,9 @@ class View:
 
     def rows(
         self, name: str, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]
-    ) -> Rows:
+    ) -> LimitRows:
         """Return rows of a limit; the derivatives are computed only if they are wanted."""
-        return Rows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
+        return LimitRows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
 
     def section(self, beam: str) -> Section:
         """Return the section of a beam."""

@@ -58,7 +58,7 @@ _STEEP = 20.0  # what a half band beyond that counts against the violation of th
 
 
 @dataclass(frozen=True)
-class Plan:
+class StartBudget:
     """How much is tried at one start.
 
     Attributes
@@ -124,7 +124,7 @@ class Found:
         return self.violation <= VIOLATION
 
 
-def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
+def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
     """Return what a start leads to; None where no random network could be followed over the window.
 
     Parameters
@@ -133,7 +133,7 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
         What is shaped.
     seed, index : int
         Of the run and of the start: the same pair gives the same answer.
-    plan : Plan
+    plan : StartBudget
         How much is tried.
     """
     first, rng = task.first, np.random.default_rng([seed, index])
@@ -151,7 +151,7 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
     return finished(task, found if found.feasible else met(task, found, found.order, plan), plan)
 
 
-def _begun(task: Task, rng: np.random.Generator, plan: Plan) -> Found | None:
+def _begun(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | None:
     """Return a random network that was made to meet the limits, or that misses them least; None without any."""
     best: Found | None = None
     evaluations = plan.drawn
@@ -179,7 +179,7 @@ def modelled(task: Task, found: Found) -> Found:
     return replace(found, objective=objective, violation=violation, evaluations=found.evaluations + 1)
 
 
-def finished(task: Task, found: Found, plan: Plan) -> Found:
+def finished(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return a design flattened in every order from its own on, as it is at many poses."""
 
     def again(finer: Task, design: Found) -> Found:
@@ -188,7 +188,7 @@ def finished(task: Task, found: Found, plan: Plan) -> Found:
     return confirmed(task, improved(task, found, plan), plan, again)
 
 
-def improved(task: Task, found: Found, plan: Plan, enough: float = -np.inf) -> Found:
+def improved(task: Task, found: Found, plan: StartBudget, enough: float = -np.inf) -> Found:
     """Return a design flattened in every order from its own on, in each until the half band is small enough."""
     for order in task.orders:
         if order >= found.order and not plan.late():
@@ -196,12 +196,12 @@ def improved(task: Task, found: Found, plan: Plan, enough: float = -np.inf) -> F
     return found
 
 
-def confirmed(task: Task, found: Found, plan: Plan, again: Callable[[Task, Found], Found]) -> Found:
+def confirmed(task: Task, found: Found, plan: StartBudget, again: Callable[[Task, Found], Found]) -> Found:
     """Return a design with objective, window and limits as they are at many poses.
 
     Parameters
     ----------
-    task, found, plan : Task, Found, Plan
+    task, found, plan : Task, Found, StartBudget
         What was searched for, and what came out; where that misses a limit it is returned as it is.
     again : callable
         What searches on, from a task with more poses and a design.
@@ -265,7 +265,7 @@ def rounded(task: Task, found: Found) -> Found:
     return replace(found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], TURNS)))
 
 
-def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
+def drawn(task: Task, rng: np.random.Generator, plan: StartBudget) -> list[Found]:
     """Return random networks that can be followed over the window, the most promising first.
 
     Straight ones; curved ones too where those cannot move, as a single beam that does not stretch.
@@ -293,7 +293,7 @@ def _coarse(task: Task) -> int:
 
 
 def met(
-    task: Task, found: Found, order: int, plan: Plan, give: tuple[str, ...] = tuple(LIMITS), share: float = 0.5
+    task: Task, found: Found, order: int, plan: StartBudget, give: tuple[str, ...] = tuple(LIMITS), share: float = 0.5
 ) -> Found:
     """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
 
@@ -315,7 +315,7 @@ def met(
     return found
 
 
-def _flattened(task: Task, found: Found, order: int, plan: Plan, steps: int, enough: float = -np.inf) -> Found:
+def _flattened(task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, found.order).raised(found.x, order)
     program = Shaping(variables, found.start, Compared() if task.objective == "paper" else Flattest())
@@ -360,7 +360,7 @@ def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> flo
     return worst(program.limits(view))
 
 
-def widened(task: Task, found: Found, plan: Plan) -> Found:
+def widened(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the design with the widest window in which the force stays in the wanted band.
 
     The start of the window is a variable like all others; the window grows from the last design, whose force is flatter
@@ -379,7 +379,7 @@ def widened(task: Task, found: Found, plan: Plan) -> Found:
     return wide if kept else replace(good, evaluations=wide.evaluations)
 
 
-def _widest(task: Task, found: Found, plan: Plan) -> Found:
+def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
     for _ in range(_WIDENINGS):
@@ -396,7 +396,7 @@ def _widest(task: Task, found: Found, plan: Plan) -> Found:
     return found
 
 
-def _repaired(task: Task, wide: Found, good: Found, plan: Plan) -> Found:
+def _repaired(task: Task, wide: Found, good: Found, plan: StartBudget) -> Found:
     """Return a design near one that all but meets the limits, that does, at nearly its window; else the good one."""
     start = wide.start
     while start < good.start and not plan.late():

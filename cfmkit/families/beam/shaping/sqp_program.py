@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.designing import sqp_program
 from cfmkit.designing.limits import worst
-from cfmkit.designing.sqp_program import Rows, SeenPoint
+from cfmkit.designing.sqp_program import LimitRows, SeenPoint
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
@@ -94,10 +94,12 @@ class Shaping:
         except NoAnswer:
             return None
         if aim.by_x is None or aim.rows_by_x is None:
-            return SeenPoint(aim.value, None, [Rows("goal", aim.rows), *limits])
+            return SeenPoint(aim.value, None, [LimitRows("goal", aim.rows), *limits])
         slopes = np.concatenate([aim.rows_by_x, aim.rows_by_own], axis=1)
-        return SeenPoint(aim.value, np.concatenate([aim.by_x, aim.by_own]), [Rows("goal", aim.rows, slopes), *limits])
+        return SeenPoint(
+            aim.value, np.concatenate([aim.by_x, aim.by_own]), [LimitRows("goal", aim.rows, slopes), *limits]
+        )
 
-    def limits(self, view: View) -> list[Rows]:
+    def limits(self, view: View) -> list[LimitRows]:
         """Return the rows of all limits."""
         return [rows for make in LIMITS.values() for rows in make(view)]

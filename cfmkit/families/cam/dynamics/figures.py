@@ -11,7 +11,7 @@ from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
 from cfmkit.plots.text import Heading, value_text
@@ -121,7 +121,7 @@ def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]
     ]
 
 
-def _regions(moved: MotionSolution) -> Iterator[Region]:
+def _regions(moved: MotionSolution) -> Iterator[MarkedRange]:
     """Yield the spans of time in which the roller lifts off, the cable is slack, or the roller is on the corner."""
     history = moved.history
     lost = (history.contact[0] <= 0) | (history.contact[1] <= 0)
@@ -130,14 +130,14 @@ def _regions(moved: MotionSolution) -> Iterator[Region]:
     yield from _spans(history.times, history.on_corner, "on the corner")
 
 
-def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[Region]:
+def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[MarkedRange]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     for index, (first, after) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-        yield Region(float(times[first]), float(times[after - 1]), "" if index else text)
+        yield MarkedRange(float(times[first]), float(times[after - 1]), "" if index else text)
 
 
-def _unnamed(regions: list[Region]) -> list[Region]:
-    return [Region(item.start, item.stop, "") for item in regions]
+def _unnamed(regions: list[MarkedRange]) -> list[MarkedRange]:
+    return [MarkedRange(item.start, item.stop, "") for item in regions]
 
 
 def _constant_name(moved: MotionSolution) -> str:

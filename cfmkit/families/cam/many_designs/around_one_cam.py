@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
 from cfmkit.families.cam.geometry.many_tracks import sign_changes, tangents
-from cfmkit.families.cam.many_designs.forces import Forces, Pose, Slab
+from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point
@@ -176,11 +176,11 @@ class BuiltSlab(Slab):
         """Return the force at travels of some mechanisms, (r, m) [N]; NaN where friction holds a roller."""
         return self._slider(self._poses_at(travel, rows), rows, way)
 
-    def _forces(self, friction: FloatArray) -> Forces:
+    def _forces(self, friction: FloatArray) -> ForcesOfCams:
         way = -1.0 if (friction < 0).any() else 1.0
         contact = self._contact(self._poses, self._every, way) if self.contacts or self._pressed else None
         slider = self._slider(self._poses, self._every, way)
-        return Forces(slider, contact, np.asarray(np.isfinite(slider[:, 1:]).all(axis=1)))
+        return ForcesOfCams(slider, contact, np.asarray(np.isfinite(slider[:, 1:]).all(axis=1)))
 
     def _levers(self, poses: Poses, rows: Rows, way: float | FloatArray) -> tuple[FloatArray, ...]:
         """Return friction, tangent, 1 + mu f, the lever, and the spring force on one roller [N]."""

@@ -19,7 +19,7 @@ from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.track_records import NoTrack
-from cfmkit.families.cam.many_designs.forces import Begin, Forces, Pose, Slab, force_at
+from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
 from cfmkit.families.cam.statics import jams
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ class CornerSlab(Slab):
             [any(low < end for low, _ in each) for each, end in zip(self.jams, self.corner_travel, strict=True)]
         )
 
-    def _forces(self, friction: FloatArray) -> Forces:
+    def _forces(self, friction: FloatArray) -> ForcesOfCams:
         """Return the forces at all samples, as `statics.forces` does without weight."""
         stretch, slope, mu = self.stretch, self.slope, friction[:, None]
         tangent = tangents(self.half_width, self.designs.brace[:, None])
@@ -205,4 +205,4 @@ class CornerSlab(Slab):
         divisor = np.where(moves, lever, 1.0)
         contact = np.sqrt(1.0 + slope * slope) * spring / divisor if self.contacts else None
         solved = np.asarray((moves | (spring == 0)).all(axis=1))
-        return Forces(2.0 * (spring * turn) / divisor, contact, solved)
+        return ForcesOfCams(2.0 * (spring * turn) / divisor, contact, solved)

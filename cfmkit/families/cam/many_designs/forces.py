@@ -115,7 +115,7 @@ class Begin(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Forces:
+class ForcesOfCams:
     """Force on the slider and at a contact, (designs, points) each [N], and where a lever is missing."""
 
     slider: FloatArray
@@ -182,16 +182,16 @@ class Slab:
         return self.stretch / self.designs.constant[:, None] + self.tangent
 
     @cached_property
-    def up(self) -> Forces:
+    def up(self) -> ForcesOfCams:
         """Forces on the way up."""
         return self._forces(self.designs.friction)
 
     @cached_property
-    def down(self) -> Forces:
+    def down(self) -> ForcesOfCams:
         """Forces on the way down."""
         return self._forces(-self.designs.friction) if self.designs.friction.any() else self.up
 
-    def _forces(self, friction: FloatArray) -> Forces:
+    def _forces(self, friction: FloatArray) -> ForcesOfCams:
         """Return the forces of one direction, as `statics.forces` does without weight."""
         cams, mu = self.designs, friction[:, None]
         turn = 1.0 + mu * self.slope
@@ -205,7 +205,7 @@ class Slab:
         slider[:, 0] = np.where(ideal, limit, 0.0)
         if contact is not None:
             contact[:, 0] = np.where(ideal, 0.5 * limit * (1.0 + self.slope[:, 0] ** 2) ** 0.5, 0.0)
-        return Forces(slider, contact, np.asarray((lever[:, 1:] > 0).all(axis=1)))
+        return ForcesOfCams(slider, contact, np.asarray((lever[:, 1:] > 0).all(axis=1)))
 
     @cached_property
     def places(self) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.designing.variables import at_bounds
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.printed.assembly import strip_chain
-from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solution, first_at
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def judge(
     first = max(task.start, 1e-3 * end)
     travel = np.unique(np.concatenate([np.geomspace(first, end, PLACES // 4), np.linspace(first, end, PLACES)]))
     pressed = chain.press(travel)
-    if pressed.ending is not Ending.COMPLETE:
+    if pressed.ending is not PressingEnd.COMPLETE:
         return None
     solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end), True)
     ratio = solution.force / task.force - task.share(solution.travel)

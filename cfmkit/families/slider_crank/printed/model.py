@@ -26,7 +26,7 @@ from cfmkit.families.slider_crank.printed.assembly import (
     travel_direction,
 )
 from cfmkit.families.slider_crank.printed.findings import findings_of
-from cfmkit.families.slider_crank.printed.pressing import Ending, kept_clear
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd, kept_clear
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS, numbers
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
@@ -47,13 +47,13 @@ DEFAULT_SHARE = 0.35
 """Travel where none is requested, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
 
 _NAMES = {
-    Ending.LIMIT_POINT: "limit_point",
-    Ending.UNSTABLE: "unstable",
-    Ending.NOT_CONVERGED: "not_converged",
-    Ending.WRONG_BRANCH: "wrong_branch",
-    Ending.CROSSES: "wrong_branch",
-    Ending.BLOCKED: "meets_itself",
-    Ending.STARTS_LATE: "branch_begins_late",
+    PressingEnd.LIMIT_POINT: "limit_point",
+    PressingEnd.UNSTABLE: "unstable",
+    PressingEnd.NOT_CONVERGED: "not_converged",
+    PressingEnd.WRONG_BRANCH: "wrong_branch",
+    PressingEnd.CROSSES: "wrong_branch",
+    PressingEnd.BLOCKED: "meets_itself",
+    PressingEnd.STARTS_LATE: "branch_begins_late",
 }
 
 
@@ -90,8 +90,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
     pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
     pressed = kept_clear(pressed, _thickness(chain))
-    usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
-    told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
+    told = () if pressed.ending is PressingEnd.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
     if not usable:
         return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=told)
     whole = (float(pressed.travel[0]), float(pressed.travel[-1]))

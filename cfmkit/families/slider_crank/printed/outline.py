@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, mark, polygon
+from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Line, Region, Sheet, circle, mark, polygon
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
@@ -140,12 +140,12 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     return replace(drawn, contours=(rounded, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
 
 
-def _dimensions(points: FloatArray) -> Iterator[Dimension]:
+def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:
     """Yield how far the ends of the centre line are apart."""
     start, end = ((float(x), float(y)) for x, y in (points[0], points[-1]))
-    yield Dimension("ends of the centre line", start, end, "x")
+    yield DrawnDimension("ends of the centre line", start, end, "x")
     if abs(end[1] - start[1]) > STRAIGHT:
-        yield Dimension("ends of the centre line", start, end, "y")
+        yield DrawnDimension("ends of the centre line", start, end, "y")
 
 
 def _facts(spec: SliderCrankSpec, drawn: Drawing) -> Iterator[tuple[str, str]]:

@@ -62,7 +62,7 @@ BENT = 0.1
 """Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
 
 
-class Ending(Enum):
+class PressingEnd(Enum):
     """How pressing a chain ended."""
 
     COMPLETE = "every requested point is a stable equilibrium on the requested branch"
@@ -83,7 +83,7 @@ class Pressed:
     ----------
     path : Path
         Converged points only.
-    ending : Ending
+    ending : PressingEnd
         Why it ended, or that it is complete.
     message : str
         One sentence with the place.
@@ -92,7 +92,7 @@ class Pressed:
     """
 
     path: Path
-    ending: Ending
+    ending: PressingEnd
     message: str
     side: int = 0
 
@@ -171,7 +171,11 @@ class Chain:
         if len(taut):
             near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
             text = f"the chain is taut before {travel[taut[0]] * 1e3:.4g} mm; beyond, it could only be torn"
-            return replace(near, ending=Ending.LIMIT_POINT, message=text) if near.ending is Ending.COMPLETE else near
+            return (
+                replace(near, ending=PressingEnd.LIMIT_POINT, message=text)
+                if near.ending is PressingEnd.COMPLETE
+                else near
+            )
         drive = Displacement(SLIDER, self.direction, travel)
         wanted = side or self.side or 1
         clear = abs(kink(self.pins)) > CLEAR * self.length
@@ -205,23 +209,23 @@ class Chain:
         if other and 0 < first < len(drive.points):
             path = _from_its_limit(_since(path, first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
-            return Pressed(path, Ending.STARTS_LATE, text, wanted)
+            return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
         return self._judged(path, wanted)
 
     def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
         """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
-        ending, message = _ENDINGS.get(path.status, Ending.NOT_CONVERGED), path.message
+        ending, message = _ENDINGS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
         if helped or not len(path.at_requested):
-            ending = Ending.NOT_CONVERGED if ending is Ending.COMPLETE else ending
+            ending = PressingEnd.NOT_CONVERGED if ending is PressingEnd.COMPLETE else ending
             return Pressed(path, ending, message)
         sides = self._sides(path, wanted)
         side = int(sides[-1])
         stable = path.stable[path.at_requested]
-        if ending is Ending.COMPLETE and not stable.all():
+        if ending is PressingEnd.COMPLETE and not stable.all():
             first = path.drive[path.at_requested][~stable][0]
-            ending, message = Ending.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
+            ending, message = PressingEnd.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
         chain_like = abs(kink(self.pins)) <= BENT * self.length
-        if ending is Ending.COMPLETE and side != wanted and (chain_like or wanted != self.side):
+        if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
             return self._crossed(path, sides, wanted)
         return Pressed(path, ending, message, side)
 
@@ -247,17 +251,17 @@ class Chain:
         """Return what there is before the chain bends to the other side: nothing where it does so at once."""
         first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
         if first < FEWEST:
-            return Pressed(path, Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value, -wanted)
+            return Pressed(path, PressingEnd.WRONG_BRANCH, PressingEnd.WRONG_BRANCH.value, -wanted)
         places = path.drive[path.at_requested][first - 1 : first + 1] * 1e3
-        text = f"between {places[0]:.4g} and {places[1]:.4g} mm {Ending.CROSSES.value}"
+        text = f"between {places[0]:.4g} and {places[1]:.4g} mm {PressingEnd.CROSSES.value}"
         kept = part_of(path, np.isin(path.requested, path.requested[path.at_requested][:first]))
-        return Pressed(kept, Ending.CROSSES, text, wanted)
+        return Pressed(kept, PressingEnd.CROSSES, text, wanted)
 
 
 _ENDINGS = {
-    PathStatus.COMPLETE: Ending.COMPLETE,
-    PathStatus.LIMIT_POINT: Ending.LIMIT_POINT,
-    PathStatus.JUMPS: Ending.UNSTABLE,
+    PathStatus.COMPLETE: PressingEnd.COMPLETE,
+    PathStatus.LIMIT_POINT: PressingEnd.LIMIT_POINT,
+    PathStatus.JUMPS: PressingEnd.UNSTABLE,
 }
 
 
@@ -378,7 +382,7 @@ def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
             at = pressed.path.drive[places[number]] * 1e3
             text = f"at {at:.4g} mm the chain {what}: no such part exists from there on; end 'analysis.travel' before"
             kept = part_of(pressed.path, np.isin(np.arange(len(pressed.path.drive)), places[:number]))
-            return replace(pressed, path=kept, ending=Ending.BLOCKED, message=text)
+            return replace(pressed, path=kept, ending=PressingEnd.BLOCKED, message=text)
     return pressed
 
 

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.build import side_of
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import FLEXURE_SHARE, chain_of_flexures, elasticity, flexures_of
 from cfmkit.families.slider_crank.printed.chain import Flexure
-from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.results import Design, Status
@@ -209,7 +209,7 @@ def corrected(
     limit = made_of.allowable_stress or np.inf
     for number in range(_ROUNDS):
         pressed = chain_of_flexures(parts, made_of, *built_in).press(travel)
-        if pressed.ending is not Ending.COMPLETE:
+        if pressed.ending is not PressingEnd.COMPLETE:
             return None
         by_force = float(pressed.force.mean() / force.mean())
         by_stress = float(pressed.path.peak_stress().value.max() / limit)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
-from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.metrics.continuous_curves import mean
 from cfmkit.numerics.chebyshev_panels import nodes_of, resolved
 from cfmkit.numerics.roots import bracketed_root
@@ -141,9 +141,9 @@ def course(
     return ChainCurve(ends, first, (force, stress)) if whole else None
 
 
-Model = Literal["lumped", "beam"]
+ChainModel = Literal["lumped", "beam"]
 
-FOLLOWED = (Ending.COMPLETE, Ending.UNSTABLE)
+FOLLOWED = (PressingEnd.COMPLETE, PressingEnd.UNSTABLE)
 """Endings of a path that has all points that were requested."""
 
 CHECKED = 6
@@ -188,7 +188,7 @@ class Solution:
         Whether a mirrored pair keeps the guide free of load.
     """
 
-    model: Model
+    model: ChainModel
     chain: Chain
     pressed: Pressed
     material: Elasticity

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.designing import sqp_program
-from cfmkit.designing.sqp_program import Rows, SeenPoint
+from cfmkit.designing.sqp_program import LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
@@ -271,25 +271,25 @@ class StripProgram:
         slope[-1] = sign
         return sign * float(z[-1]), slope
 
-    def _band(self, z: FloatArray, ratio: FloatArray, by: FloatArray | None) -> list[Rows]:
+    def _band(self, z: FloatArray, ratio: FloatArray, by: FloatArray | None) -> list[LimitRows]:
         """Return by how much the force is below the upper edge of its band, and above the lower one [%]."""
         if self.task.goal == "rms":
             return []
         most, off = 100.0 * self.ripple(z), 100.0 * (self.between @ ratio)
         if by is None:
-            return [Rows("band", most - off), Rows("band", most + off)]
+            return [LimitRows("band", most - off), LimitRows("band", most + off)]
         slope = 100.0 * self.between @ by
         upper, lower = -slope, slope.copy()
         if self.task.goal == "ripple":
             upper[:, -1], lower[:, -1] = 1.0, 1.0
-        return [Rows("band", most - off, upper), Rows("band", most + off, lower)]
+        return [LimitRows("band", most - off, upper), LimitRows("band", most + off, lower)]
 
-    def _strength(self, state: State, by: FloatArray | None) -> list[Rows]:
+    def _strength(self, state: State, by: FloatArray | None) -> list[LimitRows]:
         """Return by which share the stress is below the allowable one, ten times: as strict as the band is."""
         limit = self.task.material.allowable_stress
         if limit is None:
             return []
-        return [Rows("stress", 10.0 * (1.0 - state.stress / limit), None if by is None else -10.0 * by / limit)]
+        return [LimitRows("stress", 10.0 * (1.0 - state.stress / limit), None if by is None else -10.0 * by / limit)]
 
     def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of force (p, n) and stress (r, n) by all variables."""

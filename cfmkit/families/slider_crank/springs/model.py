@@ -26,7 +26,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.scalar_results import values_of, values_of_wires
-from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm, Solution
+from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
@@ -83,7 +83,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         travel=asked_motion(spec, assembly),
         target=target_of(spec),
         reference=solution.reference,
-        closed=ClosedForm(solution.character),
+        closed=ClosedFormEffort(solution.character),
         tables=listed(parts_of(spec)),
         state=solution,
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import Arc, Contour, Dimension, Drawing, Line, Sheet, circle
+from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
 from cfmkit.families.slider_crank.build import linkage_of
 from cfmkit.specs.units import format_short
 
@@ -40,8 +40,8 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     part = spec.mechanism.part
     y = -3.0 * eye
     told = (
-        Dimension("crank", (0.0, 0.0), (linkage.crank, 0.0)),
-        Dimension("coupler", (0.0, y), (linkage.coupler, y)),
+        DrawnDimension("crank", (0.0, 0.0), (linkage.crank, 0.0)),
+        DrawnDimension("coupler", (0.0, y), (linkage.coupler, y)),
     )
     facts = [("material", "not stated"), ("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []

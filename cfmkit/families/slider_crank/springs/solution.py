@@ -300,7 +300,7 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class ClosedForm:
+class ClosedFormEffort:
     """The effort at every place of the motion, for metrics that are places.
 
     Attributes

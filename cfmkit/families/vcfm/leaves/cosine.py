@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
@@ -42,7 +42,7 @@ class CosineLeaf:
     arch are developed ones: at 7 deg the negative stiffness is then within 0.6 % of the exact one (2.4 % without).
     """
 
-    strip: Strip
+    strip: LeafStrip
 
     @cached_property
     def developed(self) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
 SLENDER, CRUSHED = 6.0, 0.25
@@ -30,7 +30,7 @@ class HybridLeaf:
 
     Parameters
     ----------
-    strip : Strip
+    strip : LeafStrip
         Of the flexures; its length is that of the whole leaf.
     flexure : float
         Length of each flexure [m].
@@ -38,7 +38,7 @@ class HybridLeaf:
         Thickness of the bar over that of the flexures.
     """
 
-    strip: Strip
+    strip: LeafStrip
     flexure: Any
     stiffening: Any = 4.0
 

@@ -25,16 +25,16 @@ from cfmkit.families.vcfm.leaves.s_form import s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
-def leaf_compliance(strip: Strip) -> Any:
+def leaf_compliance(strip: LeafStrip) -> Any:
     """Return the compliance of a leaf whose far end is guided and free to move across [m/N].
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.leaves.strip import Strip
-    >>> leaf = Strip(25e-3, np.radians(7), 1.5e-3, 10e-3, 1477e6, 0.3)
+    >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    >>> leaf = LeafStrip(25e-3, np.radians(7), 1.5e-3, 10e-3, 1477e6, 0.3)
     >>> float((1e-3 / leaf_compliance(leaf)).round(6))
     3.202276
     """
@@ -43,7 +43,7 @@ def leaf_compliance(strip: Strip) -> Any:
     return bent + strip.length * c2 / strip.shear + strip.length * s2 / strip.axial
 
 
-def leaf_stress(strip: Strip, deflection: Any) -> Any:
+def leaf_stress(strip: LeafStrip, deflection: Any) -> Any:
     """Return the bending stress at the ends of a leaf that is deflected by so much [m], in Pa."""
     e, t, length = strip.youngs_modulus, strip.thickness, strip.length
     return 3.0 * e * t * np.abs(deflection) * np.cos(strip.angle) / length**2
@@ -56,7 +56,7 @@ class Diamond:
     `share` is the loaded part of the structure: 1, or 0.5 for one of the two chains.
     """
 
-    strip: Strip
+    strip: LeafStrip
     share: Any = 1.0
     pairs: float = 1.0
 
@@ -82,7 +82,7 @@ class UShape:
     chains, S its developed length, xb and I2 its centroid and second moment across the motion.
     """
 
-    strip: Strip
+    strip: LeafStrip
     radius: Any
     share: Any = 1.0
 
@@ -122,7 +122,7 @@ class StraightSpring:
     the S form in tension is within 1 %.
     """
 
-    strip: Strip
+    strip: LeafStrip
     share: Any = 1.0
 
     @property
@@ -176,7 +176,7 @@ class Coils:
 Spring = Diamond | UShape | StraightSpring | Coils
 
 
-def folded(strip: Strip, share: Any = 1.0) -> Diamond:
+def folded(strip: LeafStrip, share: Any = 1.0) -> Diamond:
     """Return eight folded beams: four chains of two straight leaves, whose joints move along the leaves."""
     return Diamond(strip, share, pairs=2.0)
 

@@ -15,7 +15,7 @@ SHEAR_FACTOR = 5.0 / 6.0
 
 
 @dataclass(frozen=True)
-class Strip:
+class LeafStrip:
     """One leaf, clamped at one end, `angle` from the direction across the motion.
 
     Parameters

@@ -17,22 +17,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
 @dataclass(frozen=True)
 class TrussLeaf:
     """One leaf as a bar on two pins [D, eq. 18]: half of E S u (u - s)(u - 2 s), u = d/L, s = sin(theta)."""
 
-    strip: Strip
+    strip: LeafStrip
 
     def force(self, travel: Any) -> Any:
         """Return the force of one leaf along the motion [N].
 
         Examples
         --------
-        >>> from cfmkit.families.vcfm.leaves.strip import Strip
-        >>> leaf = TrussLeaf(Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3))
+        >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+        >>> leaf = TrussLeaf(LeafStrip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3))
         >>> float(leaf.force(1e-3).round(6))
         2.541452
         """
@@ -73,7 +73,7 @@ class TrussLeaf:
 class TrussDiamond:
     """The diamond by bending alone [D, eq. 19]: E b t^3/(2 (L cos)^3) for each chain."""
 
-    strip: Strip
+    strip: LeafStrip
     share: Any = 1.0
 
     @property

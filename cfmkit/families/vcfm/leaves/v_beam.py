@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
-    Law = Callable[[Strip, FloatArray], Any]
+    Law = Callable[[LeafStrip, FloatArray], Any]
 
 NEGATIVE_ABOVE = 1.4246
 """Rise over thickness above which a V-beam has a negative stiffness anywhere."""
@@ -49,7 +49,7 @@ RELIABLE = 1.6
 """Travel over rise beyond which the S form is no longer to be trusted (0.07 N of 2.3 at 1.9 of [D], Table I)."""
 
 
-def critical_force(strip: Strip) -> Any:
+def critical_force(strip: LeafStrip) -> Any:
     """Return P_cr of the form 1 - cos(2 pi s/L) with stretching and shear [N].
 
     P_e (1 + P_e/EA - P_e/(5/6 GA)), P_e = 4 pi^2 EI/L^2: within 0.2 % of the exact slope for t/L up to 1/29.
@@ -58,7 +58,7 @@ def critical_force(strip: Strip) -> Any:
     return euler * (1.0 + euler / strip.axial - euler / strip.shear)
 
 
-def onset_and_exit(strip: Strip) -> tuple[Any, Any]:
+def onset_and_exit(strip: LeafStrip) -> tuple[Any, Any]:
     """Return where the leaf buckles and where it straightens again, d1 and d2 [m]; NaN where it does not buckle.
 
     u - 3 u^2/4 = pi^2/(3 Q^2), u = d/h: good to a percent; the curve joins its branches where the two laws cross.
@@ -69,20 +69,20 @@ def onset_and_exit(strip: Strip) -> tuple[Any, Any]:
     return 2.0 / 3.0 * rise * (1.0 - half), 2.0 / 3.0 * rise * (1.0 + half)
 
 
-def negative_stiffness(strip: Strip) -> Any:
+def negative_stiffness(strip: LeafStrip) -> Any:
     """Return P_cr/X, the size of the negative stiffness of one leaf [N/m].
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.leaves.strip import Strip
-    >>> leaf = Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3)
+    >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    >>> leaf = LeafStrip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3)
     >>> float(negative_stiffness(leaf).round(3))
     681.202
     """
     return critical_force(strip) / strip.reach
 
 
-def first_stiffness(strip: Strip) -> Any:
+def first_stiffness(strip: LeafStrip) -> Any:
     """Return the stiffness of one leaf as made, K_b1 [N/m]: EA sin^2/L + 12 EI cos^2/L^3."""
     s, c = np.sin(strip.angle), np.cos(strip.angle)
     return strip.axial * s * s / strip.length + 12.0 * strip.bending * c * c / strip.length**3
@@ -110,7 +110,7 @@ def overrated(angle: float) -> float:
 class VBeam:
     """The law of one leaf: force and stress over the travel, and where it is buckled."""
 
-    strip: Strip
+    strip: LeafStrip
 
     @property
     def balance(self) -> Any:
@@ -208,12 +208,12 @@ class VBeam:
         return found
 
 
-def _buckled_force(strip: Strip, travel: FloatArray) -> Any:
+def _buckled_force(strip: LeafStrip, travel: FloatArray) -> Any:
     drop = strip.rise - travel
     return critical_force(strip) * (drop / np.hypot(strip.reach, drop))
 
 
-def _buckled(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
+def _buckled(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
     force, at = critical_force(strip), pose(strip.angle, travel / strip.length)
     # (2 pi/L) sqrt(alpha^2 + 4 r) with r = shortening - P/EA - alpha^2/4: the tilt drops out
     curvature = 4.0 * np.pi / strip.length * np.sqrt(np.maximum(at.shortening - force / strip.axial, 0.0))
@@ -221,12 +221,12 @@ def _buckled(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
     return _buckled_force(strip, travel), stress
 
 
-def _bent_force(strip: Strip, travel: FloatArray) -> Any:
+def _bent_force(strip: LeafStrip, travel: FloatArray) -> Any:
     unit = strip.bending / strip.length**2
     return unit * s_force(strip.angle, strip.thickness / strip.length, travel / strip.length).along
 
 
-def _bent(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
+def _bent(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
     unit = strip.bending / strip.length**2
     found = s_force(strip.angle, strip.thickness / strip.length, travel / strip.length)
     axial = np.abs(4.0 * found.z * unit) / strip.area

@@ -31,7 +31,7 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     small_angle_number,
 )
 from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
-from cfmkit.metrics.branch_views import Frame
+from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.continuous_curves import extremes, mean
 from cfmkit.metrics.ranges_many import (
     UNIFORM_POINTS,
@@ -134,7 +134,7 @@ class Base:
     @cached_property
     def band(self) -> float:
         """Half width of the band of the usable stroke, as a fraction."""
-        return float(getattr(self.spec.analysis, "band", Frame.band))
+        return float(getattr(self.spec.analysis, "band", MeasuringFrame.band))
 
     def knows(self, measure: Measure) -> bool:
         """Return whether this model has a measure."""
