@@ -3,6 +3,7 @@
 What is seen of a part are numbers such as the force at some poses; limits are rows of them that must be at least zero.
 Near a design both move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are
 known to first order, without solving one of them, and with them how far each limit must be drawn in: none is guessed.
+Derivatives are exact where the family has them, and central differences elsewhere.
 
 A step minimises, over such parts, the mean of the worst share of them (the conditional value at risk of the row that is
 missed most, counted in standard deviations of that row) [RU]. That is a linear program. It is followed as far as the
@@ -16,10 +17,12 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+
+from cfmkit.designing.conditional_value_at_risk import best_move, tail_risk
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,8 +40,8 @@ SIGMA_STEP = 0.5
 ASIDE = 0.25
 """A mean error beyond so many standard deviations is one to one side, as of a waviness, which is never below zero."""
 
-LINEAR_PARTS, ROWS = 192, 24
-"""Parts of a linear program, and how many of its rows each brings: those that are missed most, or nearly."""
+LINEAR_PARTS = 192
+"""Parts of a linear program."""
 
 SURE = 0.01
 """The estimated share is to be so much above what was requested: the estimate is of first order."""
@@ -55,6 +58,34 @@ class SeenPart(Protocol):
 
     def __call__(self, x: FloatArray, errors: FloatArray, /) -> FloatArray | None:
         """Return the numbers of a part (q,) whose design has the values x (n,) and whose errors are (d,); or None."""
+
+
+@dataclass(frozen=True)
+class PartSlopes:
+    """Exact derivatives of the numbers of a part; NaN by what they are not known by.
+
+    Attributes
+    ----------
+    by_x : (q, n) array
+        By the values of its design.
+    by_error : (q, d) array
+        By its errors.
+    """
+
+    by_x: FloatArray
+    by_error: FloatArray
+
+
+class SlopedPart(Protocol):
+    """What a family knows of the derivatives of a part's numbers."""
+
+    def __call__(self, x: FloatArray, errors: FloatArray, /) -> PartSlopes | None:
+        """Return the derivatives at the values x (n,) and errors (d,); None where none is known."""
+
+
+def no_slopes(_x: FloatArray, _errors: FloatArray) -> PartSlopes | None:
+    """Return that no derivative is known exactly."""
+    return None
 
 
 def never() -> bool:
@@ -90,6 +121,8 @@ class RobustProblem:
         Tells whether the time is up.
     tell : callable
         Takes the share estimated and the number of steps so far.
+    slopes : callable
+        Exact derivatives of a part's numbers, where there are any.
     """
 
     seen: SeenPart
@@ -102,6 +135,7 @@ class RobustProblem:
     share: float
     late: Callable[[], bool] = never
     tell: Callable[[float, int], None] = unheard
+    slopes: SlopedPart = no_slopes
 
     @property
     def reach(self) -> FloatArray:
@@ -205,29 +239,28 @@ class _Counted:
 
 
 def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | None:
-    """Return a design to first order, by central differences; None where it or a neighbour has no numbers."""
+    """Return a design to first order; None where it, or a neighbour that a difference needs, has no numbers."""
     middle = seen(x, problem.none)
     if middle is None:
         return None
-    by_x = _by_values(problem, x, problem.none, seen)
-    by_error = np.empty((len(middle), len(problem.deviations)))
-    for k, sigma in enumerate(problem.deviations.tolist()):
-        step = SIGMA_STEP * sigma * np.eye(len(problem.deviations))[k]
-        about = problem.middle * (step > 0)
-        ends = [seen(x, about + sign * step) for sign in (1.0, -1.0)]
-        if ends[0] is None or ends[1] is None:
-            return None
-        by_error[:, k] = (ends[0] - ends[1]) / (2.0 * SIGMA_STEP * sigma)
-    if by_x is None:
+    known = problem.slopes(x, problem.none)
+    by_x = _by_values(problem, x, problem.none, seen, None if known is None else known.by_x)
+    by_error = _by_errors(problem, x, seen, None if known is None else known.by_error)
+    if by_x is None or by_error is None:
         return None
     matrix = problem.matrix
     return Linear(x, matrix @ middle + problem.constant, matrix @ by_x, matrix @ by_error)
 
 
-def _by_values(problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart) -> FloatArray | None:
-    """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
+def _by_values(
+    problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart, known: FloatArray | None
+) -> FloatArray | None:
+    """Return the derivatives of the numbers of a part by the values of its design, (q, n); those not known by steps."""
     columns = []
     for k, width in enumerate(problem.reach.tolist()):
+        if known is not None and np.isfinite(known[:, k]).all():
+            columns.append(known[:, k])
+            continue
         low, high = x.copy(), x.copy()
         low[k] = max(problem.bounds[k, 0], x[k] - STEP * width)
         high[k] = min(problem.bounds[k, 1], x[k] + STEP * width)
@@ -235,6 +268,22 @@ def _by_values(problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: 
         if ends[0] is None or ends[1] is None:
             return None
         columns.append((ends[0] - ends[1]) / (high[k] - low[k]))
+    return np.array(columns).T
+
+
+def _by_errors(problem: RobustProblem, x: FloatArray, seen: SeenPart, known: FloatArray | None) -> FloatArray | None:
+    """Return the derivatives of the numbers by the errors, (q, d); those not known at the middle error by steps."""
+    columns = []
+    for k, sigma in enumerate(problem.deviations.tolist()):
+        one = np.arange(len(problem.deviations)) == k
+        if known is not None and np.isfinite(known[:, k]).all() and problem.middle[k] == 0:
+            columns.append(known[:, k])
+            continue
+        step, about = SIGMA_STEP * sigma * one, problem.middle * one
+        ends = [seen(x, about + sign * step) for sign in (1.0, -1.0)]
+        if ends[0] is None or ends[1] is None:
+            return None
+        columns.append((ends[0] - ends[1]) / (2.0 * SIGMA_STEP * sigma))
     return np.array(columns).T
 
 
@@ -263,22 +312,22 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     few = problem.errors[:LINEAR_PARTS]
     began = share = now.share(problem.errors)
     best = now
-    best_share, risk, trust, steps = share, _risk(now.parts(few) / scale, problem.share), FIRST_TRUST, 0
+    best_share, risk, trust, steps = share, tail_risk(now.parts(few) / scale, problem.share), FIRST_TRUST, 0
     for _ in range(most):
         if best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
             break
         parts = now.parts(few) / scale
         slopes = np.broadcast_to(now.by_x / scale[:, None], (len(few), *now.by_x.shape))
-        move = _step(parts, slopes, problem, now.x, trust)
+        move = best_move(parts, slopes, problem.share, problem.bounds, now.x, trust)
         if move is None:
             break
         there = np.clip(now.x + move, *problem.bounds.T)
         # one part tells most of what the way bends: errors and slopes are looked at where that is good only
-        if not _moved_risk(now, there, few, scale, problem, seen) < risk:
+        if not _movedtail_risk(now, there, few, scale, problem, seen) < risk:
             trust *= 0.5
             continue
         next_ = linear(problem, there, seen)
-        new_risk = np.inf if next_ is None else _risk(next_.parts(few) / scale, problem.share)
+        new_risk = np.inf if next_ is None else tail_risk(next_.parts(few) / scale, problem.share)
         if next_ is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.5
             continue
@@ -291,14 +340,14 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     return RobustResult(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
 
 
-def _moved_risk(
+def _movedtail_risk(
     now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: RobustProblem, seen: _Counted
 ) -> float:
     """Return the risk of other values, errors moving the rows as they do now."""
     numbers = seen(there, problem.none)
     if numbers is None:
         return np.inf
-    return _risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)
+    return tail_risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)
 
 
 def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
@@ -313,59 +362,6 @@ def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
     return out
 
 
-def _risk(parts: FloatArray, share: float) -> float:
-    """Return the conditional value at risk of the row that parts (k, m) miss most: below zero, the share is reached."""
-    worst = np.sort(-parts.min(axis=1))[::-1]
-    tail = max(1.0, (1.0 - share) * len(worst))
-    whole = int(tail)
-    rest = tail - whole
-    total = worst[:whole].sum() + (rest * worst[whole] if rest and whole < len(worst) else 0.0)
-    return float(total / tail)
-
-
-def _step(
-    parts: FloatArray, slopes: NDArray[np.float64], problem: RobustProblem, x: FloatArray, trust: float
-) -> FloatArray | None:
-    """Return the move of the values (n,) that lowers the risk most within the trust; None where there is none.
-
-    Parameters
-    ----------
-    parts : (k, m) array
-        Rows of each part.
-    slopes : (k, m, n) array
-        Their derivatives by the values.
-    problem, x : RobustProblem and (n,) array
-        Bounds, and where the values are.
-    trust : float
-        Largest move, as a share of the ranges.
-    """
-    from scipy.optimize import linprog
-    from scipy.sparse import csr_matrix, hstack
-
-    count, size = len(parts), len(x)
-    reach = problem.reach
-    kept = min(ROWS, parts.shape[1])
-    # what a row can still lose within the trust decides whether it may come to matter
-    possible = parts - trust * np.abs(slopes * reach).sum(axis=2)
-    chosen = np.argpartition(possible, kept - 1, axis=1)[:, :kept]
-    part = np.repeat(np.arange(count), kept)
-    row = chosen.ravel()
-    # slack of the part + level + row + slope move >= 0
-    moves = csr_matrix(-slopes[part, row] * reach)
-    level = csr_matrix(-np.ones((len(part), 1)))
-    slack = csr_matrix((-np.ones(len(part)), (np.arange(len(part)), part)), shape=(len(part), count))
-    tail = max(1.0, (1.0 - problem.share) * count)
-    cost = np.concatenate([np.zeros(size), [1.0], np.full(count, 1.0 / tail)])
-    low = np.maximum(-trust, (problem.bounds[:, 0] - x) / reach)
-    high = np.minimum(trust, (problem.bounds[:, 1] - x) / reach)
-    limits = [*zip(low.tolist(), high.tolist(), strict=True), (None, None), *([(0.0, None)] * count)]
-    solve: Any = linprog  # its stubs know no sparse matrices
-    found = solve(
-        cost, A_ub=hstack([moves, level, slack]).tocsr(), b_ub=parts[part, row], bounds=limits, method="highs"
-    )
-    return None if found.x is None else np.asarray(found.x[:size] * reach)
-
-
 @dataclass
 class _Parts:
     """Drawn parts that are solved themselves."""
@@ -373,25 +369,22 @@ class _Parts:
     problem: RobustProblem
     errors: FloatArray
     seen: _Counted
-    slopes: FloatArray | None = field(default=None)
 
     def rows(self, x: FloatArray) -> FloatArray | None:
         """Return the rows of all parts, (k, m); None where a part has no numbers."""
         found = [self.seen(x, error) for error in self.errors]
         return None if any(one is None for one in found) else np.array([self.seen.rows(one) for one in found])  # type: ignore[arg-type]
 
-    def sloped(self, x: FloatArray, rows: FloatArray) -> FloatArray | None:
-        """Return the derivatives of those rows by the values, (k, m, n), by one-sided differences."""
-        bounds, out = self.problem.bounds, np.empty((*rows.shape, len(x)))
-        for k, width in enumerate(self.problem.reach.tolist()):
-            step = STEP * width if x[k] + STEP * width <= bounds[k, 1] else -STEP * width
-            moved = x.copy()
-            moved[k] += step
-            there = self.rows(moved)
-            if there is None:
+    def sloped(self, x: FloatArray) -> FloatArray | None:
+        """Return the derivatives of those rows by the values, (k, m, n)."""
+        out = []
+        for error in self.errors:
+            known = self.problem.slopes(x, error)
+            found = _by_values(self.problem, x, error, self.seen, None if known is None else known.by_x)
+            if found is None:
                 return None
-            out[..., k] = (there - rows) / step
-        return out
+            out.append(self.problem.matrix @ found)
+        return np.array(out)
 
 
 def drawn(problem: RobustProblem, found: RobustResult, count: int, worst: bool = False, most: int = 25) -> RobustResult:
@@ -417,18 +410,22 @@ def drawn(problem: RobustProblem, found: RobustResult, count: int, worst: bool =
     x, rows = found.x, parts.rows(found.x)
     if rows is None:
         return found
-    risk, trust, steps = _risk(rows / scale, asked.share), 0.25 * FIRST_TRUST, 0
+    risk, trust, steps = tail_risk(rows / scale, asked.share), 0.25 * FIRST_TRUST, 0
     slopes = None
     for _ in range(most):
         if trust < LEAST_TRUST or problem.late():
             break
-        slopes = parts.sloped(x, rows) if slopes is None else slopes
-        move = None if slopes is None else _step(rows / scale, slopes / scale[:, None], asked, x, trust)
+        slopes = parts.sloped(x) if slopes is None else slopes
+        move = (
+            None
+            if slopes is None
+            else best_move(rows / scale, slopes / scale[:, None], asked.share, problem.bounds, x, trust)
+        )
         if move is None:
             break
         there = np.clip(x + move, *problem.bounds.T)
         new = parts.rows(there)
-        new_risk = np.inf if new is None else _risk(new / scale, asked.share)
+        new_risk = np.inf if new is None else tail_risk(new / scale, asked.share)
         if new is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.35
             continue

@@ -172,6 +172,23 @@ class Sampled:
 
 
 @dataclass(frozen=True)
+class SampledSlopes:
+    """Effort and stress of one part at p places of its motion, and their exact derivatives by some of its values.
+
+    Attributes
+    ----------
+    sampled : Sampled
+        The effort and the stresses themselves.
+    by : mapping of str to Sampled
+        Dotted path of a value -> derivatives of both by it, per SI unit of the value; paths whose derivatives are not
+        known exactly are left out.
+    """
+
+    sampled: Sampled
+    by: Mapping[str, Sampled]
+
+
+@dataclass(frozen=True)
 class MeasuredLoop:
     """Both branches of a measured loop at the same places.
 
@@ -314,6 +331,9 @@ class Family:
     sampled : str, optional
         ``"module:function"`` with ``sampled(spec, places) -> Sampled``: effort and stress at a few places [m or
         rad], faster than the analysis and equal to it; None where it cannot. Searches over many parts ask for it.
+    sampled_slopes : str, optional
+        ``"module:function"`` with ``sampled_slopes(spec, places, paths) -> SampledSlopes``: the same with exact
+        derivatives by the values at those paths that the family knows; None where it cannot.
     free : str, optional
         ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
         specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
@@ -368,6 +388,7 @@ class Family:
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     sampled: str | None = None
+    sampled_slopes: str | None = None
     free: str | None = None
     errors: str | None = None
     attribution: str | None = None

@@ -207,7 +207,7 @@ class DesignKeys(Model):
     )
     robust: Literal["cvar", "worst"] | None = Field(
         None,
-        description="after margins to first order: 24 drawn parts are solved at each step, and the mean of the worst "
+        description="after margins to first order: 48 drawn parts are solved at each step, and the mean of the worst "
         "share of them counts (cvar), or the worst",
     )
     verify: Literal["solid"] | None = Field(

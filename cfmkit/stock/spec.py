@@ -168,7 +168,7 @@ class MaterialSpec(Model):
     @property
     def modulus(self) -> float:
         """Young's modulus E [Pa]."""
-        return float(self.youngs_modulus or 0.0)
+        return self.youngs_modulus or 0.0
 
     @property
     def poisson(self) -> float:

@@ -19,6 +19,7 @@ from cfmkit.designing.audit import searched
 from cfmkit.designing.robust_design import (
     SIGMA_STEP,
     NoPart,
+    PartSlopes,
     RobustProblem,
     RobustResult,
     costliest,
@@ -32,7 +33,7 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Design, Status
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.requirement_rows import RequirementRows, numbers_of, places_of, rows_of, sampled_of
+from cfmkit.studies.requirement_rows import RequirementRows, numbers_in, numbers_of, places_of, rows_of, sampled_of
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.spec_values import CannotVary, leaf
 
@@ -55,8 +56,8 @@ SEARCH_SEED = 7919
 CHECKED, ROUNDS, MOST_ASKED = 400, 4, 0.9975
 """Parts that are solved to see whether the estimate holds, how often more is then requested, and for how much."""
 
-DRAWN = 24
-"""Parts that `design.robust` solves at each step."""
+DRAWN = 48
+"""Parts that `design.robust` solves at each step: of Lan's shape 96 % are good after it, after 24 of them 93 %."""
 
 DIGITS = 6
 """Decimals of a value that is written, as a share of its range."""
@@ -101,6 +102,26 @@ class Sight:
             return numbers_of(self.variant(x, errors), self.rows, self.run)
         except CfmError:
             return None
+
+    def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
+        """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""
+        quick = family(self.spec.family).sampled_slopes
+        # metrics are extremes of a whole analysis: nobody has their derivatives
+        if quick is None or self.rows.metrics:
+            return None
+        try:
+            part = self.variant(x, errors)
+            found = function_named(quick)(part, self.rows.places, tuple({*self.free, *self.made.paths}))
+        except CfmError:
+            return None
+        if found is None:
+            return None
+        unknown = np.full(len(self.rows.matrix.T), np.nan)
+        by = {path: numbers_in(one) for path, one in found.by.items()}
+        return PartSlopes(
+            np.array([by.get(path, unknown) for path in self.free]).T,
+            np.array([by.get(path, unknown) for path in self.made.paths]).T,
+        )
 
 
 def rows_by_errors(spec: Spec, nominal: Result, parameters: tuple[Parameter, ...]) -> tuple[FloatArray, FloatArray]:
@@ -270,6 +291,7 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
         wanted,
         clock.late,
         tell,
+        sight.slopes,
     )
 
 

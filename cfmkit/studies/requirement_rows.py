@@ -283,12 +283,17 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
     return Sampled(effort, np.array(stress).reshape(-1, len(places)))
 
 
+def numbers_in(seen: Sampled) -> FloatArray:
+    """Return efforts and stresses one after the other, as the columns of rows have them."""
+    return np.concatenate([*seen.effort.values(), *seen.stress])
+
+
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
     """Return what rows look at of a part, (q,); None where it has no such numbers."""
     found = sampled_of(spec, rows.places, run)
     if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
         return None
-    numbers = [*found.effort.values(), *found.stress]
+    numbers = [numbers_in(found)]
     if rows.metrics:
         result = family(spec.family).analyze(spec, run)
         if not result.curves:

@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from cfmkit.designing.robust_design import NoPart, RobustProblem, costliest, drawn, linear, with_margins
+from cfmkit.designing.robust_design import NoPart, PartSlopes, RobustProblem, costliest, drawn, linear, with_margins
 
 PHI = NormalDist().cdf
 
@@ -98,3 +98,39 @@ def test_an_error_to_one_side_is_never_looked_at_on_the_other():
     assert found.linear.by_error[0, 0] == pytest.approx(-2.0)
     assert found.reached
     assert found.x[0] >= 1.8
+
+
+def test_a_step_sees_the_limit_that_is_missed_among_many_steeper_ones_that_are_not():
+    # forty limits keep y between -0.2 and 0.2, where it is; the one that parts miss wants x above 3
+    def seen(x, e):
+        return np.array([x[0] + e[0], x[1]])
+
+    steep = [[0.0, 5.0 * sign] for sign in (1.0, -1.0) for _ in range(20)]
+    one = problem(seen, normal(2000, 1), [[1.0, 0.0], *steep], [-3.0, *[1.0] * 40], [[0.0, 10.0], [-5.0, 5.0]])
+    found = with_margins(one, np.zeros(2))
+    assert found.reached
+    assert found.x[0] > 3.0 + 1.2
+    assert abs(found.x[1]) <= 0.2
+
+
+def test_derivatives_that_are_known_need_no_other_part_and_the_rest_is_found_by_steps():
+    def seen(x, e):
+        return np.array([np.exp(x[0] + 0.1 * e[0]), x[0] * x[1] + e[1]])
+
+    def slopes(x, e):
+        known = np.exp(x[0] + 0.1 * e[0])
+        unknown = [np.nan, np.nan]
+        return PartSlopes(np.array([[known, x[1]], unknown]).T, np.array([[0.1 * known, 0.0], unknown]).T)
+
+    plain = problem(seen, normal(500, 2), np.eye(2), [-1.5, 0.0], [[0.0, 2.0], [1.0, 2.0]])
+    exact = replace(plain, slopes=slopes)
+    counted = []
+    found = linear(exact, np.array([0.5, 1.5]), lambda x, e: counted.append(1) or seen(x, e))
+    assert len(counted) == 1 + 2 + 2  # itself, and the unknown value and error to both sides
+    steps = linear(plain, np.array([0.5, 1.5]), seen)
+    assert found.by_x[0, 0] == np.exp(0.5)
+    assert found.by_x == pytest.approx(steps.by_x, rel=1e-6, abs=1e-9)
+    assert found.by_error == pytest.approx(steps.by_error, rel=1e-3, abs=1e-9)
+    ends = [with_margins(one, np.array([0.5, 1.5])) for one in (exact, plain)]
+    assert ends[0].x == pytest.approx(ends[1].x, abs=0.02)
+    assert ends[0].seen < ends[1].seen

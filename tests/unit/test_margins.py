@@ -10,7 +10,9 @@ import pytest
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.families.base import Run
+from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.studies import margins
+from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.margins import with_design_margins
 from cfmkit.studies.requirement_rows import places_of, rows_of, sampled_of
 
@@ -38,6 +40,55 @@ def test_what_is_seen_quickly_is_what_the_analysis_finds(name):
     assert seen.effort["load"] == pytest.approx(np.interp(places, curve.motion, curve.effort), rel=2e-4)
     stress = np.interp(places, curve.motion, curve.extra["max_stress"].values)
     assert seen.stress.max(axis=0) == pytest.approx(stress, rel=2e-3)
+
+
+LAN = "configs/studies/beam_lan2010_yield.yaml"
+
+
+@pytest.mark.parametrize("changes", [{}, {"mechanism.wide_beams": True, "analysis.fidelity": "reissner"}])
+def test_the_engines_derivatives_are_those_of_neighbouring_parts(changes):
+    spec = cfmkit.load(LAN).replace(changes)
+    places, paths = np.array([0.004, 0.0136]), ["mechanism.nodes.n3.at.0", "mechanism.beams.b3.thickness"]
+    paths += ["mechanism.beams.b2.shape.coefficients.1", "mechanism.material.youngs_modulus", "mechanism.width"]
+    found = sampled_slopes(spec, places, [*paths, "mechanism.safety_factor"])
+    assert set(found.by) == set(paths)  # what no exact derivative is known by is left out
+    seen = sampled(spec, places)
+    assert found.sampled.effort["load"] == pytest.approx(seen.effort["load"], rel=1e-12)
+    assert found.sampled.stress == pytest.approx(seen.stress, rel=1e-9)
+    for path in paths:
+        value = spec.at(path)
+        ends = [sampled(spec.replace({path: value * (1 + sign * 1e-5)}), places) for sign in (1, -1)]
+        force, stress = ((a - b) / (2e-5 * value) for a, b in (
+            [one.effort["load"] for one in ends], [one.stress for one in ends]))  # fmt: skip
+        assert found.by[path].effort["load"] == pytest.approx(force, rel=1e-5, abs=1e-6 * abs(force).max()), path
+        assert found.by[path].stress == pytest.approx(stress, rel=1e-4, abs=1e-6 * seen.stress.max() / abs(value)), path
+
+
+def test_margins_of_beams_look_at_few_parts():
+    # with differences it would be 61 of them at each step
+    spec = cfmkit.load(LAN)
+    nominal, made = cfmkit.analyze(spec), tolerances_of(spec, spec.design, 0)
+    free, places = margins.free_of(spec, spec), places_of(nominal)
+    rows = rows_of(nominal, sampled_of(spec, places, Run()), places)
+    sight = margins.Sight(spec, tuple(free), made, rows, Run())
+    start = np.array([spec.at(path) for path in free])
+    found = sight.slopes(start, np.zeros(len(made.paths)))
+    assert np.isfinite(found.by_x).all()
+    assert np.isfinite(found.by_error).all()
+    assert found.by_x.shape == (80, 13)
+    assert found.by_error.shape == (80, 17)
+
+
+def test_loads_that_grow_with_the_drive_are_seen_quickly_too():
+    spec = cfmkit.load("configs/beam_design_arch.yaml")
+    node = spec.mechanism.drive.node
+    load = {"kind": "point", "node": node, "fx": 0.0, "fy": -0.2, "moment": 1e-3, "follows": False}
+    changes = {"mechanism.loads": (load,), "analysis.loads_first": False, "design": None, "requirements": ()}
+    grown = spec.replace(changes)
+    curve = cfmkit.analyze(grown).curve
+    places = curve.motion[[10, 20, -1]]
+    assert sampled(grown, places).effort["load"] == pytest.approx(curve.effort[[10, 20, -1]], rel=1e-4)
+    assert abs(curve.effort[-1] / cfmkit.analyze(spec).curve.effort[-1] - 1) > 0.01  # the load is felt
 
 
 @pytest.mark.parametrize(

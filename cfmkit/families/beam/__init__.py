@@ -26,6 +26,7 @@ FAMILY = Family(
     errors="cfmkit.families.beam.force_at_few_poses:errors",
     free="cfmkit.families.beam.free_values:free",
     sampled="cfmkit.families.beam.force_at_few_poses:sampled",
+    sampled_slopes="cfmkit.families.beam.force_at_few_poses:sampled_slopes",
     draw="cfmkit.families.beam.figures",
     scheme="cfmkit.families.beam.dimension_drawing",
     outline="cfmkit.families.beam.outline",

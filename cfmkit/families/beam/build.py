@@ -105,18 +105,18 @@ class Assembly:
         spec, drive = self.spec, self.spec.mechanism.drive
         points = self.places if drive.kind in ("displacement", "rotation") else self._even
         if drive.kind == "displacement":
-            return engine.Displacement(self.driven, self.direction, points, self._growing(spec.extent))
+            return engine.Displacement(self.driven, self.direction, points, self.growing(spec.extent))
         if drive.kind == "rotation":
-            return engine.Rotation(self.driven, points, self._growing(spec.extent))
+            return engine.Rotation(self.driven, points, self.growing(spec.extent))
         if drive.kind == "loads":
-            return engine.Loading((*map(_load, drive.loads), *self._growing(spec.extent)), points)
+            return engine.Loading((*map(_load, drive.loads), *self.growing(spec.extent)), points)
         x, y = math.cos(self.direction), math.sin(self.direction)
         own = (
             engine.PointLoad(self.driven, moment=1.0)
             if drive.kind == "moment"
             else engine.PointLoad(self.driven, x, y, follows=drive.follows)
         )
-        return engine.Loading((own, *self._growing(spec.extent / self.parallel)), points / self.parallel)
+        return engine.Loading((own, *self.growing(spec.extent / self.parallel)), points / self.parallel)
 
     @property
     def effort_unit(self) -> float:
@@ -142,7 +142,7 @@ class Assembly:
         turned = self.spec.mechanism.drive.kind in ("rotation", "moment")
         return self.driven, None if turned else self.direction
 
-    def _growing(self, end: float) -> tuple[LoadOn, ...]:
+    def growing(self, end: float) -> tuple[LoadOn, ...]:
         """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""
         if self.spec.analysis.loads_first:
             return ()

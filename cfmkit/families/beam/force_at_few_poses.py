@@ -5,18 +5,34 @@ The network and the path are those of the analysis; what is left out is everythi
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica import PathStatus, trace
+from cfmkit.elastica import PathStatus, gradient, trace
 from cfmkit.elastica.model.drive import Displacement
-from cfmkit.families.base import Sampled
+from cfmkit.errors import CfmError
+from cfmkit.families.base import Sampled, SampledSlopes
 from cfmkit.families.beam.build import assemble
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network, Path
+    from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.spec import BeamSpec
+
+_SMOOTH = re.compile(
+    r"mechanism\.(nodes\.[^.]+\.at\.[01]"
+    r"|(beams\.[^.]+\.)?(thickness|width|material\.(youngs_modulus|poisson_ratio))"
+    r"|beams\.[^.]+\.((start|end)_offset\.[01]|shape\.(coefficients\.\d+|sweep|rise))"
+    r"|springs\.[^.]+\.(stiffness|free_length|free_angle|free_displacement))"
+)
+"""Values of which every number of the network is a smooth function that takes complex ones."""
 
 
 def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
@@ -27,20 +43,98 @@ def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
     spec : BeamSpec
         Driven by a displacement, not solved as a solid.
     places : (p,) array
-        Increasing displacements [m].
+        Displacements, increasing, all to one side of rest [m].
     """
-    if spec.mechanism.drive.kind != "displacement" or spec.fidelity == "solid" or spec.analysis.through_folds:
+    found = _followed(spec, places)
+    if found is None:
         return None
-    assembly = assemble(spec)
-    poses = np.unique(np.append(0.0, places))
-    path = trace(assembly.network, Displacement(assembly.driven, assembly.direction, poses), assembly.control())
-    keep = path.at_requested
-    if path.status is not PathStatus.COMPLETE or len(keep) != len(poses):
-        return None
-    at = keep[np.searchsorted(poses, places)]
+    assembly, path, at = found
     axial = spec.stress == "total"
     stress = [path.beam_stress(name, axial)[0][at] for name in path.layout.network.beams]
     return Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress))
+
+
+def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> SampledSlopes | None:
+    """Return force and stress at places with their exact derivatives by values of the specification.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        Driven by a displacement, not solved as a solid.
+    places : (p,) array
+        Displacements, increasing, all to one side of rest [m].
+    paths : sequence of str
+        Of values; those of nodes, shapes, sections, moduli and springs are known, others are left out.
+
+    Returns
+    -------
+    SampledSlopes or None
+        None where `sampled` is None, and where the tangent is singular at a place.
+    """
+    # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
+    copies = spec.mechanism.copies
+    if spec.mechanism.closure == "chain" or (copies is not None and copies.layers > 1):
+        return None
+    known = [path for path in paths if _SMOOTH.fullmatch(path) and isinstance(spec.at(path), float)]
+    found = _followed(spec, places)
+    if found is None or not known:
+        return None
+    assembly, path, at = found
+
+    def build(x: Any) -> Network:
+        return assemble(_with(spec, dict(zip(known, x, strict=True)))).network
+
+    try:
+        slopes = gradient(path, build, np.array([spec.at(one) for one in known]), at)
+        axial = spec.stress == "total"
+        stress, by_stress = [], []
+        for name in path.layout.network.beams:
+            extremes = path.stress_extremes(name, axial).value[at].reshape(len(at), 4)
+            worst = np.abs(extremes).argmax(axis=1)
+            pick = np.arange(len(at)), worst
+            stress.append(np.abs(extremes[pick]))
+            by = slopes.stress_extremes(name, axial).reshape(len(at), 4, -1)
+            by_stress.append(np.sign(extremes[pick])[:, None] * by[pick])
+        by_effort = assembly.effort_unit * slopes.effort
+    except (CfmError, np.linalg.LinAlgError):
+        return None
+    return SampledSlopes(
+        Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress)),
+        {one: Sampled({"load": by_effort[:, k]}, np.array(by_stress)[:, :, k]) for k, one in enumerate(known)},
+    )
+
+
+def _followed(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
+    """Return a mechanism, its path from rest, and the path's points at places; None where it does not get there."""
+    if spec.mechanism.drive.kind != "displacement" or spec.fidelity == "solid" or spec.analysis.through_folds:
+        return None
+    if places[0] < 0 < places[-1]:
+        return None
+    assembly = assemble(spec)
+    poses = np.array(sorted({0.0, *places.tolist()}, key=abs))
+    drive = Displacement(assembly.driven, assembly.direction, poses, assembly.growing(spec.extent))
+    path = trace(assembly.network, drive, assembly.control())
+    keep = path.at_requested
+    if path.status is not PathStatus.COMPLETE or len(keep) != len(poses):
+        return None
+    return assembly, path, np.asarray(keep[np.searchsorted(np.abs(poses), np.abs(places))])
+
+
+def _with(block: Any, values: Mapping[str, Any]) -> Any:
+    """Return a block, a mapping or a list with other values at dotted paths, which are not checked: complex ones."""
+    below: dict[str, dict[str, Any]] = {}
+    for path, value in values.items():
+        head, _, rest = path.partition(".")
+        below.setdefault(head, {})[rest] = value
+
+    def item(now: Any, inside: dict[str, Any]) -> Any:
+        return inside[""] if "" in inside else _with(now, inside)
+
+    if isinstance(block, tuple):
+        return tuple(item(one, below[str(k)]) if str(k) in below else one for k, one in enumerate(block))
+    if isinstance(block, dict):
+        return {name: item(one, below[name]) if name in below else one for name, one in block.items()}
+    return block.model_copy(update={name: item(getattr(block, name), inside) for name, inside in below.items()})
 
 
 def errors(spec: BeamSpec) -> dict[str, str]:
