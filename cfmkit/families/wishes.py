@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 MaterialBlock = Mapping[str, Any]
 
+RESERVED = 0.8
+"""Share of the strength that is used where made parts have to be good: sources scatter moduli by 10 % and more."""
+
 
 @dataclass(frozen=True)
 class Wish:
@@ -46,6 +49,10 @@ class Wish:
         Presses that it has to survive; judged where the material has fatigue data, whose allowable stress counts.
     thinnest : float
         Thinnest leaf that the process makes [m].
+    good_parts : float, optional
+        Least share of made parts that meet all of it.
+    process : str, optional
+        By which tolerances they are made; None: those of the process that is usual for the material.
     """
 
     kind: Literal["force", "torque"]
@@ -61,11 +68,18 @@ class Wish:
     hysteresis: float | None = None
     cycles: int | None = None
     thinnest: float = 2e-5
+    good_parts: float | None = None
+    process: str | None = None
 
     @property
     def depth(self) -> float | None:
         """What there is out of the plane [m]; None where it does not matter."""
         return self.room[2] if len(self.room) > 2 else None
+
+    @property
+    def strength_used(self) -> float:
+        """The share of the allowable stress that designs may use: made parts are thicker and stiffer than drawn."""
+        return 1.0 if self.good_parts is None else RESERVED
 
 
 @dataclass(frozen=True)

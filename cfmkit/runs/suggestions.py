@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
-from time import time
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
 from cfmkit.specs.units import to_border
+from cfmkit.studies.pool import until
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
+    from cfmkit.designing.starts import Clock
     from cfmkit.families.base import Run
     from cfmkit.studies.suggest.proposal import Proposal
     from cfmkit.studies.suggest.search import Suggestions
@@ -30,9 +32,26 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "depth": ("length", "mm"),
     "parts": ("count", ""),
     "life": ("ratio", "1"),
+    "yield": ("ratio", "1"),
     "finer_deviation": ("ratio", "1"),
 }
 """What is told of each proposal: its dimension and the unit of the files."""
+
+
+@dataclass(frozen=True)
+class Deadlines:
+    """What a run leaves out when it is late.
+
+    Attributes
+    ----------
+    figures : Clock
+        Of the search and of proposals whose turn comes after it.
+    files : Clock
+        Of proposals, all but ``design.yaml``.
+    """
+
+    figures: Clock
+    files: Clock
 
 
 def told(proposal: Proposal) -> dict[str, Any]:
@@ -112,11 +131,6 @@ def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
 def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
     if found.late and found.proposals:
         yield {"name": "search_cut_short", "message": "the time budget ended the search: --time-budget gives it more"}
-    if block.made_well is not None:
-        yield {
-            "name": "yield_not_judged",
-            "message": "the share of good parts was not judged: `cfmkit sensitivity` tells it of a design.yaml",
-        }
     judged = all(one.numbers.get("life") is not None for one in found.proposals)
     if block.cycles is not None and not judged:
         yield {
@@ -132,7 +146,7 @@ def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dic
 
 
 def files(
-    found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline: float, command: str | None = None
+    found: Suggestions, block: WishBlock, run: Run, plots: bool, deadlines: Deadlines, command: str | None = None
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of the run as (name below the folder, content).
 
@@ -144,14 +158,15 @@ def files(
         Its executor draws the proposals.
     plots : bool
         Whether to draw.
-    deadline : float
-        When the time is up [s since the epoch]: proposals whose turn comes later have their files, but no figures.
+    deadlines : Deadlines
+        What is left out when its time is up.
     command : str, optional
         How the search was started, for ``report.html``; None: no page is written, nor one of each proposal.
     """
     yield "metrics.json", json_bytes(as_json(found, block))
     yield "suggestions.csv", table(found)
-    drawn = _pictures(found) if found.proposals and (plots or command is not None) else {}
+    in_time = not deadlines.figures.late()
+    drawn = _pictures(found) if found.proposals and in_time and (plots or command is not None) else {}
     if plots:
         from cfmkit.plots.style import png
 
@@ -163,16 +178,12 @@ def files(
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.proposals, 1)}
         unit = "N" if found.wish.kind == "force" else "N*mm"
         yield suggestions_page.NAME, suggestions_page.page(as_json(found, block), texts, drawn, unit, command)
-    jobs = list(enumerate(found.proposals, 1))
-    made = {
-        number: files
-        for (number, _), files in run.executor(
-            partial(_made, (plots, command is not None), deadline), iter(jobs), lambda: False
-        )
-    }
-    for number, one in jobs:
-        for name, data in made[number]:
-            yield f"{folder_name(number, one)}/{name}", data
+    work = partial(_made, (plots, command is not None), deadlines, found.proposals)
+    made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.proposals))), lambda: False))
+    for index, one in enumerate(found.proposals):
+        files = made.get(index)
+        for name, data in files if isinstance(files, list) else [("design.yaml", one.text.encode())]:
+            yield f"{folder_name(index + 1, one)}/{name}", data
 
 
 def _pictures(found: Suggestions) -> dict[str, Figure]:
@@ -185,19 +196,23 @@ def _pictures(found: Suggestions) -> dict[str, Figure]:
     }
 
 
-def _made(wanted: tuple[bool, bool], deadline: float, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
-    """Return the files of one proposal: its specification first, which `analyze` takes."""
+def _made(
+    wanted: tuple[bool, bool], deadlines: Deadlines, proposals: Sequence[Proposal], index: int
+) -> list[tuple[str, bytes]]:
+    """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
     from cfmkit.results import Design, Status
     from cfmkit.runs.files import files
     from cfmkit.runs.run_findings import report_on
 
-    _, proposal = job
+    proposal = proposals[index]
+    if deadlines.files.late():
+        return [("design.yaml", proposal.text.encode())]
     spec = proposal.spec
     # springs at pins have links that no drawing shows: nothing of them is cut
     design = None if "at pins" in proposal.variant else Design(spec, Status.COMPLETE)
     plots, page = wanted
-    found = dict(files(report_on(api.analyze(spec), design), plots and time() < deadline, page))
+    found = dict(files(report_on(api.analyze(spec), design), plots and not deadlines.figures.late(), page))
     return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 

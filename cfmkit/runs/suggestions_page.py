@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TONES = {"complete": "good", "partial": "warn"}
 """Which colour the verdict has, by how the search ended; another end is bad."""
 
-SHARES = ("ripple", "hysteresis")
+SHARES = ("ripple", "hysteresis", "yield")
 """Numbers of a proposal that are shares."""
 
 
@@ -40,15 +40,16 @@ def page(
     """
     from cfmkit.plots.vector_formats import inline, svg
 
+    columns = (*_COLUMNS, *(("yield",) if "yield" in told["wish"] else ()))
     rows = [
-        (one, [_cell(one, name, unit) for name in _COLUMNS], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
+        (one, [_cell(one, name, unit) for name in columns], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
         for one in told["proposals"]
     ]
     text: str = template("suggestions.html.j2").render(
         told=told,
         tone=TONES.get(told["status"], "bad"),
         wish=_listed(told["wish"]),
-        heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in _COLUMNS[1:])],
+        heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],
         rows=rows,
         silent=[(one, _listed(one["nearest"])) for one in told["families"] if not one["proposals"]],
         pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},

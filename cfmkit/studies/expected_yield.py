@@ -48,8 +48,8 @@ def expected(result: Result, run: Run) -> str:
     name = found.process.name
     again = f"the same command with --set design.process={name}"
     try:
-        shares = _shares(result, found, run)
-    except _NotKnown as why:
+        shares = first_order_shares(result, found, run)
+    except YieldUnknown as why:
         return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
@@ -57,7 +57,7 @@ def expected(result: Result, run: Run) -> str:
     return f"{_told(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
 
 
-class _NotKnown(Exception):
+class YieldUnknown(Exception):
     """Why nothing is said of a yield."""
 
 
@@ -81,12 +81,21 @@ def _percent(share: float) -> str:
     return f"about {100.0 * share:.2g} %" if share * PARTS >= 1.0 else "hardly any"
 
 
-def _shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
+def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
     """Return the share of good parts, and that of those whose modulus is as it should be.
+
+    Parameters
+    ----------
+    result : Result
+        The analysis of the design, with the requirements that its parts have to meet.
+    found : Assumed
+        The tolerances of its process.
+    run : Run
+        Seed of the parts.
 
     Raises
     ------
-    _NotKnown
+    YieldUnknown
         If it would take long, or a part near the design has no curve.
     """
     spec = result.spec
@@ -96,10 +105,10 @@ def _shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
     rows = None if first is None else rows_of(result, first, places)
     middle = None if rows is None else _numbers(spec, rows, run)
     if rows is None or middle is None:
-        raise _NotKnown("the design cannot be followed at a few poses")
+        raise YieldUnknown("the design cannot be followed at a few poses")
     quick = family(spec.family).sampled is not None and not rows.metrics
     if 2 * len(paths) > (MOST_LOOKS if quick else MOST_ANALYSES):
-        raise _NotKnown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
+        raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
     generator = np.random.default_rng([run.seed, 17])
     moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
     for path in paths:
@@ -124,7 +133,7 @@ def _numbers(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray:
     try:
         found = numbers_of(spec, rows, run)
     except CfmError as error:
-        raise _NotKnown(str(error)) from None
+        raise YieldUnknown(str(error)) from None
     if found is None or not np.isfinite(found).all():
-        raise _NotKnown("a part near the design has no curve, or it ends within a window of the requirements")
+        raise YieldUnknown("a part near the design has no curve, or it ends within a window of the requirements")
     return found

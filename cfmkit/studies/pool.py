@@ -4,7 +4,7 @@ Each worker has pipes of its own, and no lock is shared: killing one at any mome
 leaves the others untouched. A worker says when it starts a job, so that its death
 is held against that job alone; jobs that were only waiting in its pipe go to others.
 A job is tried a second time on a new worker and given up after two deaths. A job that
-exceeds the time allowed is given up at once, with its worker.
+exceeds the time allowed, or runs when the time of all is up, is given up at once, with its worker.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import threading
 import time
 from collections import Counter, deque
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
@@ -32,13 +32,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import BinaryIO
 
-    from cfmkit.studies.executors import Stopping, Work
+    from cfmkit.studies.executors import Executor, Stopping, Work
 
 DEATHS = 2
 """A job is given up after so many of its workers have died."""
 
 PATIENCE = 0.1
 """Seconds between two looks at the clock and at whether to stop."""
+
+OVER = "the time of all jobs was up"
 
 QUICK, AHEAD = 0.02, 4
 """Jobs that take less than so many seconds are handed out so many at a time: the pipe is never empty."""
@@ -84,10 +86,13 @@ class Pool:
         How many.
     timeout : float or None
         Seconds that one job may take.
+    deadline : float or None
+        When the time of all jobs is up, in `time.time` [s].
     """
 
     processes: int
     timeout: float | None = None
+    deadline: float | None = None
 
     def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
         """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.
@@ -200,16 +205,28 @@ class _Crew:
 
     def _late(self) -> Iterator[tuple[Any, Any]]:
         """Yield the jobs that have used up their time, and end their workers."""
-        if self.pool.timeout is None:
+        over = self.pool.deadline is not None and time.time() > self.pool.deadline
+        if over:
+            self.empty = True
+            self.again.clear()
+        elif self.pool.timeout is None:
             return
-        now = time.monotonic()
-        for one in [one for one in self.workers if one.started is not None]:
-            if now - (one.started or now) > self.pool.timeout and not one.outcomes.poll():
+        now, allowed = time.monotonic(), self.pool.timeout
+        # a worker that has not begun yet is still loading: with all time up nobody waits for it
+        for one in [one for one in self.workers if one.given and (over or one.started is not None)]:
+            late = over or (allowed is not None and now - (one.started or now) > allowed)
+            if late and not one.outcomes.poll():
                 self.workers.remove(one)
                 one.end()
                 job = one.given.popleft()
-                self.again.extend(one.given)
-                yield job, Lost(Status.TIMEOUT, f"not finished within {self.pool.timeout:g} s")
+                if not over:
+                    self.again.extend(one.given)
+                yield job, Lost(Status.TIMEOUT, OVER if over else f"not finished within {allowed:g} s")
+
+
+def until(executor: Executor, deadline: float | None) -> Executor:
+    """Return an executor that gives up what runs at a deadline, in `time.time` [s]; as it is if it has one process."""
+    return replace(executor, deadline=deadline) if isinstance(executor, Pool) else executor
 
 
 def _cause(code: int) -> str:

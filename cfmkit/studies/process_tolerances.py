@@ -50,8 +50,8 @@ class Assumed:
         return {path: getattr(self.process, kind) for path, kind in self.kinds.items()}
 
 
-def assumed(spec: Spec) -> Assumed | None:
-    """Return what is assumed of a part, by `design.process` or the usual process of its material; None of no part."""
+def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
+    """Return what is assumed of a part, by a process, `design.process` or the usual one; None of no part."""
     errors = family(spec.family).errors
     if errors is None:
         return None
@@ -59,19 +59,19 @@ def assumed(spec: Spec) -> Assumed | None:
     if not kinds:
         return None
     material = getattr(getattr(spec, "mechanism", None), "material", None)
-    named = getattr(getattr(spec, "design", None), "process", None)
-    process = PROCESSES[named or OF_PLATES]
+    named = process or getattr(getattr(spec, "design", None), "process", None)
+    accuracy = PROCESSES[named or OF_PLATES]
     if material is not None and not named:
-        process = usual(material.name, material.modulus)
+        accuracy = usual(material.name, material.modulus)
     band = None
     if material is not None and (known := MATERIALS.get(material.name)) and material.modulus == known.youngs_modulus:
         band = known.scatter.youngs_modulus
-    return Assumed(process, kinds, band)
+    return Assumed(accuracy, kinds, band)
 
 
-def tolerances(spec: Spec) -> dict[str, Any]:
+def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:
     """Return the same in the words of `design.tolerances`; nothing of no part."""
-    found = assumed(spec)
+    found = assumed(spec, process)
     if found is None:
         return {}
     stated: dict[str, Any] = {

@@ -8,7 +8,7 @@ from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.processes import PROCESSES
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.expected_yield import _shares, expected
+from cfmkit.studies.expected_yield import expected, first_order_shares
 from cfmkit.studies.made_parts import judge
 from cfmkit.studies.process_tolerances import assumed
 
@@ -27,7 +27,7 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
-    share, measured = _shares(result, assumed(spec), Run())
+    share, measured = first_order_shares(result, assumed(spec), Run())
     made = tolerances_of(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
     judged = judge(made, made.drawn(), result, Run()).share()

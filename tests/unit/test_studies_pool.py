@@ -43,6 +43,16 @@ def test_no_jobs_start_no_process(doer, monkeypatch):
     assert list(Pool(2)(doer, iter(()))) == []
 
 
+def test_what_runs_when_the_time_of_all_is_up_is_given_up(doer):
+    begun = time.monotonic()
+    done = list(Pool(2, deadline=time.time() + 0.6)(doer, iter([(1, "square"), (2, "hang"), (3, "hang"), (4, "hang")])))
+    assert time.monotonic() - begun < 5.0
+    assert {job[0]: outcome for job, outcome in done if job[0] == 1} in ({1: 1}, {})
+    lost = [outcome for job, outcome in done if job[1] == "hang"]
+    assert 1 <= len(lost) <= 2
+    assert all(one.status is Status.TIMEOUT for one in lost)
+
+
 def test_jobs_are_pulled_as_they_are_needed(doer):
     pulled = []
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,7 +19,8 @@ from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
-from cfmkit.studies.suggest.proposal import ProposalJob, made
+from cfmkit.studies.suggest import good_parts, search
+from cfmkit.studies.suggest.proposal import OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
@@ -94,6 +96,68 @@ def test_what_misses_a_wish_says_which():
     one = made(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
     assert any("across the travel" in told for told in one.missed)
+
+
+PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
+"""Of which the first proposals have yields between nothing and two thirds."""
+
+
+@pytest.fixture
+def few_parts(monkeypatch):
+    monkeypatch.setattr(good_parts, "PARTS", 20)
+
+
+def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):
+    asked = wish(**PRINTED_CAM, **{"yield": "30 %"})
+    offer = function_named(family("cam").propose)(asked, Run())
+    one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
+    assert one.good, one.missed
+    assert 0.3 <= one.numbers["yield"] < 0.95
+    spec = cfmkit.loads(one.text)
+    assert spec.sensitivity.min_yield == pytest.approx(0.3)
+    found = cfmkit.sensitivity(spec, method="tolerance", samples=20, seed=3, parameters=spec.sensitivity.parameters)
+    assert found.summary["yield"]["value"] == one.numbers["yield"]
+
+
+def test_a_wish_for_more_good_parts_than_there_are_is_missed(few_parts):
+    asked = wish(**PRINTED_CAM, **{"yield": "95 %"})
+    offer = function_named(family("cam").propose)(asked, Run())
+    one = made(ProposalJob("cam", offer.candidates[0], asked, 3))
+    assert one.near
+    assert one.missed[0].startswith("yield")
+    assert one.missed[0].endswith("wanted at least 95 %")
+    assert one.numbers["yield"] < 0.95
+
+
+def test_a_part_of_which_nobody_knows_the_errors_misses_a_wish_for_good_parts():
+    asked = wish_of(str(WISHES / "crank-lumped.yaml"), {"yield": "50 %"}).wish()
+    offer = function_named(family("slider-crank").propose)(asked, Run())
+    flexures = next(one for one in offer.candidates if one.variant == "flexures")
+    assert "its yield is not known" in " ".join(made(ProposalJob("slider-crank", flexures, asked, 0)).missed)
+
+
+def test_a_search_without_time_has_asked_and_ends_with_6():
+    found = suggest(wish(), Run(time_budget=0.0))
+    assert found.late
+    assert found.proposals == ()
+    assert exit_code(found) == 6
+
+
+def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
+    clock = iter([0.0] + [1.0] * 6 + [100.0] * 10_000)
+    monkeypatch.setattr(search, "time", SimpleNamespace(time=lambda: next(clock)))
+    monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, text="cam"))
+    found = suggest(wish(), Run(time_budget=50.0))
+    assert found.proposals
+    assert found.late
+    assert exit_code(found) == 0
+
+
+def test_a_candidate_whose_time_is_up_is_not_made():
+    asked = wish()
+    offer = function_named(family("cam").propose)(asked, Run())
+    one = made(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
+    assert (one.text, one.message) == ("", OUT_OF_TIME)
 
 
 def test_a_family_out_of_reach_says_what_it_would_need():

@@ -26,8 +26,12 @@ EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
 
 BUDGET = "60s"
 
-SPARE = 4.0
-"""Before the end of the time budget no more figures are begun [s]: those of one proposal take about two."""
+SPARE, WRITING = 4.0, 1.0
+"""Before the end of the time budget no more figures are begun [s], those of one proposal take about two; and nothing
+but what was found is written."""
+
+VERIFYING, WRITTEN = 0.5, 0.1
+"""Shares of the time budget that are kept for the better models, with ``--verify``, and for files."""
 
 
 def _key(name: str, metavar: str, text: str) -> Any:
@@ -56,9 +60,7 @@ class SuggestOptions(Common):
     cycles: Annotated[
         str | None, _key("cycles", "N", "Presses that it has to survive; judged of a material with fatigue data.")
     ] = None
-    made_well: Annotated[
-        str | None, _key("yield", "SHARE", "Share of made parts that is to be good; not judged yet.")
-    ] = None
+    made_well: Annotated[str | None, _key("yield", "SHARE", "Share of made parts that meet the wish.")] = None
     prefer: Annotated[str | None, _key("prefer", "A,B", "What decides the order: size,ripple,parts,stress,depth.")] = (
         None
     )
@@ -93,12 +95,14 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     shown only if it does everything that is wished.
     """
     from cfmkit.cli.study_verbs import noting
+    from cfmkit.designing.starts import Clock
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestions
     from cfmkit.runs.run import long_run
     from cfmkit.runs.wish_file import wish_of
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import cores
+    from cfmkit.studies.pool import Pool
     from cfmkit.studies.suggest.search import RESERVE, suggest, with_better_models
 
     start, begun = time.perf_counter(), time.time()
@@ -112,12 +116,18 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     with RunFolder(out) as folder, terminal.progress() as progress:
         folder.check("metrics.json", "suggestions.csv")
         plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
-        with long_run(options.jobs or cores(), options.fresh, folder, plain, noting) as working:
-            found = suggest(block.wish(), working, block.prefer, SPARE if options.no_plots else RESERVE)
-            found = with_better_models(found, replace(working, time_budget=None), options.verify)
-            drawing = replace(working, time_budget=None)
+        jobs = options.jobs or cores()
+        with long_run(jobs, options.fresh, folder, plain, noting) as working:
+            if jobs == 1:  # a process of its own, which can be ended when the time is up
+                working = replace(working, executor=Pool(1))
+            reserve = max(SPARE, WRITTEN * budget) if options.no_plots else RESERVE
+            kept = reserve + VERIFYING * budget if options.verify else reserve
+            found = suggest(block.wish(), working, block.prefer, kept)
+            left = max(ends - reserve - time.time(), 0.0)
+            found = with_better_models(found, replace(working, time_budget=left), options.verify)
+            deadlines = suggestions.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
-            for name, content in suggestions.files(found, block, drawing, not options.no_plots, ends - SPARE, command):
+            for name, content in suggestions.files(found, block, working, not options.no_plots, deadlines, command):
                 folder.write(name, content)
         code = suggestions.exit_code(found)
         manifest = folder.commit(
@@ -197,6 +207,7 @@ def _folder(options: SuggestOptions) -> str:
 
 
 HEADS = ("", "", "mean", "ripple", "room", "hysteresis", "safety", "parts")
+"""Of the table; "yield" follows where one is wished."""
 
 
 def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterator[Block]:
@@ -205,7 +216,8 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     if data["proposals"]:
         yield BLANK
         rows = [_row(str(number), one, data) for number, one in enumerate(data["proposals"], 1)]
-        yield CellGrid(tuple(GridColumn(head, False) for head in HEADS), rows, gap=2, indented=True)
+        heads = (*HEADS, "yield") if "yield" in data["wish"] else HEADS
+        yield CellGrid(tuple(GridColumn(head, False) for head in heads), rows, gap=2, indented=True)
     if data["near_misses"]:
         yield BLANK
         yield line("misses one wish", LABEL)
@@ -244,7 +256,12 @@ def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[s
         _percent(one["hysteresis"]),
         "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
         str(one["parts"]),
+        *([_share(one["yield"])] if "yield" in data["wish"] else []),
     ]
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.3g} %"
 
 
 def _percent(value: float | None) -> str:

@@ -166,7 +166,7 @@ def _sized(
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
         return 1e9, "no strength of the material is known", {}
-    thicker = min(STRESS * strength * size / (stress * stiffer), STOUT * size)
+    thicker = min(STRESS * wish.strength_used * strength * size / (stress * stiffer), STOUT * size)
     wide = _width(wish, kept, size, stiffer, thicker, force)
     if wide < FLAT * thicker * thin:
         # thinner, so that the same force wants as much width as the beam is thick
@@ -214,7 +214,7 @@ def finish(spec: BeamSpec, wish: Wish) -> BeamSpec:
     The force is linear in the width. Where the stress of that model is above the allowable one, the beams get
     thinner and wider: it falls nearly as the thickness.
     """
-    made, allowed = spec, spec.mechanism.material.allowable(1.0) or np.inf
+    made, allowed = spec, wish.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
     for _ in range(2):
         longer = 1.12 * float(made.analysis.travel or 0.0)
         result = analyze(made.replace({"analysis.travel": longer, "analysis.window": None}), Run())

@@ -49,6 +49,10 @@ ROLLER_MIN = 0.0015
 COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
 """Numbers of springs that are tried."""
 
+SPARE_SHARE, SPARE_LENGTH = 0.03, 0.3e-3
+"""Of the travel, and [m]: beyond the window where made parts have to be good; holes that lie 0.05 mm off move the end
+of the travel by a few times as much."""
+
 RESERVE, FLAT_RESERVE = 0.97, 0.9
 """Shares of room and ripple that closed forms may fill: they leave out the plate's margins, and friction squared."""
 
@@ -86,7 +90,7 @@ def _sized(wish: Wish, draw: FloatArray) -> dict[str, Any]:
     constant = brace * 10.0 ** (-2.0 + 2.0 * draw[2])
     roller = np.minimum(start, brace) * (0.04 + 0.9 * draw[3])
     run_in = wish.travel * 10.0 ** (-2.3 + 2.0 * draw[4])
-    stroke = run_in + wish.travel
+    stroke = run_in + wish.travel + spare_stroke(wish)
     with np.errstate(invalid="ignore", divide="ignore"):
         end = start + np.sqrt(2.0 * constant * stroke)
         rise = np.sqrt(brace**2 - start**2)
@@ -112,6 +116,11 @@ def _sized(wish: Wish, draw: FloatArray) -> dict[str, Any]:
         "flat": there & (ripple < FLAT_RESERVE * wish.ripple) & (loss.max(axis=0) < 0.2),
         "lossless": there & (hysteresis < RESERVE * (wish.hysteresis or np.inf)),
     }  # fmt: skip
+
+
+def spare_stroke(wish: Wish) -> float:
+    """Return how much longer than the travel a contour is cut [m]: half of made parts end before their own stroke."""
+    return 0.0 if wish.good_parts is None else SPARE_SHARE * wish.travel + SPARE_LENGTH
 
 
 def _spread(found: dict[str, Any], fitting: Any) -> list[int]:
@@ -155,13 +164,14 @@ def _written(
     along = wish.room[1]
     begin = float(f"{size['run_in']:.6g}")
     stroke = begin + wish.travel
+    longer = stroke + spare_stroke(wish)
     mechanism = {
         "brace_length": size["brace"],
         "rest_half_width": size["start"],
         "roller_radius": size["roller"],
         "springs": {"stiffness": total / count, "count": count},
         "rolling_friction": FRICTION,
-        "profile": {"force_constant": size["constant"], "stroke": stroke},
+        "profile": {"force_constant": size["constant"], "stroke": longer},
         "plate": {
             "base_height": TAB * along,
             "top_margin": min(TOP * along, 0.5 * size["roller"]),
@@ -173,7 +183,7 @@ def _written(
         "family": "cam",
         "name": "suggested",
         "mechanism": mechanism,
-        "design": {"force": wish.target, "stroke": stroke},
+        "design": {"force": wish.target, "stroke": longer},
         "analysis": {"window": (Place(begin, "length"), Place(stroke, "length"))},
     }
     spec = CamSpec.model_validate(data)

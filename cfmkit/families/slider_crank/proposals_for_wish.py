@@ -267,7 +267,7 @@ def _strip(
         "family": "slider-crank",
         "name": "suggested",
         "mechanism": {
-            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01,
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / wish.strength_used,
             "beam": {"width": wide[1], "thickness": 0.02 * crank},
         },
         "design": {
@@ -307,7 +307,8 @@ def _flexures(
         "family": "slider-crank",
         "name": "suggested",
         "mechanism": {
-            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01, "springs": springs,
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01 / wish.strength_used,
+            "springs": springs,
             "flexures": {"pivot": one, "crank_pin": one, "slider_pin": one},
         },
         "design": {"force": wish.target, "travel": (0.0, travel[1]), "flexures": {}},

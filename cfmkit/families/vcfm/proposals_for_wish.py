@@ -100,7 +100,9 @@ def _designs(wish: Wish, material: dict[str, Any]) -> Any:
             rise = 0.75 * stroke / sqrt(1.0 - (pi / slender) ** 2)
             for pairs in PAIRS:
                 for thicker in THICKER:
-                    data = _data(material, base, adjustment, stroke, rise, slender, pairs, thicker)
+                    data = _data(
+                        (material, SAFETY / wish.strength_used), base, adjustment, stroke, rise, slender, pairs, thicker
+                    )
                     yield from _lengths(VcfmSpec.model_validate(data), wish)
 
 
@@ -128,8 +130,8 @@ def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
 
 
 def _data(
-    material: dict[str, Any], force: float, adjustment: float, stroke: float, rise: float, slender: float, pairs: int,
-    thicker: float,
+    made_of: tuple[dict[str, Any], float], force: float, adjustment: float, stroke: float, rise: float, slender: float,
+    pairs: int, thicker: float,
 ) -> dict[str, Any]:  # fmt: skip
     thin = rise / slender
     block = max(3.0 * thin * max(thicker, 1.0), 0.4 * rise, 1e-3)
@@ -137,8 +139,8 @@ def _data(
         "family": "vcfm",
         "name": "suggested",
         "mechanism": {
-            "material": material,
-            "safety_factor": SAFETY,
+            "material": made_of[0],
+            "safety_factor": made_of[1],
             "positive": {
                 "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
                 "thickness": thin * thicker, "width": 5.0 * thin,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import time
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.starts import NEVER, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
@@ -14,6 +16,7 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.studies.suggest.good_parts import GoodParts, good_parts, with_made_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -23,19 +26,24 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
+LONGEST = 15.0
+"""Seconds that one design may search."""
+
+OUT_OF_TIME = "the time budget ended before it was made and judged"
+
 SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
 
 
 @dataclass(frozen=True)
 class ProposalJob:
-    """A candidate of a family that is to be made and judged against a wish, in some seconds."""
+    """A candidate of a family that is to be made and judged against a wish before a deadline, in `time.time` [s]."""
 
     family: str
     candidate: Candidate
     wish: Wish
     seed: int
-    seconds: float | None
+    deadline: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,7 +62,7 @@ class Proposal:
         Why nothing came of it.
     numbers : mapping of str to float or None
         In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
-        ``life`` (cycles),
+        ``life`` (cycles), ``yield`` (share of made parts that are good, where one is wished),
         ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
@@ -104,12 +112,12 @@ def spec_of(name: str, text: str) -> Spec:
 
 def made(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; whatever its design or model refuses is its message."""
-    candidate = job.candidate
+    candidate, clock = job.candidate, Clock(job.deadline)
     try:
-        spec, told = _designed(job)
+        spec, told = _designed(job, clock)
         if spec is None:
             return Proposal(job.family, candidate.variant, message=told)
-        return judged(job.family, candidate.variant, spec, job.wish)
+        return judged(job.family, candidate.variant, spec, job.wish, job.seed, clock)
     except (
         CfmError,
         ValueError,
@@ -119,21 +127,34 @@ def made(job: ProposalJob) -> Proposal:
         return Proposal(job.family, candidate.variant, message=" ".join(str(problem).split())[:300])
 
 
-def _designed(job: ProposalJob) -> tuple[Spec | None, str]:
+def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     """Return the candidate's specification, designed and finished; else None with the reason."""
     record, spec = family(job.family), job.candidate.spec
+    if clock.late():
+        return None, OUT_OF_TIME
     if job.candidate.design and record.design is not None:
-        design = record.design(spec, Run(job.seed, time_budget=job.seconds))
+        design = record.design(spec, Run(job.seed, time_budget=_seconds(clock)))
         if design.spec is None or design.status is not Status.COMPLETE:
-            return None, design.message
+            return None, OUT_OF_TIME if clock.late() else design.message
         spec = design.spec
+    if clock.late():
+        return None, OUT_OF_TIME
     if job.candidate.finish:
         spec = function_named(job.candidate.finish)(spec, job.wish)
     return spec, ""
 
 
-def judged(name: str, variant: str, spec: Spec, wish: Wish) -> Proposal:
-    """Return a specification as a proposal: it is written with the wish as its requirements, read, analysed, judged."""
+def _seconds(clock: Clock) -> float:
+    """Return how long one design may search [s]."""
+    return LONGEST if clock.deadline is None else min(LONGEST, max(clock.deadline - time.time(), 0.1))
+
+
+def judged(name: str, variant: str, spec: Spec, wish: Wish, seed: int = 0, clock: Clock = NEVER) -> Proposal:
+    """Return a specification as a proposal: it is written with the wish as its requirements, read, analysed, judged.
+
+    Where a share of good parts is wished, the file says in its block `sensitivity` how they are made, and parts are
+    drawn of what misses nothing else.
+    """
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
     # read back from its text: what is judged is what stands in the file, whose requirements change no analysis
@@ -141,16 +162,23 @@ def judged(name: str, variant: str, spec: Spec, wish: Wish) -> Proposal:
     result = record.analyze(plain, Run())
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
-    text = dump(plain.replace({"requirements": tuple(demanded(wish, result, values_of_family(record.values)))}))
+    wished = plain.replace({"requirements": tuple(demanded(wish, result, values_of_family(record.values)))})
+    text = dump(with_made_parts(wished, wish, seed))
     space: Room | None = function_named(record.room)(result) if record.room else None
-    outcomes = check(spec_of(name, text).requirements, result, values_of_family(record.values))
+    written = spec_of(name, text)
+    outcomes = check(written.requirements, result, values_of_family(record.values))
     missed = [one.sentence for one in outcomes if not one.ok]
     missed += _outside(wish, space)
     missed += _too_short(wish, result)
     missed += _badly_adjusted(wish, result)
-    return Proposal(
-        name, variant, text, tuple(missed), "", numbers_of(result, space, wish), tuple(_notes(space, result))
-    )
+    numbers = numbers_of(result, space, wish)
+    if wish.good_parts is not None and len(missed) <= 1:
+        parts: GoodParts = good_parts(replace(result, spec=written), wish, clock, draw=not missed)
+        if parts.late:
+            return Proposal(name, variant, message=OUT_OF_TIME)
+        missed += [parts.missed] if parts.missed else []
+        numbers["yield"] = parts.share
+    return Proposal(name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)))
 
 
 def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]]:
@@ -165,7 +193,7 @@ def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]
         yield {"metric": f"{wish.kind}_mean", "min": low, "max": high}
     found = evaluate(result, None, None, values)
     if (factor := found.get("safety_factor")) is not None and factor.value is not None:
-        yield {"metric": "safety_factor", "min": "1", "over": ("0 %", "100 %")}
+        yield {"metric": "safety_factor", "min": "1", "over": _pressed(wish, result)}
     if wish.hysteresis is not None and "unload" in result.curve.branches:
         lost = wish.hysteresis * wish.target * wish.travel
         yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
@@ -175,6 +203,17 @@ def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]
     if wish.adjustable is not None and "force_change_max" in found:
         most = max(abs(end - wish.target) for end in wish.adjustable)
         yield {"metric": "force_change_max", "min": format_short(0.99 * most, "force", 12)}
+
+
+def _pressed(wish: Wish, result: Result) -> tuple[str, str]:
+    """Return over what a mechanism has to bear its stress: all it does; of made parts from half of the run-in on.
+
+    A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
+    """
+    window: Any = result.spec.at("analysis.window")
+    if wish.good_parts is None or window is None or wish.kind == "torque":
+        return "0 %", "100 %"
+    return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
 
 
 def _outside(wish: Wish, space: Room | None) -> Iterator[str]:
@@ -252,6 +291,7 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
         "life": None if (life := found.get("fatigue_life")) is None else life.value,
+        "yield": None,
         "finer_deviation": None,
     }
 

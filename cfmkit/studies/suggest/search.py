@@ -3,37 +3,70 @@
 A round takes the next candidates of every family that has not enough proposals yet; what the next round takes depends
 on what came of the ones before, never on what finished first. So the same seed gives the same proposals however many
 processes work, unless the time budget ends the search.
+
+The time is looked at before each design and between its steps; what still runs in a process of a pool when the time is
+up is given up with it, be it the compilation of the beam engine. What was found so far is kept.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
+from cfmkit.designing.starts import Clock
 from cfmkit.families import family, names
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import FamilyOffer
+from cfmkit.results import Status
 from cfmkit.store.identity import code_stamp, stable_hash
-from cfmkit.studies.suggest.proposal import Proposal, ProposalJob, made
+from cfmkit.studies.pool import until
+from cfmkit.studies.suggest.proposal import OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.verification import unverified, verified
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.families.wishes import Candidate, Wish
+    from cfmkit.studies.executors import Lost
 
-ENOUGH = 3
-"""Proposals of a family after which no more of its candidates are made."""
+ENOUGH, ENOUGH_WITH_PARTS = 3, 2
+"""Proposals of a family after which no more of its candidates are made; fewer where parts of each are drawn."""
 
 ROUNDS = (3, 4, 6, 12)
 """Candidates of a family in each round, the last again and again: every round waits for the one before it."""
 
-LONGEST = 15.0
-"""Seconds that one design may search."""
+ASKING, LAST = 0.5, 0.05
+"""Shares of the time budget in which families answer, and which are left where nothing is found."""
 
 RESERVE = 14.0
 """Seconds that figures of a dozen proposals take on two cores."""
+
+
+@dataclass(frozen=True)
+class _Times:
+    """When what ends, in `time.time` [s]; None: never.
+
+    Attributes
+    ----------
+    asking : float or None
+        Families that have not answered by then, because the beam engine is compiled, are left out.
+    with_proposals, without : float or None
+        The search, with and without anything found; what runs at the second is given up.
+    """
+
+    asking: float | None = None
+    with_proposals: float | None = None
+    without: float | None = None
+
+    @classmethod
+    def of(cls, budget: float | None, reserve: float) -> _Times:
+        """Return the times of a budget that begins now, of which a reserve is for what comes afterwards [s]."""
+        if budget is None:
+            return cls()
+        now = time.time()
+        return cls(now + ASKING * budget, now + max(budget - reserve, 0.5 * budget), now + (1.0 - LAST) * budget)
 
 
 @dataclass(frozen=True)
@@ -89,24 +122,26 @@ def suggest(
     prefer : sequence of str
         What decides the order, most important first: ``size``, ``ripple``, ``parts``, ``stress``, ``depth``.
     reserve : float
-        Of the time budget, kept for what comes after the search [s].
+        Of the time budget, kept for what comes after the search [s]; as long as nothing is found there is nothing to
+        come, and the search goes on.
     """
-    begun = time.monotonic()
-    deadline = None if run.time_budget is None else begun + max(run.time_budget - reserve, 0.6 * run.time_budget)
-    answers = [Answered(name, _asked(name, wish, run)) for name in names()]
-    answers = [one for one in answers if one.offer.candidates or one.offer.reason]
+    times = _Times.of(run.time_budget, reserve)
+    answers, unasked = _answers(wish, run, times.asking)
     queues = {one.family: list(one.offer.candidates) for one in answers}
     total = sum(map(len, queues.values()))
     done: list[Proposal] = []
     reused = tried = turn = 0
+    cut, enough = unasked, ENOUGH if wish.good_parts is None else ENOUGH_WITH_PARTS
+
+    known: dict[int, Proposal] = {}
 
     def late() -> bool:
-        return deadline is not None and time.monotonic() > deadline
+        end = times.with_proposals if any(one.good for one in (*done, *known.values())) else times.without
+        return end is not None and time.time() > end
 
-    while not late() and (batch := list(_next(queues, done, ROUNDS[min(turn, len(ROUNDS) - 1)]))):
+    while not late() and (batch := list(_next(queues, done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
         turn += 1
-        left = LONGEST if deadline is None else min(LONGEST, max(deadline - time.monotonic(), 0.1))
-        jobs = [ProposalJob(name, candidate, wish, run.seed, left) for name, candidate in batch]
+        jobs = [ProposalJob(name, candidate, wish, run.seed, times.without) for name, candidate in batch]
         keys = [_key(job) for job in jobs]
         places = [run.notes.find(key) for key in keys]
         known = {
@@ -115,17 +150,19 @@ def suggest(
             if place >= 0
         }
         reused += len(known)
-        open_jobs = [(index, job) for index, job in enumerate(jobs) if index not in known]
-        for (index, _job), proposal in run.executor(_indexed, iter(open_jobs), late):
-            if isinstance(proposal, Proposal):
+        left = [index for index in range(len(jobs)) if index not in known]
+        for index, outcome in until(run.executor, times.without)(partial(_made_of, tuple(jobs)), iter(left), late):
+            proposal = _survived(jobs[index], outcome)
+            if proposal.message != OUT_OF_TIME:
                 known[index] = proposal
-                if not proposal.message.startswith("the time budget"):
-                    run.notes.add(keys[index], proposal.as_record())
+                run.notes.add(keys[index], proposal.as_record())
             tried += 1
             run.progress(min(0.99, (tried + reused) / max(total, 1)), f"{sum(one.good for one in done)} proposals")
         done += [known[index] for index in sorted(known)]
         if len(known) < len(jobs):
+            cut = True
             break
+        known = {}
     counts = {name: sum(one.family == name for one in done) for name in queues}
     return Suggestions(
         wish,
@@ -133,7 +170,7 @@ def suggest(
         tuple(_near(done, wish)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
-        late() and bool(list(_next(queues, done, 1))),
+        cut or (late() and bool(list(_next(queues, done, 1, enough)))),
         reused,
     )
 
@@ -145,27 +182,54 @@ def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions
     ----------
     found : Suggestions
     run : Run
-        Its executor does the work.
+        Its executor does the work, its time budget ends it: what was not verified then says so.
     solve : bool
         Whether to run those models; else it is said that they were not.
     """
     if not solve:
         return replace(found, proposals=tuple(map(unverified, found.proposals)))
-    jobs = list(enumerate(found.proposals))
-    done = {index: one for (index, _), one in run.executor(_verified, iter(jobs), lambda: False)}
-    kept = [done[index] if isinstance(done[index], Proposal) else unverified(one) for index, one in jobs]
+    clock = Clock.of(run.time_budget)
+    executor = until(run.executor, clock.deadline)
+    done = dict(executor(partial(_verified_of, found.proposals), iter(range(len(found.proposals))), clock.late))
+    kept = [
+        one if isinstance(one := done.get(index), Proposal) else unverified(old)
+        for index, old in enumerate(found.proposals)
+    ]
     return replace(found, proposals=tuple(kept))
 
 
-def _verified(item: tuple[int, Proposal]) -> Proposal:
-    return verified(item[1])
+def _verified_of(proposals: Sequence[Proposal], index: int) -> Proposal:
+    return verified(proposals[index])
 
 
-def _indexed(item: tuple[int, ProposalJob]) -> Proposal:
-    return made(item[1])
+def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
+    return made(jobs[index])
 
 
-def _asked(name: str, wish: Wish, run: Run) -> FamilyOffer:
+def _survived(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
+    """Return a proposal, or what is said of one whose process died or was given up."""
+    if isinstance(outcome, Proposal):
+        return outcome
+    return Proposal(
+        job.family, job.candidate.variant, message=OUT_OF_TIME if outcome.status is Status.TIMEOUT else outcome.message
+    )
+
+
+def _answers(wish: Wish, run: Run, deadline: float | None) -> tuple[list[Answered], bool]:
+    """Return what the families have to say, in their order, and whether the time was up before all had."""
+    asked = list(names())
+    plain = Run(run.seed)
+    found = dict(until(run.executor, deadline)(partial(_asked, wish, plain), iter(asked), lambda: False))
+    offers = {name: offer for name, offer in found.items() if isinstance(offer, FamilyOffer)}
+    lost = [name for name in asked if name not in offers]
+    answers = [
+        Answered(name, offers.get(name, FamilyOffer(reason="the time budget ended before it had answered")))
+        for name in asked
+    ]
+    return [one for one in answers if one.offer.candidates or one.offer.reason], bool(lost)
+
+
+def _asked(wish: Wish, run: Run, name: str) -> FamilyOffer:
     record = family(name)
     if record.propose is None:
         return FamilyOffer()
@@ -173,12 +237,15 @@ def _asked(name: str, wish: Wish, run: Run) -> FamilyOffer:
     return offer
 
 
-def _next(queues: dict[str, list[Candidate]], done: Sequence[Proposal], most: int) -> Iterator[tuple[str, Candidate]]:
-    """Yield the next candidates of every family that has not enough proposals, and take them from the queues."""
-    for name, queue in queues.items():
-        if sum(one.good for one in done if one.family == name) < ENOUGH:
-            for _ in range(min(most, len(queue))):
-                yield name, queue.pop(0)
+def _next(
+    queues: dict[str, list[Candidate]], done: Sequence[Proposal], most: int, enough: int
+) -> Iterator[tuple[str, Candidate]]:
+    """Yield the next candidates of every family that has not enough proposals, by turns; they leave the queues."""
+    short = [name for name in queues if sum(one.good for one in done if one.family == name) < enough]
+    for _ in range(most):
+        for name in short:
+            if queues[name]:
+                yield name, queues[name].pop(0)
 
 
 def _key(job: ProposalJob) -> str:

@@ -69,7 +69,9 @@ class WishBlock(Model):
         None, description="presses that it has to survive; judged of a material with `fatigue` data"
     )
     made_well: Share | None = Field(
-        None, alias="yield", description="share of made parts that is to be good; not judged yet"
+        None,
+        alias="yield",
+        description="share of made parts that meet all of it, under the tolerances assumed of the process",
     )
     prefer: tuple[Prefer, ...] = Field(("size", "ripple", "parts", "stress"), description="what decides the order")
 
@@ -135,6 +137,8 @@ class WishBlock(Model):
             adjustable=self.adjustable,
             hysteresis=self.hysteresis,
             cycles=self.cycles,
+            good_parts=self.made_well,
+            process=self.process,
             **({} if thinnest is None else {"thinnest": thinnest}),
         )
 
