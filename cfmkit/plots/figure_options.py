@@ -66,7 +66,7 @@ class FigureForm:
             if not layout.asked:
                 return figure
             width = layout.size[0] if self.width is None else self.width * 1e3
-            return laid_out(make, layout.stretched(width, self.titles, is_to_scale(figure)))
+            return laid_out(make, layout.narrowed(width, self.titles, is_to_scale(figure)))
 
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
         """Yield a figure's files as (name, content), below ``figures/``."""

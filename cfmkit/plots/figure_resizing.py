@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 NARROW = 8.0
@@ -24,6 +25,19 @@ HEADING = 6.0
 
 LEAST, MOST = 0.8, 1.1
 """By how much the height of a diagram changes with its width: a column of 84 mm gets about 84 x 75 mm."""
+
+LETTER = 0.55
+"""Width of a letter, on the average, in sizes of its type."""
+
+SIDE_BY_SIDE = 0.6
+"""Boxes that would become narrower than this share of their width stand below each other instead: names beside lines,
+in letters of a fixed size, overlap in less."""
+
+MOST_STACKED = 6
+"""More boxes are not stacked: they are small ones of one kind, and would fill a page."""
+
+TALLEST = 230.0
+"""Of a figure whose boxes stand below each other [mm]: the height of a page of print."""
 
 Box = tuple[float, float, float, float]
 
@@ -44,6 +58,8 @@ class FigureLayout:
         Where it draws, if not in a figure of its own.
     above : float
         Room at the top that it is to leave free, for the letter of a panel [mm].
+    stacked : bool
+        Whether boxes that stood side by side stand below each other: each has its own scales, then.
     """
 
     size: tuple[float, float] = (0.0, 0.0)
@@ -51,6 +67,7 @@ class FigureLayout:
     boxes: Sequence[Box] = ()
     host: Any = None
     above: float = 0.0
+    stacked: bool = False
 
     def sized(self, width: float, height: float) -> tuple[float, float]:
         """Return the size of the figure, and note it where none is set."""
@@ -79,6 +96,34 @@ class FigureLayout:
             x, y = across.at(left, factor), up.at(low, taller)
             boxes.append((x, y, across.at(left + wide, factor) - x, up.at(low + high, taller) - y))
         return FigureLayout((width, up.at(self.size[1], taller) - cut), [], boxes)
+
+    def narrowed(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
+        """Return the layout for another width [mm]: stretched, or with boxes below each other where they do not fit."""
+        across = _Stretch.of([(left, left + wide) for left, _, wide, _ in self.asked], self.size[0])
+        fits = across.factor(width) >= SIDE_BY_SIDE or len(across.parts) < 2
+        if fits or not all(wide > NARROW for _, _, wide, _ in self.asked) or len(self.asked) > MOST_STACKED:
+            return self.stretched(width, titles, to_scale)
+        return self._below_each_other(width, titles, to_scale)
+
+    def _below_each_other(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
+        """Return the layout whose boxes stand in one column, in the order in which they are read."""
+        left, below = min(box[0] for box in self.asked), min(box[1] for box in self.asked)
+        room = width - left - (self.size[0] - max(box[0] + box[2] for box in self.asked))
+        above = max(self.size[1] - max(box[1] + box[3] for box in self.asked) - HEADING, 4.0)
+        gap, heading = below + above, HEADING if titles else 0.0
+        count = len(self.asked)
+        heights = sum(box[3] for box in self.asked)
+        shares = [1.0, (TALLEST - heading - count * gap) / heights]
+        factor = max(min([*shares, *(room / box[2] for box in self.asked)] if to_scale else shares), 0.2)
+        top = heading + count * gap + factor * heights
+        place, boxes = top - heading, [(0.0, 0.0, 0.0, 0.0)] * count
+        for number in sorted(range(count), key=lambda at: (-round(self.asked[at][1]), self.asked[at][0])):
+            _, _, wide, high = self.asked[number]
+            wide, high = factor * wide if to_scale else room, factor * high
+            place -= above + high
+            boxes[number] = (left + 0.5 * (room - wide), place, wide, high)
+            place -= below
+        return FigureLayout((width, top), [], boxes, stacked=True)
 
 
 @dataclass(frozen=True)
@@ -133,6 +178,19 @@ def laid_out(make: Callable[[], Figure], layout: FigureLayout) -> Figure:
     """Return a figure in a layout."""
     mark = _LAYOUT.set(layout)
     try:
-        return make()
+        figure = make()
     finally:
         _LAYOUT.reset(mark)
+    for ax in figure.axes if layout.stacked else ():
+        ax.tick_params(labelleft=True, labelbottom=True)  # a neighbour had the numbers of an axis for both
+    for ax in figure.axes:
+        _break_label(ax, layout.size[1] / 25.4 * 72.0)
+    return figure
+
+
+def _break_label(ax: Axes, paper: float) -> None:
+    """Put the unit of a vertical axis below its name where both are longer than the axis; `paper` is in points."""
+    label = ax.yaxis.label
+    name, bracket, unit = label.get_text().rpartition(" [")
+    if name and len(label.get_text()) * LETTER * float(label.get_fontsize()) > ax.get_position().height * paper:
+        label.set_text(f"{name}\n{bracket.strip()}{unit}")

@@ -1,5 +1,6 @@
 """Figures for print: another width, formats, no headings, a style file; text stays text, bytes repeat."""
 
+import itertools
 import re
 
 import numpy as np
@@ -136,3 +137,36 @@ def test_a_style_file_that_says_something_wrong_is_refused(text, told, tmp_path)
     with pytest.raises(UsageError, match=re.escape(told)) as caught:
         form_of(style=str(file))
     assert "\n" not in str(caught.value)
+
+
+def side_by_side():
+    figure = style.new_figure(160, 90)
+    write_heading(figure, Heading("name", "subject"))
+    for number, left in enumerate((16, 64, 112)):
+        ax = style.axes_mm(figure, (left, 14, 43, 56))
+        ax.tick_params(labelleft=number == 0)
+        ax.set_ylabel("a name that is long [mm]" * (number == 0))
+    return figure
+
+
+def test_boxes_that_would_be_too_narrow_beside_each_other_stand_below_each_other_with_their_own_scales():
+    narrow = form_of(width="84 mm").draw(side_by_side)
+    found = boxes(narrow)
+    assert np.allclose(style.size_mm(narrow)[0], 84)
+    assert style.size_mm(narrow)[1] <= 230
+    lows = [box[1] for box in found]
+    assert lows == sorted(lows, reverse=True)
+    assert all(upper[1] - (lower[1] + lower[3]) > 14 for upper, lower in itertools.pairwise(found))
+    assert all(label.get_visible() for ax in narrow.axes for label in ax.get_yticklabels())
+    wide = form_of(width="140 mm").draw(side_by_side)
+    assert len({box[1] for box in boxes(wide)}) == 1
+
+
+def test_the_unit_of_a_long_axis_name_goes_to_a_line_of_its_own():
+    def low():
+        figure = style.new_figure(160, 60)
+        style.axes_mm(figure, (16, 14, 130, 30)).set_ylabel("a name that is long [mm]")
+        style.axes_mm(figure, (16, 50, 130, 8)).set_ylabel("y")
+        return figure
+
+    assert form_of(width="84 mm").draw(low).axes[0].get_ylabel() == "a name that is long\n[mm]"
