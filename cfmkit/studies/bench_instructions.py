@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.robust_design import SIGMA_STEP
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.expected_yield import MOST_ANALYSES, MOST_LOOKS
+from cfmkit.studies.near_design import most_parts, slopes, step_of
 from cfmkit.studies.process_tolerances import assumed, tolerances
 from cfmkit.studies.requirement_rows import sampled_of
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.design_tolerances import DesignTolerances
 
 PARTS, SHARE = 4000, 0.95
@@ -109,27 +109,18 @@ def _moved(
     result: Result, made: DesignTolerances, places: FloatArray, run: Run
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the force of the design at places (p,), on its first branch, and its derivatives by the errors (p, d)."""
-    spec = made.spec
-    quick = family(spec.family).sampled is not None
-    if 2 * len(made.paths) > (MOST_LOOKS if quick else MOST_ANALYSES):
+    spec, branch = made.spec, result.curve.branches[0]
+    if 2 * len(made.paths) > most_parts(spec):
         return None
-    branch = result.curve.branches[0]
 
-    def force(changes: dict[str, float]) -> FloatArray | None:
-        found = sampled_of(spec.replace(changes) if changes else spec, places, run)
+    def force(part: Spec) -> FloatArray | None:
+        found = sampled_of(part, places, run)
         values = None if found is None else found.effort.get(branch)
         return values if values is not None and np.isfinite(values).all() else None
 
-    nominal = force({})
+    nominal = force(spec)
     if nominal is None:
         return None
-    by_error = np.empty((len(places), len(made.paths)))
-    for k, one in enumerate(made.parameters):
-        spread = one.spread
-        sigma = spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
-        step = SIGMA_STEP * sigma
-        ends = force({one.path: spread.nominal + step}), force({one.path: spread.nominal - step})
-        if ends[0] is None or ends[1] is None:
-            return None
-        by_error[:, k] = (ends[0] - ends[1]) / (2.0 * step)
-    return nominal, by_error
+    steps = {one.path: (one.spread.nominal, step_of(one.spread.standard_deviation)) for one in made.parameters}
+    by_error = slopes(force, spec, steps)
+    return None if by_error is None else (nominal, np.column_stack(by_error))

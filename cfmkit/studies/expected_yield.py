@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.robust_design import SIGMA_STEP
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
+from cfmkit.studies.near_design import most_parts, slopes, step_of
 from cfmkit.studies.process_tolerances import MODULUS, assumed
 from cfmkit.studies.requirement_rows import numbers_of, places_of, rows_of, sampled_of
 
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.process_tolerances import Assumed
     from cfmkit.studies.requirement_rows import RequirementRows
-
-MOST_LOOKS, MOST_ANALYSES = 24, 12
-"""Parts that are looked at the quick way, or analysed, for an estimate: some tenths of a second on any machine."""
 
 PARTS = 4000
 
@@ -106,20 +103,23 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     middle = None if rows is None else _numbers(spec, rows, run)
     if rows is None or middle is None:
         raise YieldUnknown("the design cannot be followed at a few poses")
-    quick = family(spec.family).sampled is not None and not rows.metrics
-    if 2 * len(paths) > (MOST_LOOKS if quick else MOST_ANALYSES):
+    if 2 * len(paths) > most_parts(spec, by_looks=not rows.metrics):
+        quick = family(spec.family).sampled is not None and not rows.metrics
         raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
     generator = np.random.default_rng([run.seed, 17])
     moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
-    for path in paths:
-        nominal = float(spec.at(path))
+    nominal = {path: float(spec.at(path)) for path in paths}
+    steps = {path: (nominal[path], step_of(sigma)) for path, sigma in found.deviations.items()}
+    if found.modulus:
+        steps[MODULUS] = nominal[MODULUS], 1e-3 * nominal[MODULUS]
+    by_error = slopes(lambda part: _numbers(part, rows, run), spec, steps)
+    assert by_error is not None  # a part without numbers has ended the estimate
+    for path, slope in zip(steps, by_error, strict=True):
         if path == MODULUS and found.modulus is not None:
-            errors, step = generator.uniform(*found.modulus, PARTS) - nominal, 1e-3 * nominal
+            errors = generator.uniform(*found.modulus, PARTS) - nominal[path]
         else:
-            sigma = found.deviations[path]
-            errors, step = sigma * generator.standard_normal(PARTS), SIGMA_STEP * sigma
-        ends = [_numbers(spec.replace({path: nominal + sign * step}), rows, run) for sign in (1.0, -1.0)]
-        change = np.outer(errors, (ends[0] - ends[1]) / (2.0 * step))
+            errors = found.deviations[path] * generator.standard_normal(PARTS)
+        change = np.outer(errors, slope)
         moved += change
         by_modulus = change if path == MODULUS else by_modulus
     limits = [(middle + part) @ rows.matrix.T + rows.constant for part in (moved, moved - by_modulus)]

@@ -246,9 +246,7 @@ def _force_share(made: DesignTolerances, members: tuple[int, ...], nominal: Resu
 
 
 def _one_sigma(one: Parameter) -> float:
-    spread = one.spread
-    step = spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
-    return spread.nominal + step
+    return one.spread.nominal + one.spread.standard_deviation
 
 
 def _window(result: Result) -> tuple[float, float]:

@@ -152,8 +152,7 @@ def rows_by_errors(spec: Spec, nominal: Result, parameters: tuple[Parameter, ...
 
 def deviation_of(one: Parameter) -> float:
     """Return the standard deviation of a parameter [SI]."""
-    spread = one.spread
-    return spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
+    return one.spread.standard_deviation
 
 
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
@@ -274,8 +273,7 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
     made, clock = sight.made, Clock.of(run.time_budget)
     values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
     errors = values - made.nominal
-    spreads = [one.spread for one in made.parameters]
-    sigma = np.array([one.deviation if one.kind == "normal" else (one.high - one.low) / 12**0.5 for one in spreads])
+    sigma = np.array([one.spread.standard_deviation for one in made.parameters])
 
     def tell(share: float, steps: int) -> None:
         run.progress(min(0.99, steps / 20.0), f"step {steps}: about {100.0 * share:.3g} % of parts good")

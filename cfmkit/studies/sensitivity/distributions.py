@@ -48,6 +48,11 @@ class ParameterSpread:
     deviation: float = 0.0
 
     @property
+    def standard_deviation(self) -> float:
+        """Of the distribution: that of the normal one before truncation, or of a range [SI]."""
+        return self.deviation if self.kind == "normal" else (self.high - self.low) / 12.0**0.5
+
+    @property
     def ends(self) -> tuple[float, float]:
         """The range that it covers: three standard deviations where it has no ends."""
         if self.kind == "uniform":
