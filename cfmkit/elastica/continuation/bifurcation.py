@@ -104,6 +104,8 @@ def _on_one_path(problem: PathProblem, found: Singular, one: Spot, beyond: Spot)
     near, far = ends
     if near is None or far is None or near.unstable > one.unstable:
         return False
+    if beyond.unstable > one.unstable and far.unstable <= near.unstable:  # interpolated between two paths
+        return False
     return fine.pose_change(near.y, far.y) <= _STRAIGHT * _ASIDE * whole + _ROUNDING
 
 

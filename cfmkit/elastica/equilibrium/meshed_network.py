@@ -281,6 +281,12 @@ class Solver:
             spot = near
         return replace(spot, drive=0.0)
 
+    def degree(self, dof: int, ys: FloatArray, drives: FloatArray) -> FloatArray:
+        """Return the values (k,) of a degree of freedom, free or held, of unknowns (k, size) at drives (k,)."""
+        m = self.model
+        slot = int(m.slot[dof])
+        return ys[:, slot] if slot >= 0 else m.base[dof] + drives * m.rate[dof]
+
     def pose_change(self, one: FloatArray, other: FloatArray) -> float:
         """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
         change = np.abs(one - other)

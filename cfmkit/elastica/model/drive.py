@@ -102,8 +102,9 @@ class Control:
     most_points : int
         At most so many points besides those requested.
     imperfection : float
-        Bend the unloaded beams by so much [m] in the form of the buckling mode at the first bifurcation of the
-        perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names what was done.
+        Bend the unloaded beams, and move the nodes between them, by so much [m] in the form of the buckling mode at
+        the first bifurcation of the perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names
+        what was done.
     """
 
     tolerance: float = 1e-7

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp, log
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,9 @@ from cfmkit.elastica.model.numbering import NOWHERE, driven, plan_of
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import LoadOn
 
 
@@ -76,6 +79,33 @@ class Layout:
     def position(self, node: str) -> tuple[Any, Any]:
         """Return the reference position of a node [m]."""
         return self.network.nodes[node].x, self.network.nodes[node].y
+
+    def motion(self, node: str, value: Callable[[int], FloatArray]) -> FloatArray:
+        """Return displacement and rotation of a node at n equilibria, (n, 3) [m, m, rad].
+
+        Parameters
+        ----------
+        node : str
+            Its name.
+        value : callable
+            Returns the values (n,) of a degree of freedom at the equilibria, dimensionless.
+        """
+        length, plan = self.scales.length, self.plan
+        master = self.network.master_of(node)
+        first = self.first[master]
+        frame = self.direction[master]
+        c, s = math.cos(frame) * length, math.sin(frame) * length
+        a, b = value(first), value(first + 1)
+        moved = np.empty((len(a), 3))
+        moved[:, 0], moved[:, 1], moved[:, 2] = c * a - s * b, s * a + c * b, value(plan.turn[node])
+        (x, y), (mx, my) = self.position(node), self.position(master)
+        ax, ay = x - mx, y - my
+        if ax != 0 or ay != 0:
+            swing = value(plan.swing[node])
+            less, across = np.cos(swing) - 1.0, np.sin(swing)
+            moved[:, 0] += less * ax - across * ay
+            moved[:, 1] += across * ax + less * ay
+        return moved
 
     def supported(self, node: str) -> int:
         """Return the first degree of freedom of a node that support and drive can act on.
@@ -167,7 +197,7 @@ class Layout:
     def _scales(self) -> Scales:
         lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)
         length = sum(lengths.tolist()) / len(lengths)
-        rigidity = exp(sum(map(log, middles.tolist())) / len(middles))
+        rigidity = math.exp(sum(map(math.log, middles.tolist())) / len(middles))
         return Scales(length, rigidity, self._drive_unit(length, rigidity))
 
     def _drive_unit(self, length: float, rigidity: float) -> float:

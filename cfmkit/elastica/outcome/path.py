@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -151,29 +150,11 @@ class Path:
 
     def value(self, dof: int) -> FloatArray:
         """Return the values of a degree of freedom, free or held, at every point, dimensionless."""
-        m = self.solver.model
-        slot = int(m.slot[dof])
-        known: FloatArray = self.points.y[:, slot] if slot >= 0 else m.base[dof] + self.points.drive * m.rate[dof]
-        return known
+        return self.solver.degree(dof, self.points.y, self.points.drive)
 
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
-        length, plan = self.layout.scales.length, self.layout.plan
-        master = self.layout.network.master_of(node)
-        first = self.layout.first[master]
-        frame = self.layout.direction[master]
-        c, s = math.cos(frame) * length, math.sin(frame) * length
-        a, b = self.value(first), self.value(first + 1)
-        moved = np.empty((len(self), 3))
-        moved[:, 0], moved[:, 1], moved[:, 2] = c * a - s * b, s * a + c * b, self.value(plan.turn[node])
-        (x, y), (mx, my) = self.layout.position(node), self.layout.position(master)
-        ax, ay = x - mx, y - my
-        if ax != 0 or ay != 0:
-            swing = self.value(plan.swing[node])
-            less, across = np.cos(swing) - 1.0, np.sin(swing)
-            moved[:, 0] += less * ax - across * ay
-            moved[:, 1] += across * ax + less * ay
-        return read_only(moved)
+        return read_only(self.layout.motion(node, self.value))
 
     def reaction(self, node: str) -> FloatArray:
         """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m].
