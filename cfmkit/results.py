@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 WINDOW_OUTSIDE = "window_outside"
 """Name of the finding that nothing was measured over a window."""
 
+OLD_KEY = "old_key"
+"""Name of the finding that the specification uses a key by its old name."""
+
 
 class Status(Enum):
     """How a solve ended."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cfmkit.results import WINDOW_OUTSIDE
+from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -248,7 +248,10 @@ def article(word: str) -> str:
     return "an" if first[0] in "aeiou" else "a"
 
 
-SHARED = {WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value"}
+SHARED = {
+    WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
+    OLD_KEY: "a key has another name now; the old one is still read by this version",
+}
 """Findings that are made of any family's result."""
 
 

@@ -17,7 +17,7 @@ from cfmkit.metrics.branch_views import Cycle, MeasuringFrame, cycle, span_text
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, time_of, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, covers, traces
-from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
+from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import Share, between
 
 if TYPE_CHECKING:
@@ -320,8 +320,12 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 
 
 def windows_judged(result: Result) -> Result:
-    """Return a result that warns of each window that some branch of its nominal curve does not cover."""
+    """Return a result that warns of windows that its nominal curve does not cover, and of keys by old names."""
     found = tuple(Finding(WINDOW_OUTSIDE, _told(gap, result)) for gap in gaps(result))
+    found += tuple(
+        Finding(OLD_KEY, f"'{old}' is the old name of '{new}', and read by this version only: write {written}")
+        for old, new, written in result.spec.old_keys()
+    )
     return replace(result, warnings=(*result.warnings, *found)) if found else result
 
 

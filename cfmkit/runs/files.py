@@ -121,8 +121,9 @@ def _drawn(drawing: Drawing, spec: Spec) -> Figure:
 
 def stated_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return a line for each tolerance that the specification's design states."""
-    made = getattr(getattr(spec, "design", None), "tolerances", None)
-    return tuple(f"{path}: {_spread(stated)}" for path, stated in (made or {}).items())
+    design = getattr(spec, "design", None)
+    made = {} if design is None else design.tolerances_of(spec)[0]
+    return tuple(f"{path}: {_spread(stated)}" for path, stated in made.items())
 
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:

@@ -220,6 +220,10 @@ class DesignKeys(Model):
     )
     seed: int | None = Field(None, ge=0, description="of the parts that are drawn; default: `--seed`")
 
+    def tolerances_of(self, _spec: Any) -> tuple[Mapping[str, Any], int]:
+        """Return the tolerances that are stated for a specification, and how many parts are to be drawn."""
+        return self.tolerances or {}, self.samples
+
 
 if TYPE_CHECKING:
     from cfmkit.specs.target_function import TargetCurve
@@ -334,6 +338,10 @@ class Spec(Model):
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """What is cut from a sheet: each width out of the plane [m], by its key below `mechanism`."""
         return {}
+
+    def old_keys(self) -> Iterator[tuple[str, str, str]]:
+        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
+        yield from ()
 
     def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:
         """Yield (path, window) of the analysis, then of each requirement that has its own."""

@@ -7,6 +7,7 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -17,6 +18,7 @@ from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
+from cfmkit.stock.processes import PROCESSES, ProcessAccuracy, ProcessName
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -270,8 +272,44 @@ class Hole(Model):
     diameter: AboveZero = Field(description="of the hole as cut")
 
 
+class PartProcess(Model):
+    """How a part is made: a process, and what is known better than what is assumed of it."""
+
+    name: ProcessName | None = Field(None, description="the process; default: by the material")
+    kerf: FromZero | None = Field(None, description="width of the cut")
+    thickness: FromZero | None = Field(None, description="standard deviation of the thickness of a leaf")
+    position: FromZero | None = Field(None, description="standard deviation of where a joint lies; hides smaller kinks")
+    least_feature: FromZero | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
+    least_radius: FromZero | None = Field(None, description="smallest inside radius")
+
+    def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
+        """Return what the process holds, and what the usual one does where it has no name."""
+        known = PROCESSES[self.name] if self.name else usual
+        own = {
+            one: value
+            for one in ("kerf", "thickness", "position", "least_feature", "least_radius")
+            if (value := getattr(self, one)) is not None
+        }
+        return replace(known, **own, reason="values of 'mechanism.part.process'") if own else known
+
+
+def _process_block(value: Any) -> Any:
+    """Return a bare name as the block that it is short for."""
+    return {"name": value} if isinstance(value, str) else value
+
+
+ProcessField = Annotated[PartProcess, BeforeValidator(_process_block, json_schema_input_type=ProcessName | PartProcess)]
+"""The type of a key that says how something is made."""
+
+
 class CutPart(Model):
     """How a part is cut: what every family that is cut from a sheet can say."""
+
+    process: ProcessField | None = Field(
+        None,
+        description="how it is made: laser, wire-edm, fdm, sls or mill, or values of your own: {name: laser, "
+        "thickness: 0.02 mm}; its tolerances count where `design.tolerances` says none",
+    )
 
     fillet: FromZero = Field(
         0.0005, description="radius of inside corners: that of the cutter; 0: sharp, the stress there has no value"

@@ -88,7 +88,7 @@ def _listed(items: list[str]) -> str:
 def _made(result: Result, run: Run) -> tuple[DesignTolerances | None, str]:
     """Return the tolerances of a part, those that are given or those that are assumed, and whence they are."""
     block = getattr(result.spec, "design", None)
-    if isinstance(block, DesignKeys) and block.tolerances:
+    if isinstance(block, DesignKeys) and block.tolerances_of(result.spec)[0]:
         return tolerances_of(result.spec, block, run.seed), "within design.tolerances"
     found = assumed(result.spec)
     if found is None or not isinstance(block, DesignKeys):

@@ -85,16 +85,25 @@ def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> DesignTolerance
     except SpecError as error:
         raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
     chosen = seed if design.seed is None else design.seed
-    return DesignTolerances(spec, block, parameters, design.samples, chosen)
+    return DesignTolerances(spec, block, parameters, design.tolerances_of(spec)[1], chosen)
 
 
 def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
-    """Return the tolerances that a `design` block gives, else those assumed of the process that it names."""
-    if design.tolerances or design.process is None:
-        return dict(design.tolerances or {})
+    """Return the tolerances that a `design` block gives, else those of the process that it or the part names."""
+    stated = design.tolerances_of(spec)[0]
+    if stated or not _made(spec, design):
+        return dict(stated)
     from cfmkit.studies.process_tolerances import tolerances
 
     return tolerances(spec)
+
+
+def _made(spec: Spec, design: DesignBlock) -> bool:
+    """Tell whether it is said how parts are made: by a block `design`, or of a part whose yield is asked for."""
+    if design.tolerances_of(spec)[0] or design.process is not None:
+        return True
+    part = getattr(getattr(spec, "mechanism", None), "part", None)
+    return getattr(design, "yield") is not None and getattr(part, "process", None) is not None
 
 
 def _renamed(path: str) -> str:
@@ -122,8 +131,7 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
             yield ("design", "free", path), str(problem)
     if design.robust is not None and getattr(design, "yield") is None:
         yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
-    made = design.tolerances or design.process
-    if getattr(design, "yield") is not None and not made:
+    if getattr(design, "yield") is not None and not _made(spec, design):
         yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
     if design.tolerances and not spec.part_requirements:
         told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Spec
     from cfmkit.stock.processes import ProcessAccuracy
+    from cfmkit.stock.spec import PartProcess
 
 OF_PLATES = "laser"
 """How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
@@ -51,7 +52,10 @@ class Assumed:
 
 
 def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
-    """Return what is assumed of a part, by a process, `design.process` or the usual one; None of no part."""
+    """Return what is assumed of a part, by a process, the one that the specification names, or the usual one.
+
+    None of what is no part.
+    """
     errors = family(spec.family).errors
     if errors is None:
         return None
@@ -60,13 +64,20 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
         return None
     material = getattr(getattr(spec, "mechanism", None), "material", None)
     named = process or getattr(getattr(spec, "design", None), "process", None)
-    accuracy = PROCESSES[named or OF_PLATES]
-    if material is not None and not named:
-        accuracy = usual(material.name, material.modulus)
+    accuracy = PROCESSES[OF_PLATES] if material is None else usual(material.name, material.modulus)
+    own = _of_part(spec)
+    if named:
+        accuracy = PROCESSES[named]
+    elif own is not None:
+        accuracy = own.accuracy(accuracy)
     band = None
     if material is not None and (known := MATERIALS.get(material.name)) and material.modulus == known.youngs_modulus:
         band = known.scatter.youngs_modulus
     return Assumed(accuracy, kinds, band)
+
+
+def _of_part(spec: Spec) -> PartProcess | None:
+    return getattr(getattr(getattr(spec, "mechanism", None), "part", None), "process", None)
 
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:

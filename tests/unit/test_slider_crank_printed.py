@@ -270,7 +270,7 @@ CASES = {
     "kink_too_small": ("strip", []),
     "long_run_in": ("strip", ["mechanism.unloaded_angle=0.58 rad"]),
     "overstressed": ("strip", ["analysis.travel=[0 mm, 37 mm]"]),
-    "too_thin": ("strip", ["mechanism.process.thinnest=1.2 mm"]),
+    "too_thin": ("strip", ["mechanism.part.process.least_feature=1.2 mm"]),
     "lateral_buckling": ("strip", ["mechanism.beam.width=1.5 mm"]),
     "side_force": ("strip", []),
     "pulled": ("strip", ["analysis.travel=[-1 mm, 5 mm]"]),

@@ -101,6 +101,9 @@ class Rescale(Model):
         return self
 
 
+LEAST_DRAWN = 20
+"""Parts that a design is judged by at least, as of `design.samples`."""
+
 LEAST_SHARE = 0.05
 """Of its largest force a target curve must have everywhere: the search compares by the force that is wanted."""
 
@@ -130,6 +133,15 @@ class BeamDesign(DesignBlock):
         if low < LEAST_SHARE * high or high <= 0:
             raise ValueError(f"'target' must stay above {LEAST_SHARE:.0%} of its largest force in 'optimise.window'")
         return self
+
+    def tolerances_of(self, spec: Any) -> tuple[Mapping[str, Any], int]:
+        """Return the stated tolerances and the number of parts, those of `optimise.tolerances` by its old name, too."""
+        old = self.optimise.tolerances if self.optimise and "tolerances" in self.optimise.model_fields_set else None
+        if self.tolerances or old is None or not spec.part_requirements:
+            return super().tolerances_of(spec)
+        samples = self.samples if "samples" in self.model_fields_set else max(LEAST_DRAWN, old.samples)
+        assert self.optimise is not None
+        return self.optimise.scatter(spec.mechanism), samples
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -210,6 +222,14 @@ class BeamSpec(Spec):
     def _is_cut_from_one_sheet(self) -> Self:
         refuse("BeamSpec", sheet_faults(self.mechanism.part, self.out_of_plane_widths))
         return self
+
+    def old_keys(self) -> Iterator[tuple[str, str, str]]:
+        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
+        wanted = self.design.optimise if self.design else None
+        if wanted is not None and "tolerances" in wanted.model_fields_set:
+            found = {} if self.design is None else wanted.scatter(self.mechanism)
+            said = ", ".join(f"{path}: {{normal: {one.normal}}}" for path, one in found.items())
+            yield "design.optimise.tolerances", "design.tolerances", f"{{{said}}}"
 
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -12,7 +12,7 @@ from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, 
 from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import SolidAnalysis, Spec, refuse
-from cfmkit.specs.units import Angle, Length, Ratio
+from cfmkit.specs.units import Angle, Length, Ratio, format_short
 from cfmkit.stock.spec import Guide, Pins, sheet_faults
 
 
@@ -110,6 +110,14 @@ class SliderCrankSpec(Spec):
     mechanism: Mechanism
     design: CrankDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: CrankAnalysis = Field(default_factory=CrankAnalysis, description="how it is run")
+
+    def old_keys(self) -> Iterator[tuple[str, str, str]]:
+        """Yield (path, path by its name of today, what to write there) of each key that stands under an old name."""
+        old = self.mechanism.process
+        if old is not None:
+            values = {"position": old.layer, "least_feature": old.thinnest}
+            said = ", ".join(f"{key}: {format_short(one, 'length')}" for key, one in values.items() if one is not None)
+            yield "mechanism.process", "mechanism.part.process", f"{{{said}}}"
 
     @property
     def durability(self) -> Durability | None:

@@ -92,12 +92,12 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             "'mechanism.unloaded_offset'",
         )
         return
-    process = spec.mechanism.process
-    if process is not None and process.layer is not None and off < process.layer:
+    resolved = spec.mechanism.resolved[0]
+    if resolved is not None and off < resolved:
         yield finding(
             "kink_too_small",
             f"the kink of {mm(off)} that sends the chain to one side is smaller than what the process resolves "
-            f"({mm(process.layer)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
+            f"({mm(resolved)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
         )
     run_in = solution.first_at(0.98 * solution.level)
     if run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1] and off > 1e-3 * solution.chain.length:
@@ -109,11 +109,11 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
 
 
 def _making(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    process = spec.mechanism.process
-    if process is not None and process.thinnest is not None and solution.thinnest < process.thinnest:
+    thinnest = spec.mechanism.resolved[1]
+    if thinnest is not None and solution.thinnest < thinnest:
         yield finding(
             "too_thin",
-            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(process.thinnest)}",
+            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(thinnest)}",
         )
     if solution.width_ratio < THINNEST_RATIO:
         yield finding(

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import Analysis, Model
 from cfmkit.specs.units import Length, Ratio
+from cfmkit.stock.processes import PROCESSES
 from cfmkit.stock.spec import MaterialField, PaddedPart, SafetyFactor
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -118,8 +119,21 @@ class Printed(Model):
         description="whether a wide strip or flexure stiffens as its curling across the width is hindered; clamped "
         "ends left out",
     )
-    process: Process | None = Field(None, description="how it is made, for warnings")
+    process: Process | None = Field(None, description="deprecated: 'position' and 'least_feature' of 'part.process'")
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
+
+    @property
+    def resolved(self) -> tuple[float | None, float | None]:
+        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None where nothing says."""
+        position = thinnest = None
+        if self.part is not None and self.part.process is not None:
+            stated = self.part.process
+            known = stated.accuracy(PROCESSES[stated.name]) if stated.name else stated
+            position, thinnest = known.position, known.least_feature
+        if self.process is not None:  # the old name of the same: what a command line still sets there counts
+            position = position if self.process.layer is None else self.process.layer
+            thinnest = thinnest if self.process.thinnest is None else self.process.thinnest
+        return position, thinnest
 
     @property
     def finest(self) -> Literal["prb", "lumped", "beam"]:
