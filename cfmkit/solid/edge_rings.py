@@ -16,9 +16,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cfmkit.arrays import read_only
+from cfmkit.errors import GeometryError
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,6 +36,10 @@ GRADING = 0.25
 
 MOST_PLACES = 20_000
 """Places round the boundary at which sizes are looked up; more take seconds."""
+
+MOST_REFINED = 1000.0
+"""Largest elements in parts of the smallest: beyond it grading alone takes half a minute, and what is so thin beside
+the rest of a part is a flaw of its drawing."""
 
 
 @dataclass(frozen=True)
@@ -149,12 +155,38 @@ def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) 
         Of the radius of a curved edge.
     across : float
         Elements across the thickness at least: two six-node triangles carry the bending stress of a strip to 1e-3.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the part is so thin somewhere, or its edge so sharply curved, that it would need elements `MOST_REFINED`
+        times smaller than the largest.
     """
-    coarse = _wanted(rings, 0.5 * largest, largest, share, across)[1]
+    coarse = _resolved(*_wanted(rings, 0.5 * largest, largest, share, across), largest)[1]
     around = sum(float(ring.places[-1]) for ring in rings)
     step = 0.5 * max(min(largest, float(coarse.min())), around / MOST_PLACES)
-    places, wanted = _wanted(rings, step, largest, share, across)
+    places, wanted = _resolved(*_wanted(rings, step, largest, share, across), largest)
     return Sizes(places, _graded(places, wanted), largest)
+
+
+def _resolved(places: FloatArray, wanted: FloatArray, largest: float) -> tuple[FloatArray, FloatArray]:
+    """Return the places and the sizes wanted there, if elements can be so small; GeometryError if they cannot."""
+    least = int(wanted.argmin())
+    if wanted[least] * MOST_REFINED < largest:
+        raise GeometryError(
+            f"the part is too thin, or its edge too sharply curved, at {place_text(places[least])}: elements of "
+            f"{format_short(largest, 'length')} cannot resolve it"
+        )
+    return places, wanted
+
+
+def place_text(place: Sequence[float] | FloatArray) -> str:
+    """Return a place (2,) [m] for a message.
+
+    >>> place_text([0.005, 0.0])
+    '(5 mm, 0 mm)'
+    """
+    return f"({', '.join(format_short(float(one), 'length') for one in place)})"
 
 
 def _wanted(
@@ -208,7 +240,7 @@ def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray,
         share = (way[:, 0] * normals[ray, 1] - way[:, 1] * normals[ray, 0]) / det
         # a wall looks back: lines that the ray meets at less than 45 degrees belong to a corner, not to a wall
         steep = np.abs(det) > 0.7 * np.hypot(*side.T)
-    met = steep & (share >= 0) & (share <= 1) & (depth > 1e-6 * reach) & (depth <= reach)
+    met = steep & (share >= 0) & (share <= 1) & (depth > 1e-8 * reach) & (depth <= reach)
     found = np.full(len(places), math.inf)
     np.minimum.at(found, ray[met], depth[met])
     return found

@@ -19,7 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.edge_rings import GRADING, Ring, Sizes, sizes
+from cfmkit.solid.edge_rings import GRADING, Ring, Sizes, place_text, sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,7 +107,8 @@ def mesh(
     Raises
     ------
     cfmkit.errors.GeometryError
-        If the boundary crosses itself, or the mesh would have more than `MOST_NODES`.
+        If the boundary crosses itself, the part is thinner somewhere than elements can resolve, or the mesh would have
+        more than `MOST_NODES`.
     """
     region = _region(rings)
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
@@ -136,13 +137,17 @@ def _region(rings: tuple[Ring, ...]) -> Any:
     """Return the part as a polygon of shapely, prepared for questions."""
     from shapely import MultiPolygon, Polygon, prepare
     from shapely.geometry.polygon import signed_area
-    from shapely.validation import explain_validity
 
-    shells = [Polygon(ring.points) for ring in rings]
+    shells = [Polygon(ring.points) for ring in rings if len(ring.points) > 2]
+    if len(shells) < len(rings):
+        raise GeometryError("an outline of fewer than three points has nothing inside")
     for shell in shells:
         if not shell.is_valid:
-            raise GeometryError(f"the outline crosses itself: {explain_validity(shell)}")
+            raise _crossed(shell)
     holes = [shell for shell in shells if signed_area(shell.exterior) < 0]
+    for hole in holes:
+        if not any(shell.covers(hole) for shell in shells if shell not in holes):
+            raise GeometryError(f"the hole round {place_text(hole.centroid.coords[0])} is not inside the outline")
     region = MultiPolygon(
         [
             Polygon(shell.exterior, [hole.exterior for hole in holes if shell.covers(hole)])
@@ -151,9 +156,18 @@ def _region(rings: tuple[Ring, ...]) -> Any:
         ]
     )
     if not region.is_valid:
-        raise GeometryError(f"the outline crosses itself: {explain_validity(region)}")
+        raise _crossed(region)
     prepare(region)
     return region
+
+
+def _crossed(shape: Any) -> GeometryError:
+    """Return what is wrong with a polygon that is not valid, and where."""
+    from shapely.validation import explain_validity
+
+    what, _, where = explain_validity(shape).rstrip("]").partition("[")
+    place = place_text([float(word) for word in where.split()])
+    return GeometryError(f"the outline crosses itself or touches itself at {place} ({what.strip().lower()})")
 
 
 STEEP = 0.5

@@ -11,6 +11,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.results import Result, Status
+from cfmkit.solid.equilibrium import SolidProblem
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LAN = CONFIGS / "beam_lan2010.yaml"
@@ -182,3 +183,50 @@ def test_a_mesh_that_would_be_endless_is_no_result_but_a_sentence(tmp_path, size
     result = cfmkit.analyze(cfmkit.load(path))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "analysis.solid.mesh" in result.message
+
+
+COARSE = {
+    "analysis.travel": "0.5 mm",
+    "analysis.points": 5,
+    "analysis.solid.poses": 3,
+    "analysis.solid.mesh": "0.5 mm",
+}
+
+
+@pytest.mark.parametrize(
+    ("holes", "said"),
+    [
+        ("{at: [-0.991 mm, -0.133 mm], diameter: 1.9996 mm}", "is too thin, or its edge too sharply curved, at (-1.98"),
+        ("{at: [12 mm, 1.65 mm], diameter: 3 mm}", "the hole round (12 mm, 1.65 mm) is not inside the outline"),
+        (
+            "{at: [-1 mm, -0.1 mm], diameter: 1 mm}, {at: [-1.2 mm, -0.1 mm], diameter: 1 mm}",
+            "crosses itself or touches itself at (-1.1 mm",
+        ),
+    ],
+)
+def test_a_part_that_cannot_be_meshed_is_one_line_with_the_place(tmp_path, holes, said):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE.replace("fillet: 0.05 mm", f"fillet: 0.05 mm, holes: [{holes}]"), encoding="utf-8")
+    result = cfmkit.analyze(cfmkit.load(path).replace(COARSE))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert not result.curves
+    assert said in result.message
+    assert result.message.startswith("the part cannot be meshed: ")
+    assert "mechanism.part" in result.message
+    assert "\n" not in result.message
+
+
+def test_a_solver_that_stops_on_the_way_leaves_the_curve_up_to_there(monkeypatch, tmp_path):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE, encoding="utf-8")
+    spec = cfmkit.load(path).replace({**COARSE, "analysis.travel": "0.2 mm"})
+    whole = cfmkit.analyze(spec)
+    solve = SolidProblem.solve
+    stops = lambda self, guess, travel: solve(self, guess, travel) if travel < 0.16e-3 else None  # noqa: E731
+    monkeypatch.setattr(SolidProblem, "solve", stops)
+    result = cfmkit.analyze(spec)
+    assert result.status is Status.PARTIAL
+    assert "ends_early" in {found.name for found in result.warnings}
+    assert 0.1e-3 <= float(result.curve.motion[-1]) < 0.16e-3
+    count = len(result.curve.motion)
+    assert result.curve.effort == pytest.approx(whole.curve.effort[:count], rel=1e-3)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import GeometryError
 from cfmkit.solid.edge_rings import Ring
-from cfmkit.solid.elements import Elements, equivalent
+from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import Mesh, mesh
 from cfmkit.solid.meshed_part import HeldOrDriven, Part
@@ -82,6 +82,47 @@ def test_an_outline_that_crosses_itself_is_refused():
     bow = np.array([[0, 0], [1, 1], [1, 0], [0, 1]]) * 1e-2
     with pytest.raises(GeometryError, match="crosses itself"):
         mesh((Ring.of(bow, False),), 1e-3)
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        [[0, 0], [20, 0], [20, 0.001], [0, 2]],
+        [[0, 0], [20, 0], [0, 2]],
+        [
+            [0, 0],
+            [5, 0],
+            [5, 0.9999995],
+            [6, 0.9999995],
+            [6, 0],
+            [9, 0],
+            [9, 2],
+            [6, 2],
+            [6, 1],
+            [5, 1],
+            [5, 2],
+            [0, 2],
+        ],
+    ],
+    ids=["wedge", "needle", "neck"],
+)
+def test_a_part_that_is_thinner_than_elements_can_resolve_is_named_with_the_place(outline):
+    """Half a minute passed before, and the message asked for larger elements, which nothing would have changed."""
+    with pytest.raises(GeometryError, match=r"too thin, .* at \(.* mm, .* mm\): elements of 1 mm cannot resolve it"):
+        mesh((Ring.of(1e-3 * np.array(outline), False),), 1e-3)
+
+
+def test_a_hole_that_is_cut_beside_the_part_is_named():
+    rings = (Ring.of(box(0, 0, 10e-3, 4e-3), False), Ring.of(circle(1e-3) + np.array([20e-3, 2e-3]), True))
+    with pytest.raises(GeometryError, match=r"the hole round \(20 mm, 2 mm\) is not inside the outline"):
+        mesh(rings, 1e-3)
+
+
+def test_triangles_that_never_meet_the_outline_end_in_a_sentence(monkeypatch):
+    """Whatever the reason: halving pieces of the boundary ends, and what is reported is no mesh."""
+    monkeypatch.setattr("cfmkit.solid.mesh._missing", lambda _, laid: [np.zeros(1, int) for _ in laid])
+    with pytest.raises(GeometryError, match="the outline cannot be meshed"):
+        mesh((Ring.of(box(0, 0, 10e-3, 2e-3), False),), 1e-3)
 
 
 def test_outlines_that_cross_each_other_are_refused():
@@ -198,27 +239,76 @@ def test_a_cantilever_bends_as_timoshenko_says():
     assert course.poses[-1].stiffness == pytest.approx(1 / compliance, rel=3e-4)
 
 
-def plate_with_hole(width: float) -> tuple[SolidProblem, float]:
-    """Return a plate with a hole of radius 1 mm that is pulled, and its gross section [m2]."""
-    tall = 2.5 * width
-    rings = (Ring.of(box(-width / 2, -tall / 2, width / 2, tall / 2), False), Ring.of(circle(1e-3, 2000), True))
-    grid = mesh(rings, width / 10, share=0.15)
+def greatest_along(held: SolidProblem, end: float, near) -> tuple[float, float]:
+    """Return the largest stress along free edges where `near` says so, and the effort there, at a small travel."""
+    course = follow(held, [0.0, end])
+    moved = held.supports.displaced(course.poses[-1].unknowns, end)
+    stress, nodes = held.elements.along_edges(moved, np.zeros(len(held.elements.mesh.nodes), bool))
+    return float(np.abs(stress[near(nodes)]).max()), course.poses[-1].effort
+
+
+# gross stress concentration of a hole in a strip: [H] R. C. J. Howland, Phil. Trans. R. Soc. A 229 (1930) 49-86;
+# 0.05 is as good as Kirsch's wide plate: its factor differs from 3 by less than 0.3 %
+HOWLAND = {0.05: 3.0, 0.1: 3.03, 0.2: 3.14, 0.3: 3.36, 0.4: 3.74, 0.5: 4.32}
+
+
+@pytest.mark.parametrize(("share", "factor"), HOWLAND.items())
+def test_stress_beside_a_hole_is_kirschs_in_a_wide_plate_and_howlands_in_a_narrow_one(share, factor):
+    """Within 1 %. Rigid grips hinder the contraction: half a percent at 2.5 widths, nothing to be seen at four."""
+    radius, thickness = 1e-3, 1e-3
+    width = 2 * radius / share
+    tall = 4 * width
+    rings = (Ring.of(box(-width / 2, -tall / 2, width / 2, tall / 2), False), Ring.of(circle(radius, 2000), True))
+    grid = mesh(rings, width / 10, share=0.08)
     low = Group("low", at(grid, 1, -tall / 2), np.array([0.0, -tall / 2]))
     high = Group("high", at(grid, 1, tall / 2), np.array([0.0, tall / 2]), np.array([0.0, 1.0, 0.0]))
-    return problem(grid, [low, high]), width * 1e-3
+    hole = np.unique(grid.edges[grid.rings == 1])
+    peak, force = greatest_along(problem(grid, [low, high]), 1e-7, lambda nodes: np.isin(nodes, hole))
+    assert peak / (force / (width * thickness)) == pytest.approx(factor, rel=0.01)
 
 
-@pytest.mark.parametrize("ratio", [20.0, 4.0, 10 / 3])
-def test_stress_beside_a_hole_is_kirschs_in_a_wide_plate_and_howlands_in_a_narrow_one(ratio):
-    held, section = plate_with_hole(ratio * 1e-3 * 2)
-    course = follow(held, [0.0, 1e-6])
-    stress, _ = held.elements.stress(held.supports.displaced(course.poses[-1].unknowns, 1e-6))
-    share = 1 / ratio
-    # Howland's series as fitted by Heywood (1952), within 0.5 % for d/w below 0.65, of the gross section
-    heywood = (2 + (1 - share) ** 3) / (1 - share)
-    hole = np.unique(held.elements.mesh.edges[held.elements.mesh.rings == 1])
-    peak = equivalent(stress)[hole].max() / (course.poses[-1].effort / section)
-    assert peak == pytest.approx(heywood, rel=0.012)
+# Coefficients of [R] W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed., table 17.1, case 5:
+# rows of 1, sqrt(h/r), h/r; for tension those of h/r up to 2 and beyond
+SHOULDER = {
+    "bending": ((1.007, 1.0, -0.031), (-0.270, -2.404, 0.749), (0.677, 1.133, -0.904), (-0.414, 0.271, 0.186)),
+    "tension": ((1.007, 1.0, -0.031), (-0.114, -0.585, 0.314), (0.241, -0.992, -0.271), (-0.134, 0.577, -0.012)),
+}
+SHARP_SHOULDER = {
+    "bending": ((1.042, 0.982, -0.036), (-3.599, 1.619, -0.431), (6.084, -5.607, 1.158), (-2.527, 3.006, -0.691)),
+    "tension": ((1.042, 0.982, -0.036), (-0.074, -0.156, -0.010), (-3.418, 1.220, -0.005), (3.450, -2.046, 0.051)),
+}
+
+
+def shoulder(narrow: float, wide: float, radius: float) -> Mesh:
+    """Return a bar along x that narrows at x = 0, with fillets of a radius less than the step."""
+    turn = np.linspace(0, np.pi / 2, 40)
+    fillet = np.column_stack([radius * (1 - np.sin(turn)), 0.5 * narrow + radius * (1 - np.cos(turn))])
+    upper = np.vstack([[[3 * wide, 0.5 * narrow]], fillet, [[0, 0.5 * wide], [-3 * wide, 0.5 * wide]]])
+    return mesh((Ring.of(np.vstack([upper, (upper * [1, -1])[::-1]]), False),), 0.12 * narrow, share=0.1)
+
+
+@pytest.mark.parametrize("load", ["tension", "bending"])
+@pytest.mark.parametrize(("wide", "radius"), [(15.0, 2.0), (20.0, 3.0), (20.0, 1.0)])
+def test_stress_in_a_shoulder_fillet_is_the_handbooks(load, wide, radius):
+    """Within 5 %, which is how well the formula follows its charts.
+
+    The charts are photoelastic; for shallow shoulders, wide / narrow of 1.2 and less, they are themselves 5 to 7 % low.
+    """
+    narrow, wide, radius = 10e-3, 1e-3 * wide, 1e-3 * radius
+    grid = shoulder(narrow, wide, radius)
+    driven, free = np.array([1.0, 0.0, 0.0]), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    if load == "bending":
+        driven, free = np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    root = Group("root", at(grid, 0, -3 * wide), np.array([-3 * wide, 0.0]))
+    tip = Group("tip", at(grid, 0, 3 * wide), np.array([3 * wide, 0.0]), driven, free)
+    here = lambda nodes: np.abs(grid.nodes[nodes, 0]) < 2 * radius  # noqa: E731
+    peak, effort = greatest_along(problem(grid, [root, tip]), 1e-7 if load == "tension" else 1e-5, here)
+    nominal = effort / (narrow * 1e-3) * (1.0 if load == "tension" else 6 / narrow)
+    step = 0.5 * (wide - narrow)
+    rows = (SHOULDER if step / radius <= 2 else SHARP_SHOULDER)[load]
+    factors = [a + b * np.sqrt(step / radius) + c * step / radius for a, b, c in rows]
+    handbook = sum(factor * (2 * step / wide) ** k for k, factor in enumerate(factors))
+    assert peak / nominal == pytest.approx(handbook, rel=0.05)
 
 
 # --- stability -----------------------------------------------------------------------------------------------------
