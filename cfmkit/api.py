@@ -424,13 +424,20 @@ def drawn_files(
 
 
 def _decks(spec: Spec) -> dict[str, bytes]:
-    """Return the elastic parts as decks of a finite-element solver."""
+    """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
     record = family(spec.family)
     if record.elastic_parts is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
+    from cfmkit.elastica.input_deck import beam_deck
     from cfmkit.solid.input_deck import deck
 
-    return {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in record.driven_parts(spec)}
+    parts = record.driven_parts(spec)
+    found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
+    steps = {one.name: len(one.stops) for one in parts}
+    for network in record.driven_networks(spec):
+        title = f"{spec.name}, {network.name} as beams"
+        found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
+    return found
 
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
@@ -361,6 +362,8 @@ class Family:
     elastic_parts : str, optional
         ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks
         of finite-element solvers; imported when exporting.
+    elastic_networks : str, optional
+        ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks.
     levels : tuple of str
         Dotted paths of the forces that its `design` block may ask for.
     headline : tuple of str
@@ -399,6 +402,7 @@ class Family:
     scheme: str | None = None
     outline: str | None = None
     elastic_parts: str | None = None
+    elastic_networks: str | None = None
     propose: str | None = None
     room: str | None = None
     levels: tuple[str, ...] = ()
@@ -434,6 +438,12 @@ class Family:
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
         found: tuple[DrivenPart, ...] = function_named(self.elastic_parts)(spec) if self.elastic_parts else ()
+        return found
+
+    def driven_networks(self, spec: Spec) -> tuple[DrivenNetwork, ...]:
+        """Return the elastic parts of a mechanism as networks of beams; none where the family has none."""
+        name = self.elastic_networks
+        found: tuple[DrivenNetwork, ...] = function_named(name)(spec) if name else ()
         return found
 
 

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit.elastica import Control, Displacement, trace
+from cfmkit.elastica.input_deck import beam_deck
 from cfmkit.errors import UsageError
+from cfmkit.families import family
+from cfmkit.families.vcfm.build import strip_of
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
 from cfmkit.families.vcfm.solid import part_of
 
@@ -42,7 +46,12 @@ def made():
 
 def test_a_deck_read_back_is_the_mesh_that_is_solved(made):
     spec, files = made
-    assert sorted(files) == ["vcfm-leaf.inp", "vcfm-spring.inp"]
+    assert sorted(files) == [
+        "vcfm-leaf-as-beams.inp",
+        "vcfm-leaf.inp",
+        "vcfm-spring-as-beams.inp",
+        "vcfm-spring.inp",
+    ]
     problem = part_of(spec, solved_leaf(spec)).meshed(1e-3).problem
     read = blocks(files["vcfm-leaf.inp"])
     nodes = np.array(numbers(next(lines for head, lines in read if head.startswith("*NODE, NSET=ALL"))))
@@ -86,6 +95,89 @@ def test_calculix_finds_the_same_force(made, tmp_path):
         force = re.findall(r"for set SHUTTLE-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+(\S+)", told)
         own = part_of(spec, piece).meshed(1e-3).followed([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
         assert -float(force[0][1]) / share == pytest.approx(own.course.poses[-1].effort, rel=1e-3)
+
+
+# --- the same parts as beams ---------------------------------------------------------------------------------------
+
+
+def force_at_the_end(folder, data):
+    """Return the reaction of the node DRIVE at the end of a deck that CalculiX has run [N]."""
+    (folder / "beams.inp").write_bytes(data)
+    subprocess.run(["ccx", "-i", "beams"], cwd=folder, check=True, capture_output=True, timeout=120)
+    told = (folder / "beams.dat").read_text()
+    return float(re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)", told, re.S)[-1])
+
+
+def test_a_deck_of_beams_read_back_is_the_network(made):
+    spec, files = made
+    read = blocks(files["vcfm-leaf-as-beams.inp"])
+    about, strip = spec.mechanism.bistable, strip_of(spec.mechanism.bistable, spec.mechanism.material)
+    nodes = {
+        int(row[0]): np.array(row[1:]) for head, lines in read if head == "*NODE, NSET=ALL" for row in numbers(lines)
+    }
+    rows = [row for head, lines in read if head.startswith("*ELEMENT, TYPE=B32") for row in numbers(lines)]
+    ends = {tuple(nodes[int(row[k])]) for row in rows for k in (1, 3)}
+    assert (0.0, 0.0, 0.0) in ends
+    assert any(end == pytest.approx((1e3 * strip.reach, 1e3 * strip.rise, 0.0)) for end in ends)
+    along = np.array([[nodes[int(row[k])] for k in (1, 2, 3)] for row in rows])
+    assert np.hypot(*(along[:, 2] - along[:, 0]).T[:2]).sum() == pytest.approx(1e3 * np.hypot(strip.reach, strip.rise))
+    assert along[:, 1] == pytest.approx(0.5 * (along[:, 0] + along[:, 2]))
+    (section,) = (numbers(lines) for head, lines in read if head.startswith("*BEAM SECTION"))
+    assert section == [[1e3 * about.width, 1e3 * about.thickness], [0, 0, 1]]
+    assert [numbers(lines) for head, lines in read if head == "*ELASTIC"] == [[[1477.0, 0.0]]]
+    moved = next(lines for head, lines in read if head == "*BOUNDARY")
+    assert [line for line in moved if line.endswith("0.8")]
+
+
+def test_links_of_a_deck_of_beams_are_stiff_and_every_set_that_is_used_is_there():
+    spec = cfmkit.load("configs/slider_crank_lumped.yaml", ["analysis.travel=[0 mm, 2 mm]"])
+    (network,) = family(spec.family).driven_networks(spec)
+    text = beam_deck("title", network, 10)
+    read = blocks(text)
+    links = [numbers(lines)[0] for head, lines in read if head == "*ELEMENT, TYPE=B32, ELSET=LINKS"]
+    assert len(links) == 2
+    made = {word for head, _ in read for word in re.findall(r"(?:^\*ELEMENT.*ELSET|^\*NODE.*NSET)=([\w-]+)", head)}
+    used = {
+        word for head, _ in read for word in re.findall(r"(?:SECTION, ELSET|PRINT, NSET|SPRING, ELSET)=([\w-]+)", head)
+    }
+    assert used <= made
+    heads = ("*NODE", "*NODE, NSET=ALL", "*NODE, NSET=DRIVE")
+    nodes = {int(row[0]) for head, lines in read if head in heads for row in numbers(lines)}
+    known = {int(word) for row in links for word in row[1:]}
+    assert known <= nodes
+
+
+def test_parts_that_are_turned_have_no_deck_of_beams(tmp_path):
+    path = tmp_path / "turned.yaml"
+    path.write_text(
+        """
+cfmkit: 1
+family: beam
+name: turned
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 1 mm
+  width: 5 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [30 mm, 0 mm]}}
+  beams: {leaf: {start: root, end: tip}}
+  drive: {kind: rotation, node: tip}
+  part: {fillet: 0.5 mm}
+analysis: {travel: 10 deg, points: 11, fidelity: solid, solid: {poses: 5, mesh: 1 mm}}
+""",
+        encoding="utf-8",
+    )
+    assert sorted(cfmkit.export(path, format="inp")) == ["beams.inp"]
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_calculix_finds_the_force_of_the_beams(made, tmp_path):
+    """Its beams become bricks with rigid ends: within 1 % of the engine's stretching and shearing beams."""
+    spec, _ = made
+    for network in family(spec.family).driven_networks(spec):
+        end = float(network.drive.points[-1])
+        drive = Displacement(network.drive.node, network.drive.direction, np.linspace(0.0, end, 9)[1:])
+        own = float(trace(network.network, drive, Control(branch="primary")).effort[-1])
+        assert force_at_the_end(tmp_path, beam_deck("title", network, 4)) == pytest.approx(own, rel=0.01)
 
 
 def test_what_has_no_elastic_part_has_no_deck():

@@ -31,6 +31,7 @@ FAMILY = Family(
     scheme="cfmkit.families.beam.dimension_drawing",
     outline="cfmkit.families.beam.outline",
     elastic_parts="cfmkit.families.beam.solid:elastic_parts",
+    elastic_networks="cfmkit.families.beam.solid:elastic_networks",
     levels=("design.rescale.force", "design.optimise.force.target"),
     propose="cfmkit.families.beam.proposals_for_wish:propose",
     room="cfmkit.families.beam.bounding_box:room",

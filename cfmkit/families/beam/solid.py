@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.outline import HeldPlace
@@ -196,6 +197,16 @@ def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
     """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = spec.replace({"analysis.fidelity": "solid"})
     return (driven_part(spec, assemble(spec)),)
+
+
+def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
+    """Return the same as beams, for decks of other solvers; none where it is driven by a rotation."""
+    from cfmkit.elastica import Displacement
+    from cfmkit.elastica.input_deck import DrivenNetwork
+
+    assembly = assemble(spec)
+    drive = assembly.drive()
+    return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
 
 
 def _thinnest(assembly: Assembly) -> float:

@@ -38,6 +38,7 @@ FAMILY = Family(
     scheme="cfmkit.families.slider_crank.dimension_drawing",
     outline="cfmkit.families.slider_crank.dispatch",
     elastic_parts="cfmkit.families.slider_crank.printed.solid:elastic_parts",
+    elastic_networks="cfmkit.families.slider_crank.printed.solid:elastic_networks",
     levels=("design.force",),
     propose="cfmkit.families.slider_crank.proposals_for_wish:propose",
     room="cfmkit.families.slider_crank.bounding_box:room",

@@ -28,6 +28,7 @@ FAMILY = Family(
     scheme="cfmkit.families.vcfm.dimension_drawing",
     outline="cfmkit.families.vcfm.outline",
     elastic_parts="cfmkit.families.vcfm.solid:elastic_parts",
+    elastic_networks="cfmkit.families.vcfm.exact_model:elastic_networks",
     levels=("design.force",),
     propose="cfmkit.families.vcfm.proposals_for_wish:propose",
     room="cfmkit.families.vcfm.bounding_box:room",

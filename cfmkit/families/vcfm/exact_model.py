@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
+    from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.leaves.springs import Coils
     from cfmkit.families.vcfm.leaves.strip import LeafStrip
@@ -108,6 +109,20 @@ def spring_chain(spec: VcfmSpec) -> SpringChain:
     )
     travel, count = {"diamond": (0.5, 2.0), "folded": (0.5, 4.0), "straight": (1.0, 2.0)}[about.structure]
     return SpringChain(network, "end", travel, count * share)
+
+
+def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:
+    """Return leaf and, unless it is bought, spring as beams with their travels, for decks of other solvers."""
+    from cfmkit.elastica import Displacement
+    from cfmkit.elastica.input_deck import DrivenNetwork
+
+    found = [DrivenNetwork("vcfm-leaf", leaf_network(spec), Displacement("shuttle", DOWN, np.array([spec.travel])))]
+    if spec.mechanism.springs is None:
+        chain = spring_chain(spec)
+        end = chain.travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
+        drive = Displacement(chain.node, DOWN, np.array([end]))
+        found.append(DrivenNetwork("vcfm-spring", chain.network, drive))
+    return tuple(found)
 
 
 class ExactSampler:

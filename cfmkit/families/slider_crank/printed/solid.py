@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
@@ -185,6 +186,25 @@ def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
     spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
     linkage = linkage_of(spec.mechanism)
     return (driven_part(as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))),)
+
+
+def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
+    """Return the same leg as beams, for decks of other solvers."""
+    from cfmkit.elastica import Displacement
+    from cfmkit.elastica.input_deck import DrivenNetwork
+    from cfmkit.families.slider_crank.printed.assembly import lumped_chain, strip_of
+    from cfmkit.families.slider_crank.printed.chain import SLIDER
+
+    spec = resolve(spec)
+    linkage = linkage_of(spec.mechanism)
+    unloaded = unloaded_angle(spec.mechanism, linkage)
+    _, end = as_run(spec, linkage, unloaded).analysis.travel or (0.0, 0.0)
+    if spec.piece == "beam":
+        network = strip_of(spec.mechanism, linkage, unloaded).network(elasticity(spec.mechanism))
+    else:
+        chain = lumped_chain(spec.mechanism, linkage, unloaded)
+        network = chain.build(chain.points)
+    return (DrivenNetwork("slider-crank", network, Displacement(SLIDER, travel_direction(linkage), np.array([end]))),)
 
 
 def _stops(spec: SliderCrankSpec) -> list[float]:
