@@ -29,7 +29,7 @@ def _own_folder() -> Path:
 
 def _is_writable(folder: Path) -> bool:
     """Return whether a folder can be written, or made: then the nearest of those above it that exists counts."""
-    there = next((one for one in (folder, *folder.parents) if one.exists()), Path("/"))
+    there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("/"))
     return os.access(there, os.W_OK | os.X_OK)
 
 

@@ -98,6 +98,20 @@ def test_code_is_kept_whole_and_for_this_user_alone(folder: Path) -> None:
     assert disk_cache.stamp()[:24] in file.name
 
 
+def test_code_that_one_user_compiled_can_be_read_by_all_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "package"
+    monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([package]))
+    assert disk_cache.write("door", CODE) == package
+    assert package.stat().st_mode & 0o777 == 0o755
+
+
+def test_a_folder_that_cannot_be_looked_into_is_passed_over(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    disk_cache.write("door", CODE)
+    # what others may not enter, to whoever runs the tests: a name too long is refused to the system's owner as well
+    monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([Path("/" + 300 * "x"), folder]))
+    assert disk_cache.read("door") == CODE
+
+
 def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for path in Path(disk_cache.__file__).parent.glob("*.py"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
@@ -456,6 +470,7 @@ logging.basicConfig(level=logging.INFO, format="%(message)s")
 disk_cache._lasting = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
 code = machine_code.Code((), b"code")
 before = disk_cache.read("door") == code
+disk_cache.write("window", code)
 print(disk_cache.write("door", code), before, disk_cache.read("door") == code)
 """
 

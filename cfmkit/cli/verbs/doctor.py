@@ -118,7 +118,7 @@ def _caches() -> Iterator[Record]:
     from cfmkit.plots.font_cache import kept_lists
 
     for what, path in {"compiled solver": next(iter(folders())), "list of fonts": kept_lists()}.items():
-        files = [one for one in Path(path).glob("*") if one.is_file()] if Path(path).is_dir() else []
+        files = [one for one in Path(path).glob("*") if one.is_file()] if os.path.isdir(path) else []
         size = sum(one.stat().st_size for one in files)
         yield {"name": what, "path": str(path), "files": len(files), "megabytes": round(size / 1e6, 2)}
 

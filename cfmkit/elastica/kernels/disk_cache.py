@@ -100,11 +100,12 @@ def _found(name: str, ending: str) -> Iterator[Path]:
     """Yield the files of a door that only this user, or the system's owner, can have written."""
     for folder in _places():
         path = folder / _file(name, ending)
-        if path.exists():
-            if trusted(path):
-                yield path
-            else:
-                _LOG.info("compiled code in %s is not used: others can write there", folder)
+        if not os.path.exists(path):  # a folder that may not be looked into holds nothing for us; Path.exists() raises
+            continue
+        if trusted(path):
+            yield path
+        else:
+            _LOG.info("compiled code in %s is not used: others can write there", folder)
 
 
 def library(name: str) -> Path | None:
@@ -134,16 +135,22 @@ def write(name: str, code: Code) -> Path | None:
             own = private_folder("compiled") if folder is None else folder
             if own is None:
                 break
-            own.mkdir(mode=0o700, parents=True, exist_ok=True)
+            own.mkdir(mode=0o755, parents=True, exist_ok=True)  # one user compiles, all of them may read
             if not trusted(own):
                 continue
             _replace(own / _file(name, "code"), _written(code))
             _write_library(name, code, own)
             if folder is None:
-                _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", own)
+                _report_private(own)
             return own
     _LOG.info("no folder is writable: compiled code is not kept")
     return None
+
+
+@lru_cache(maxsize=1)
+def _report_private(folder: Path) -> None:
+    """Report once where compiled code went: every part of it goes there."""
+    _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", folder)
 
 
 def _write_library(name: str, code: Code, folder: Path) -> None:
