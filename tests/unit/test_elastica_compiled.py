@@ -98,7 +98,7 @@ def test_code_is_kept_whole_and_for_this_user_alone(folder: Path) -> None:
     assert disk_cache.stamp()[:24] in file.name
 
 
-def test_code_that_one_user_compiled_can_be_read_by_all_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_that_one_user_compiled_all_can_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "package"
     monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([package]))
     assert disk_cache.write("door", CODE) == package
