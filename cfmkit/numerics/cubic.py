@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import distinct
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -87,7 +89,7 @@ def inner_extremes(x: FloatArray, y: FloatArray) -> FloatArray:
     found = x[left][:, None] + np.where(inside, places, 0.0)
     heights = values_at(x, y, found.ravel()).reshape(found.shape)
     high, low = np.maximum(y[:-1], y[1:])[:, None], np.minimum(y[:-1], y[1:])[:, None]
-    return np.unique(found[inside & ((heights > high + least) | (heights < low - least))])
+    return distinct(found[inside & ((heights > high + least) | (heights < low - least))])
 
 
 def crossing(x: FloatArray, y: FloatArray, level: float) -> float | None:

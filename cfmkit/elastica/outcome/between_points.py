@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
@@ -103,7 +103,7 @@ class BetweenPoints:
     @cached_property
     def peaks(self) -> FloatArray:
         """Where the effort has an extreme between two points, (m,) [m or rad]."""
-        return read_only(np.setdiff1d(self.knots[0], self._points))
+        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()}))
 
     @cached_property
     def knots(self) -> tuple[FloatArray, FloatArray]:
@@ -224,7 +224,7 @@ class BetweenPoints:
     def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
         """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
         found = np.empty((len(wanted), self._y.shape[1]))
-        for stretch in np.unique(self._stretch[near]).tolist():
+        for stretch in distinct(self._stretch[near]).tolist():
             own, here = np.flatnonzero(self._stretch == stretch), self._stretch[near] == stretch
             found[here] = values_at(self._drive[own], self._y[own], wanted[here])
         return found

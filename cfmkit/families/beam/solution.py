@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.build import Assembly, mirror_axis, thickest_of
@@ -84,7 +84,7 @@ class Solution:
     @cached_property
     def with_ends(self) -> Solution:
         """The same with the ends of windows among the points of the curve."""
-        keep = np.union1d(self.keep, self.ends).astype(np.int64)
+        keep = distinct(np.array([*self.keep, *self.ends], np.int64))
         return self if len(keep) == len(self.keep) else replace(self, keep=read_only(keep, np.int64), ends=())
 
     @cached_property
