@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.families.base import Run, Sampled, function_named
-from cfmkit.metrics import split_name, window_of
+from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
 from cfmkit.studies.noted_metrics import metrics_of
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 POSES = 15
 """Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""
+
+CLEARLY = 0.01
+"""By so much of its terms a row is below zero where it contradicts the analysis, and not only by rounding."""
 
 NARROW = 0.02
 """A window that is a smaller share of the whole span has its ends only."""
@@ -96,14 +99,25 @@ class _RowsOfMargins:
                 for rows in [self._effort(plain, limits, one.over, k)]
             ]
             if found and all(rows is not None for rows in found):
-                self.rows += [(row, constant, number) for rows in found for row, constant in rows or ()]
-                return
+                added = [(row, constant, number) for rows in found for row, constant in rows or ()]
+                if not self._contradicted(added, one):
+                    self.rows += added
+                    return
         column = self._numbers + len(self.metrics)
         self.metrics.append(replace(metric, over=one.over, label=str(number)))
         if limits.min is not None:
             self.rows.append(({column: 1.0}, -limits.min, number))
         if limits.max is not None:
             self.rows.append(({column: -1.0}, limits.max, number))
+
+    def _contradicted(self, rows: list[tuple[dict[int, float], float, int]], one: Requirement) -> bool:
+        """Tell whether rows say that a requirement is missed which the analysis finds met: its points are too few."""
+        values = np.concatenate([*self.first.effort.values(), *self.first.stress])
+        for row, constant, _ in rows:
+            terms = [constant, *(weight * values[column] for column, weight in row.items())]
+            if sum(terms) < -CLEARLY * sum(map(abs, terms)):
+                return all(outcome.ok for outcome in check((one,), self.nominal))
+        return False
 
     @property
     def _numbers(self) -> int:

@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.studies.sensitivity.inverse import WIDEST, answered
+from cfmkit.studies.sensitivity.inverse import WIDEST, LimitsAlong, answered
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))
@@ -41,6 +41,45 @@ def test_an_error_that_moves_nothing_may_be_as_wide_as_is_looked_at():
 def test_no_tolerance_helps_where_a_perfect_part_is_bad_or_another_error_is_too_large():
     assert np.isnan(answered(np.array([-1.0]), np.ones((1, 2)), ERRORS, np.ones(2), 0.9).together).all()
     assert np.isnan(answered(np.array([0.1]), np.array([[0.0, 1.0]]), ERRORS, np.ones(2), 0.9).alone[0])
+
+
+def test_limits_with_a_corner_are_followed_on_both_of_its_sides():
+    # 4 - |e0| has no slope at 0, and allows 4 / 1.96 standard deviations all the same
+    offsets = np.array([-1.0, 0.0, 1.0])
+    corner, still = LimitsAlong(offsets, -abs(offsets)[:, None]), LimitsAlong(offsets, 0.0 * offsets[:, None])
+    assert corner(np.array([-3.0, -0.5, 0.0, 2.0]))[:, 0] == pytest.approx([-3.0, -0.5, 0.0, -2.0])
+    found = answered(np.array([4.0]), (corner, still), ERRORS, np.ones(2), 0.95)
+    assert found.alone == pytest.approx([4 / TWO_SIDED, WIDEST], rel=0.02)
+    assert found.share == pytest.approx(1.0, abs=1e-3)
+
+
+def test_costs_that_are_ages_apart_leave_every_tolerance_something():
+    by_error = np.array([[1.0, 1.0], [-1.0, -1.0]])
+    found = answered(np.array([4.0, 4.0]), by_error, ERRORS, np.array([1e300, 1e-300]), 0.95)
+    assert (found.allocated > 0).all()
+    assert found.allocated[0] == pytest.approx(4 / TWO_SIDED, rel=0.02)
+
+
+def test_tolerances_of_a_design_at_its_optimum_keep_the_yield_in_parts_that_are_solved():
+    # there the distance from the target grows with errors of either sign, and its slope says nothing
+    spec = cfmkit.load("configs/slider_crank_bilancia2019_optimum.yaml").replace({"analysis.points": 41})
+    parameters = {"mechanism.crank_length": {"normal": "0.05 mm"}}
+    found = cfmkit.sensitivity(spec, method="inverse", parameters=parameters, samples=150, min_yield="90 %")
+    assert found.summary["status"] == "complete"
+    assert found.summary["yield"]["value"] == pytest.approx(0.9, abs=0.06)
+    width = found.summary["indices"][0]["value"]
+    assert 0.001 < width < 0.01  # [mm]: one slope would allow 0.03, and 19 % of parts are good then
+
+
+def test_a_tolerance_that_does_not_exist_is_an_answer():
+    spec = cfmkit.load("configs/slider_crank_bilancia2019_optimum.yaml").replace({"analysis.points": 41})
+    parameters = {"mechanism.crank_length": {"normal": "0.05 mm"}, "mechanism.springs.pivot": {"normal": "1 %"}}
+    found = cfmkit.sensitivity(spec, method="inverse", parameters=parameters, samples=20, min_yield="90 %")
+    alone = [one["value"] for one in found.summary["indices"] if one["index"] == "tolerance_alone"]
+    assert alone == [None, None]
+    assert found.summary["status"] != "partial"
+    (told,) = [one["message"] for one in found.summary["warnings"] if one["name"] == "not_stated"]
+    assert "even without the error of that parameter alone" in told
 
 
 def test_a_study_states_tolerances_and_judges_parts_within_them():

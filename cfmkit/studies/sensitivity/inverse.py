@@ -1,7 +1,8 @@
 """The inverse of a tolerance study: which tolerance on each parameter keeps the yield at what is asked.
 
-Requirements become rows of force and stress at a few poses, which move in proportion to the errors (`studies.margins`).
-With them the yield of any set of tolerances is known to first order without one more solution. Three answers follow:
+Requirements become rows of force and stress at a few poses (`studies.margins`). How they move with each error alone is
+known exactly at some of its sizes and linear between; errors of several parameters add. With that the yield of any set
+of tolerances is estimated without one more solution. Three answers follow:
 
 - alone: how wide one tolerance may be while all others stay as they are stated;
 - together: all of them by one factor;
@@ -28,8 +29,39 @@ if TYPE_CHECKING:
 WIDEST = 20.0
 """A tolerance is not made wider than so many times what is stated: first order does not reach farther."""
 
-ROUNDS = 40
-"""Bisections."""
+ROUNDS = 26
+"""Bisections: to a millionth of what is stated."""
+
+CLOSE = 1e-3
+"""Of the widest tolerance the narrowest of an allocation has at least so much: no cost is beyond all others."""
+
+
+@dataclass(frozen=True)
+class LimitsAlong:
+    """How limits move with the error of one parameter.
+
+    Attributes
+    ----------
+    offsets : (p,) array
+        Errors at which that is known, increasing, 0 among them.
+    changes : (p, m) array
+        Of the limits there.
+    """
+
+    offsets: FloatArray
+    changes: FloatArray
+
+    def __call__(self, errors: FloatArray) -> FloatArray:
+        """Return the changes of the limits for errors (k,), linear between the offsets and beyond, (k, m)."""
+        at = np.clip(np.searchsorted(self.offsets, errors) - 1, 0, len(self.offsets) - 2)
+        share = ((errors - self.offsets[at]) / np.diff(self.offsets)[at])[:, None]
+        return np.asarray((1.0 - share) * self.changes[at] + share * self.changes[at + 1])
+
+
+def in_proportion(by_error: FloatArray) -> tuple[LimitsAlong, ...]:
+    """Return limits that move in proportion to each error, from their derivatives (m, d)."""
+    ends = np.array([-1.0, 0.0, 1.0])
+    return tuple(LimitsAlong(ends, ends[:, None] * one) for one in by_error.T)
 
 
 @dataclass(frozen=True)
@@ -41,7 +73,7 @@ class ToleranceFactors:
     alone, together, allocated : (d,) array
         For each parameter.
     share : float
-        Yield as stated, to first order.
+        Yield as stated, as estimated.
     perfect : float
         Yield without errors, 0 or 1.
     """
@@ -54,7 +86,11 @@ class ToleranceFactors:
 
 
 def answered(
-    rows: FloatArray, by_error: FloatArray, errors: FloatArray, costs: FloatArray, wanted: float
+    rows: FloatArray,
+    by_error: FloatArray | tuple[LimitsAlong, ...],
+    errors: FloatArray,
+    costs: FloatArray,
+    wanted: float,
 ) -> ToleranceFactors:
     """Return the factors on tolerances that keep a yield.
 
@@ -62,8 +98,8 @@ def answered(
     ----------
     rows : (m,) array
         Limits of a perfect part; at least zero where they hold.
-    by_error : (m, d) array
-        Their derivatives by the errors.
+    by_error : (m, d) array or d LimitsAlong
+        Their derivatives by the errors, or how they move with each.
     errors : (k, d) array
         Errors of parts as the tolerances are stated.
     costs : (d,) array
@@ -71,21 +107,27 @@ def answered(
     wanted : float
         The yield.
     """
-
-    def share(factors: FloatArray) -> float:
-        return float((rows + (errors * factors) @ by_error.T >= 0).all(axis=1).mean())
-
+    along = by_error if isinstance(by_error, tuple) else in_proportion(by_error)
+    stated = [one(error) for one, error in zip(along, errors.T, strict=True)]
+    all_moved: FloatArray = np.sum(stated, axis=0)
     ones = np.ones(errors.shape[1])
 
+    def good(moved: FloatArray) -> float:
+        return float((rows + moved >= 0).all(axis=1).mean())
+
+    def share(factors: FloatArray) -> float:
+        return good(np.sum([one(f * error) for one, f, error in zip(along, factors, errors.T, strict=True)], axis=0))
+
     def one(k: int) -> Callable[[float], float]:
-        return lambda f: share(np.where(np.arange(len(ones)) == k, f, 1.0))
+        others = all_moved - stated[k]
+        return lambda f: good(others + along[k](f * errors[:, k]))
 
     alone = np.array([_largest(one(k), wanted) for k in range(len(ones))])
-    shape = _shape(rows, by_error, errors, costs)
+    shape = _shape(rows, np.array([moved.std(axis=0) for moved in stated]).T, costs)
     together = _largest(lambda f: share(f * ones), wanted)
     allocated = _largest(lambda f: share(np.minimum(f * shape, WIDEST)), wanted)
     return ToleranceFactors(
-        alone, together * ones, np.minimum(allocated * shape, WIDEST), share(ones), share(0.0 * ones)
+        alone, together * ones, np.minimum(allocated * shape, WIDEST), good(all_moved), good(0.0 * all_moved)
     )
 
 
@@ -102,15 +144,15 @@ def _largest(share: Callable[[float], float], wanted: float) -> float:
     return low
 
 
-def _shape(rows: FloatArray, by_error: FloatArray, errors: FloatArray, costs: FloatArray) -> FloatArray:
-    """Return in which proportion tolerances of least cost stand, their mean 1."""
-    moved = by_error[:, None, :] * errors.std(axis=0)
-    spread = np.sqrt((moved**2).sum(axis=(1, 2)))
+def _shape(rows: FloatArray, moved: FloatArray, costs: FloatArray) -> FloatArray:
+    """Return in which proportion tolerances of least cost stand, their mean 1; moved (m, d): what each adds."""
+    spread = np.sqrt((moved**2).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         near = np.where(spread > 0, np.exp(-0.5 * np.clip(rows / spread, 0.0, 30.0) ** 2), 0.0)
     # what a limit loses counts as often as it is missed
     weights = near / near.sum() if near.sum() > 0 else np.full(len(rows), 1.0 / len(rows))
-    scaled = np.where(spread[:, None] > 0, (moved[:, 0, :] / np.maximum(spread, 1e-300)[:, None]) ** 2, 0.0)
+    scaled = np.where(spread[:, None] > 0, (moved / np.maximum(spread, 1e-300)[:, None]) ** 2, 0.0)
     adds = np.maximum(weights @ scaled, 1e-9)
-    found: FloatArray = (costs / adds) ** (1.0 / 3.0)
+    found: FloatArray = (costs / costs.max() / adds) ** (1.0 / 3.0)
+    found = np.maximum(found, CLOSE * found.max())
     return np.asarray(found / found.mean())

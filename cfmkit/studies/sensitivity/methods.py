@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 DEFAULT_YIELD, ESTIMATED = 0.95, 4000
 """What `inverse` keeps where `min_yield` says nothing, and the parts of its estimate of first order."""
 
+LOOKS, NEAR, LEAST_FACTOR, ROUGHLY = 4, 1.3, 1e-6, 500
+"""How often `inverse` looks at the limits, what it takes for the same tolerance, the least part of a stated one, and
+the parts that tell where to look again."""
+
 DRAWN = "drawn"
 """The role of a sample of a Monte Carlo run."""
 
@@ -204,17 +208,14 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
 
 def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     """State which tolerances keep the yield, and draw parts within those that are allocated."""
-    from cfmkit.studies.margins import rows_by_errors
-
-    spec, wanted = setup.study.spec, setup.block.min_yield or DEFAULT_YIELD
+    wanted = setup.block.min_yield or DEFAULT_YIELD
     spreads = [one.spread for one in setup.parameters]
-    rows, by_error = rows_by_errors(spec, setup.nominal.result, setup.parameters)
     unit = draw(setup.correlation, ESTIMATED, np.random.default_rng([setup.seed, 3]))
     errors = values_at(spreads, unit) - setup.values
     costs = np.array([setup.block.costs.get(path, 1.0) for path in setup.paths])
-    answer = inverse.answered(rows, by_error, errors, costs, wanted)
+    answer = _answered(setup, errors, costs, wanted)
     found = list(_tolerance_lines(setup, answer))
-    factors = np.where(np.isfinite(answer.allocated), answer.allocated, 1.0)
+    factors = np.where(np.isfinite(answer.allocated), np.maximum(answer.allocated, LEAST_FACTOR), 1.0)
     tight = [one.tightened(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
 
     def drawn(start: int, number: int) -> FloatArray:
@@ -231,6 +232,22 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     each = (tolerance.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
     whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
     return replace(plain, all_met=tolerance.yield_of(whole, failed, setup.policy), each_met=tuple(each))
+
+
+def _answered(setup: Setup, errors: FloatArray, costs: FloatArray, wanted: float) -> inverse.ToleranceFactors:
+    """Return the factors on the tolerances; limits are looked at again where these now end."""
+    from cfmkit.studies.margins import rows_along_errors
+
+    result, factors = setup.nominal.result, np.ones(len(setup.parameters))
+    for _ in range(LOOKS):
+        rows, along = rows_along_errors(setup.study.spec, result, setup.parameters, factors)
+        answer = inverse.answered(rows, along, errors[:ROUGHLY], costs, wanted)
+        ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
+        ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else inverse.WIDEST)
+        if (np.abs(np.log(ends / factors)) < np.log(NEAR)).all():
+            break
+        factors = ends
+    return inverse.answered(rows, along, errors, costs, wanted)
 
 
 def _tolerance_lines(setup: Setup, answer: inverse.ToleranceFactors) -> Iterator[IndexLine]:

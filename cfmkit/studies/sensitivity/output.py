@@ -82,7 +82,8 @@ def exit_code(found: Findings) -> ExitCode:
     if evaluator.count and evaluator.failed == evaluator.count and not evaluator.ends[Status.TIMEOUT]:
         return ExitCode.NO_SOLUTION
     stated = found.setup.method == "local" and not found.lacking
-    if (evaluator.failed and not stated) or found.lacking:
+    # a tolerance that does not exist is an answer
+    if (evaluator.failed and not stated) or (found.lacking and found.setup.method != "inverse"):
         return ExitCode.PARTIAL
     missed = not all(outcome.ok for outcome in found.setup.nominal.outcomes) or not yield_ok(found)
     return ExitCode.REQUIREMENT_MISSED if missed else ExitCode.OK
@@ -122,7 +123,11 @@ def warnings(found: Findings) -> tuple[Finding, ...]:
         extra.append(Finding("failed_samples", told))
     elif found.unstated and not found.interrupted:
         told = f"{found.unstated} indices are not stated: "
-        told += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
+        if setup.method == "inverse":
+            told = f"{found.unstated} tolerances are not stated: even without the error of that parameter alone, "
+            told += "or of all, the yield would stay too low"
+        else:
+            told += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
         extra.append(Finding("not_stated", told))
     return (*setup.warnings, *extra)
 
