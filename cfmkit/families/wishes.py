@@ -108,6 +108,19 @@ class Candidate:
     promise: float = 0.0
 
 
+def called(variant: str, wish: Wish, block: MaterialBlock) -> str:
+    """Return what a variant is called: with its material where the wish allows several.
+
+    Examples
+    --------
+    >>> wish = Wish("force", 1.0, 1.0, 1.0, False, 1.0, 0.1, (1.0, 1.0), ({"name": "pla"}, {"name": "pom"}))
+    >>> called("2 Vs", wish, wish.materials[1])
+    '2 Vs, pom'
+    """
+    name = block.get("name") if len(wish.materials) > 1 else None
+    return f"{variant}, {name}" if name else variant
+
+
 @dataclass(frozen=True)
 class FamilyOffer:
     """What a family could do with a wish.

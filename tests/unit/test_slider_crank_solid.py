@@ -48,6 +48,11 @@ def test_the_stress_map_is_drawn_and_there_is_no_film(strip):
     assert api.figures(strip["solid"])["stress_map"]().axes
 
 
+def test_a_mirrored_pair_has_twice_the_force(strip):
+    pair = api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm", "mechanism.copies=mirrored"))
+    assert pair.curve.effort == pytest.approx(2.0 * strip["solid"].curve.effort, rel=1e-9)
+
+
 def test_flexures_are_solved_with_their_own_widths():
     part = part_of(spec("lumped", "analysis.fidelity=solid"))
     assert part.width == pytest.approx(2.621e-3)

@@ -136,6 +136,73 @@ def test_a_part_of_which_nobody_knows_the_errors_misses_a_wish_for_good_parts():
     assert "its yield is not known" in " ".join(made(ProposalJob("slider-crank", flexures, asked, 0)).missed)
 
 
+def offered(name, **keys):
+    asked = wish(**keys)
+    return asked, function_named(family(name).propose)(asked, Run()).candidates
+
+
+@pytest.mark.parametrize("variant", ["2 Vs, folded spring", "2 cosine arches"])
+def test_other_springs_and_leaves_do_what_is_wished(variant):
+    asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]")
+    one = made(ProposalJob("vcfm", next(each for each in candidates if each.variant == variant), asked, 0))
+    assert one.good, one.missed or one.message
+    kinds = one.spec.mechanism.kinds
+    assert kinds == {"2 Vs, folded spring": ("folded", "v-beam"), "2 cosine arches": ("diamond", "cosine")}[variant]
+
+
+@pytest.mark.slow
+def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
+    asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]", ripple="9 %")
+    hybrid = next(each for each in candidates if each.variant == "2 hybrid Vs")
+    one = made(ProposalJob("vcfm", hybrid, asked, 0))
+    assert one.good, one.missed or one.message
+    assert one.spec.mechanism.bistable.structure == "hybrid"
+
+
+def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
+    keys = {"force": "20 N", "room": "[120 mm, 80 mm, 20 mm]", "material": "aluminium-7075-t6", "ripple": "5 %"}
+    asked, candidates = offered("slider-crank", **keys)
+    found = {}
+    for variant in ("strip", "pair of strips"):
+        first = next(each for each in candidates if each.variant == variant)
+        found[variant] = made(ProposalJob("slider-crank", first, asked, 0))
+        assert found[variant].good, found[variant].missed
+    pair, single = (found[name].numbers for name in ("pair of strips", "strip"))
+    assert pair["parts"] == 2
+    assert 0.4 < pair["depth"] / single["depth"] < 0.7
+    assert pair["across"] > 1.9 * single["across"]
+
+
+def test_catalogue_springs_of_a_cam_take_the_depth_of_their_own_coil():
+    asked, candidates = offered("cam", room="[80 mm, 60 mm, 20 mm]")
+    one = next(each for each in candidates if each.variant == "catalogue springs")
+    made_of = made(ProposalJob("cam", one, asked, 0))
+    assert made_of.good, made_of.missed or made_of.message
+    springs, plate = made_of.spec.mechanism.springs, made_of.spec.mechanism.contact.width
+    assert springs.name.startswith("generic-extension")
+    coils = min(springs.count, 2) * (springs.wound.coil + springs.wound.wire)
+    assert made_of.numbers["depth"] == pytest.approx(3.0 * plate + coils)
+
+
+def test_proposals_of_several_materials_say_which():
+    _, candidates = offered("beam", material="[pom, pla]", room="[80 mm, 60 mm]")
+    assert {each.variant.rpartition(", ")[2] for each in candidates} == {"pom", "pla"}
+
+
+def test_equal_names_are_told_apart_by_their_size():
+    def proposal(across):
+        return Proposal("cam", "2 springs", numbers={"across": across, "along": 0.05})
+
+    names = [one.variant for one in search.distinct([proposal(0.03), proposal(0.04), proposal(0.04)])]
+    assert names == ["2 springs, 30 x 50 mm", "2 springs, 40 x 50 mm (1)", "2 springs, 40 x 50 mm (2)"]
+    assert search.distinct([proposal(0.03)])[0].variant == "2 springs"
+
+
+def test_a_key_of_a_wish_is_listed_as_it_is_written():
+    with pytest.raises(SpecError, match="cycles, yield, prefer"):
+        wish(colour="red")
+
+
 def test_a_search_without_time_has_asked_and_ends_with_6():
     found = suggest(wish(), Run(time_budget=0.0))
     assert found.late

@@ -25,7 +25,7 @@ from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
-from cfmkit.families.wishes import Candidate, FamilyOffer
+from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
 from cfmkit.stock.spec import MaterialSpec
@@ -184,7 +184,8 @@ def _sized(
         )
     spec = _written(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
-    return Candidate(f"shape {kept.name}", spec, False, "cfmkit.families.beam.proposals_for_wish:finish", area)
+    variant = called(f"shape {kept.name}", wish, block)
+    return Candidate(variant, spec, False, "cfmkit.families.beam.proposals_for_wish:finish", area)
 
 
 def _width(wish: Wish, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:

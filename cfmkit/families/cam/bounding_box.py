@@ -36,8 +36,8 @@ def room(result: Result) -> Room | None:
     high = max(*pins, float(path[:, 1].max()) + radius, float(plate[:, 3].max()))
     thick = PLATE if mechanism.contact is None else mechanism.contact.width
     depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
-    told = (
-        f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, springs wound of steel wire"
+    told = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, " + (
+        f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
     )
     if depth is None:
         told = "no steel spring fits between the rollers"
@@ -50,7 +50,7 @@ BRACE = 0.010
 
 
 def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
-    """Return the depth with springs that are wound of steel wire [m]; None where no such spring fits.
+    """Return the depth with springs of a known wire, else wound of steel wire [m]; None where no such spring fits.
 
     Parameters
     ----------
@@ -62,8 +62,14 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
         Their largest elongation, and half their length at rest [m].
     """
     count = count_of(springs)
-    coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
-    return None if coil is None else thick + 2.0 * min(thick, BRACE) + min(count, 2) * coil.outer_diameter
+    if springs.wound is not None:
+        outer = springs.wound.coil + springs.wound.wire
+    else:
+        coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
+        if coil is None:
+            return None
+        outer = coil.outer_diameter
+    return thick + 2.0 * min(thick, BRACE) + min(count, 2) * outer
 
 
 def count_of(springs: Springs) -> int:

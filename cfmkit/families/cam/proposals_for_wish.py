@@ -11,6 +11,8 @@ Reference
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from cfmkit.families.cam.bounding_box import depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.spec import CamSpec, Springs
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.wishes import Candidate, FamilyOffer
+from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
 
@@ -34,7 +36,7 @@ FRICTION = 0.002
 DRAWN = 60_000
 """Proportions that are looked at."""
 
-OFFERED = 12
+OFFERED = 16
 """Designs that are worth being made."""
 
 TAB, TOP, HOLE = 0.06, 0.02, 0.0066
@@ -72,8 +74,8 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
     candidates: list[Candidate] = []
     for index in chosen:
         made = _candidate(wish, {name: float(values[index]) for name, values in found.items()})
-        candidates += [made] if made else []
-        if len(candidates) == OFFERED:
+        candidates += [made, _from_catalogue(made)] if made else []
+        if len(candidates) >= OFFERED:
             break
     if not candidates:
         depth = "" if wish.depth is None else f" within a depth of {mm(wish.depth)}"
@@ -158,6 +160,12 @@ def _candidate(wish: Wish, size: dict[str, float]) -> Candidate | None:
     return None
 
 
+def _from_catalogue(made: Candidate) -> Candidate:
+    """Return the same proportions with springs of the generic series; from these the force constant follows."""
+    spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
+    return replace(made, variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant), spec=spec)
+
+
 def _written(
     wish: Wish, size: dict[str, float], material: dict[str, Any], thick: float, count: int, total: float
 ) -> Candidate:
@@ -188,7 +196,7 @@ def _written(
     }
     spec = CamSpec.model_validate(data)
     area = size["width"] * size["height"] / (wish.room[0] * wish.room[1])
-    variant = f"{count} spring{'s' if count > 1 else ''}"
+    variant = called(f"{count} spring{'s' if count > 1 else ''}", wish, material)
     return Candidate(variant, spec, design=True, promise=area + size["ripple"] / wish.ripple)
 
 

@@ -28,7 +28,10 @@ def room(result: Result) -> Room | None:
 
 
 def _part(result: Result) -> Room:
-    """Return the box of a printed part: as it is cut, and as its centre line moves; legs lie above each other."""
+    """Return the box of a printed part: as it is cut, and as its centre line moves; legs lie above each other.
+
+    A mirrored pair is drawn apart from each other, and so needs a little less than is said.
+    """
     spec: Any = result.spec
     solution = result.state
     path = solution.pressed.path
@@ -43,8 +46,9 @@ def _part(result: Result) -> Room:
     pad = np.array([high[0] - rest[0] if rest[0] > 0.0 else low[0] - rest[0], 0.0])
     moved = np.concatenate([points - half, points + half, ends + pad])
     low, high = np.minimum(low, moved.min(axis=0)), np.maximum(high, moved.max(axis=0))
-    legs, corner = spec.mechanism.legs, (float(low[0]), float(low[1]))
-    return Room(float(high[1] - low[1]), float(high[0] - low[0]), legs * _widest(spec), legs, "", corner, True)
+    parts, corner = spec.mechanism, (float(low[0]), float(low[1]))
+    depth = parts.legs * _widest(spec)
+    return Room(float(high[1] - low[1]), float(high[0] - low[0]), depth, parts.sets, "", corner, True)
 
 
 def _thickest(spec: SliderCrankSpec) -> float:

@@ -44,7 +44,7 @@ def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
         return None
     model = "lumped" if spec.fidelity == "lumped" else "beam"
     ends = float(places[0]), float(places[-1])
-    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.legs, ends, False)  # type: ignore[arg-type]
+    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.sets, ends, False)  # type: ignore[arg-type]
     return Sampled({"load": np.asarray(solution.force)}, np.asarray(solution.stress)[None])
 
 

@@ -8,7 +8,7 @@ the family's own design.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.slider_crank.bounding_box import PIN
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.wishes import Candidate, FamilyOffer
+from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
 
@@ -62,6 +62,9 @@ PADS = (0.031, 0.040)
 """What the pads at both ends of a printed part add across the slider's way and along it [m]: twice their length, and
 the corners of the inclined one."""
 
+PAIR_GAP = (0.1, 4e-3)
+"""Between the parts of a mirrored pair: a share of one's height, and a length [m], as they are drawn."""
+
 DOUBT = 3.0
 """So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
 
@@ -87,6 +90,9 @@ TURNED = (
 """For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019."""
 
 OFFERED = 24
+
+PART = "cfmkit.families.slider_crank.proposals_for_wish:part"
+"""What finishes the parts of one piece."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -189,6 +195,9 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
             travel = start * wish.travel, (1.0 + start) * wish.travel * (1.0 + 1e-6)
             if travel[1] <= lengths.reach * size * printed:
                 found += _parts(wish, lengths, size * printed, travel, (size in SIZES[:2], start == STARTS[-1]))
+            pair = size * pair_size(wish, lengths)
+            if travel[1] <= lengths.reach * pair:
+                found += _pairs(wish, lengths, pair, travel)
             if travel[1] <= lengths.reach * size * pinned and wish.depth is None and start == STARTS[0]:
                 found.append(_springs(wish, lengths, size * pinned, travel))
     return found
@@ -208,6 +217,23 @@ def _parts(
             found.append(_flexures(wish, block, lengths, crank, travel))
         if all(more) and wide <= DOUBT * deep:
             found.append(_tapered(wish, block, lengths, crank, travel))
+    return found
+
+
+def pair_size(wish: Wish, lengths: Proportions) -> float:
+    """Return the crank's length of the largest mirrored pair that fits the room [m]: two heights and a gap."""
+    one = (wish.room[0] - PAIR_GAP[1]) / (2.0 + PAIR_GAP[0])
+    return min((one - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
+
+
+def _pairs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, float]) -> list[Candidate]:
+    """Return mirrored pairs of strips, each half as wide as one strip; the guide of the slider carries nothing."""
+    found = []
+    for block in _materials(wish):
+        if 0.5 * strip_width(wish, block, crank) <= DOUBT * (wish.depth or max(wish.room)):
+            plain = _strip(wish, block, lengths, crank, travel)
+            spec = plain.spec.replace({"mechanism.copies": "mirrored"})
+            found.append(replace(plain, variant=plain.variant.replace("strip", "pair of strips"), spec=spec))
     return found
 
 
@@ -277,7 +303,13 @@ def _strip(
         "analysis": _analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("strip", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:part", _rank(crank, wish))
+    return Candidate(
+        called("strip", wish, material),
+        spec,
+        True,
+        PART,
+        _rank(crank, wish),
+    )
 
 
 def _tapered(
@@ -289,7 +321,9 @@ def _tapered(
     wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})
-    return Candidate("tapered strip", spec, True, plain.finish, LATER + abs(crank / wish.room[1] - 0.35))
+    return Candidate(
+        called("tapered strip", wish, material), spec, True, plain.finish, LATER + abs(crank / wish.room[1] - 0.35)
+    )
 
 
 def _flexures(
@@ -315,7 +349,13 @@ def _flexures(
         "analysis": _analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("flexures", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:part", _rank(crank, wish))
+    return Candidate(
+        called("flexures", wish, material),
+        spec,
+        True,
+        PART,
+        _rank(crank, wish),
+    )
 
 
 def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:

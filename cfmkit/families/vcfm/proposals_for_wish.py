@@ -7,19 +7,24 @@ closed form; what it refuses is not offered.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.design import closed_form
+from cfmkit.families.vcfm.other_structures import STRUCTURES, with_structure
 from cfmkit.families.vcfm.spec import VcfmSpec
-from cfmkit.families.wishes import Candidate, FamilyOffer
+from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.design import DesignSizes
+    from cfmkit.families.vcfm.spec import VcfmDesign
     from cfmkit.families.wishes import Wish
 
 SLENDERNESS = (3.7, 4.0, 4.5, 5.5, 7.0)
@@ -37,6 +42,11 @@ THICKER = (1.0, 1.6, 2.4)
 MIDDLE = (0.8, 0.9)
 """Share of the linear region that is used: the exact leaves depart from the line at its ends."""
 
+STRUCTURE_WORDS = {
+    "folded spring": "2 Vs, folded spring", "cosine arches": "2 cosine arches", "hybrid leaves": "2 hybrid Vs",
+}  # fmt: skip
+"""What two Vs are called with another structure."""
+
 SPRING_ANGLE = 7.0 * pi / 180.0
 """Of the diamond's leaves, as in Ding, Li and Li 2022."""
 
@@ -46,7 +56,10 @@ SAFETY = 1.03
 LITTLE = 0.02
 """Adjustment, over the force, where none is wished: every such mechanism has one."""
 
-OFFERED = 20
+TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid")
+"""Variants in the order in which they are tried, behind two Vs with a diamond."""
+
+OFFERED = 24
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -63,13 +76,14 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                 closest = excess, over
             if excess <= 1.0:
                 pairs = spec.mechanism.bistable.half_beams // 2
-                variant = f"{pairs} V{'s' if pairs > 1 else ', guided'}"
+                variant = called(f"{pairs} V{'s' if pairs > 1 else ', guided'}", wish, block)
                 promise = over["across"] * over["along"]
                 found.append(
                     Candidate(variant, spec, True, "cfmkit.families.vcfm.proposals_for_wish:finish", float(promise))
                 )
     if found:
-        return FamilyOffer(tuple(_varied(sorted(found, key=lambda one: one.promise))[:OFFERED]))
+        plain = sorted(found, key=lambda one: one.promise)
+        return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
     if closest is None:
         return FamilyOffer(
             reason=f"no leaf as thin as {mm(wish.thinnest)} or thicker, too wide to buckle out of the plane, has "
@@ -80,12 +94,17 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
     """Return candidates, those of different numbers of Vs by turns."""
-    kinds = list(dict.fromkeys(one.variant for one in found))
+    kinds = sorted(dict.fromkeys(one.variant for one in found), key=_turn)
     rows = [[one for one in found if one.variant == kind] for kind in kinds]
     # the smallest first, then larger ones, which are flatter
     turns = [[row[len(row) * part // 8] for part in (0, 4, 2, 6, 1, 7)] for row in rows]
     mixed = [row[k] for k in range(6) for row in turns]
     return [one for number, one in enumerate(mixed) if all(one is not other for other in mixed[:number])]
+
+
+def _turn(variant: str) -> int:
+    """Return when a variant has its turn: what is most often possible first, then what differs from it most."""
+    return next((k for k, words in enumerate(TURNS, 1) if variant.startswith(words)), 0)
 
 
 def _designs(wish: Wish, material: dict[str, Any]) -> Any:
@@ -188,21 +207,64 @@ def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> FamilyOf
     return FamilyOffer(reason=reason, nearest=nearest)
 
 
+def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:
+    """Yield the same with other springs and leaves: of two Vs, a small, a larger and a large one of each structure."""
+    plain = [one for one in found if one.variant.startswith("2 Vs")]
+    chosen = [plain[k] for k in dict.fromkeys(len(plain) * part // 8 for part in (0, 3, 6))] if plain else []
+    for name in STRUCTURES:
+        function = "finish_" + name.replace(" ", "_")
+        for one in chosen:
+            words = one.variant.replace("2 Vs", STRUCTURE_WORDS[name])
+            yield replace(one, variant=words, finish=f"cfmkit.families.vcfm.proposals_for_wish:{function}")
+
+
+def finish_folded_spring(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a designed mechanism with a folded spring."""
+    return _of_structure(spec, wish, "folded spring")
+
+
+def finish_cosine_arches(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a designed mechanism with cosine arches in place of Vs."""
+    return _of_structure(spec, wish, "cosine arches")
+
+
+def finish_hybrid_leaves(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a designed mechanism whose leaves are stiff between two flexures."""
+    return _of_structure(spec, wish, "hybrid leaves")
+
+
+def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
+    strength = wish.strength_used * (spec.mechanism.material.allowable(SAFETY) or 0.0)
+    made, end = with_structure(spec, name, wish.target, wish.travel, strength)
+    return _over_flattest(made, wish, _preloads(spec.design, wish), end)
+
+
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
+    return _over_flattest(spec, wish, _preloads(spec.design, wish), float(_window(spec, wish)[1]))
+
+
+def _window(spec: VcfmSpec, wish: Wish) -> tuple[Any, Any]:
+    return spec.analysis.window or (Place(0.0, "length"), Place(wish.travel, "length"))
+
+
+def _preloads(design: VcfmDesign | None, wish: Wish) -> tuple[float, ...]:
+    """Return the preloads with which the force is that of the middle and both ends of the adjustment [m]."""
+    if wish.adjustable is None or design is None or not design.adjustment:
+        return (0.0,)
+    per_force = design.preload_stroke / design.adjustment
+    low, high = wish.adjustable
+    return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
+
+
+def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
+    """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.base import Run
     from cfmkit.families.flattest_window import flattest
     from cfmkit.families.vcfm.build import spring_room
     from cfmkit.families.vcfm.exact_model import analyze
 
-    design = spec.design
-    preloads: tuple[float, ...] = (0.0,)
-    if wish.adjustable is not None and design is not None and design.adjustment:
-        per_force = design.preload_stroke / design.adjustment
-        low, high = wish.adjustable
-        preloads = (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
-    window = spec.analysis.window or (Place(0.0, "length"), Place(wish.travel, "length"))
-    wide = float(window[1]) + 0.2 * wish.travel
+    wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
     made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
     closing = wide + max(preloads) - spring_room(made)

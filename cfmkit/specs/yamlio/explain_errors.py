@@ -134,7 +134,8 @@ def _missing(found: Trace) -> Complaint:
 
 
 def _unknown_key(found: Trace) -> str:
-    names = [name for slot in found.parents if slot.model is not None for name in slot.model.model_fields]
+    fields = [one for slot in found.parents if slot.model is not None for one in slot.model.model_fields.items()]
+    names = [field.alias or name for name, field in fields]
     key = str(found.path[-1]) if found.path else ""
     hint = did_you_mean(key, names) or listed("allowed are", names)
     return f"unknown key {shown(key)}" + (f"; {hint}" if hint else "")

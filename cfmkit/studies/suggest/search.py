@@ -11,6 +11,7 @@ up is given up with it, be it the compilation of the beam engine. What was found
 from __future__ import annotations
 
 import time
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -166,7 +167,7 @@ def suggest(
     counts = {name: sum(one.family == name for one in done) for name in queues}
     return Suggestions(
         wish,
-        tuple(ordered([one for one in done if one.good], wish, prefer)),
+        tuple(ordered(distinct([one for one in done if one.good]), wish, prefer)),
         tuple(_near(done, wish)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
@@ -256,6 +257,31 @@ def _key(job: ProposalJob) -> str:
         "spec": candidate.spec.model_dump(mode="json"), "wish": repr(job.wish), "seed": job.seed, "code": code_stamp(),
     }  # fmt: skip
     return stable_hash(content)[:32]
+
+
+def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
+    """Return proposals whose names tell them apart: equal ones get their size in the plane, then a number.
+
+    Examples
+    --------
+    >>> from cfmkit.studies.suggest.proposal import Proposal
+    >>> sizes = ({"across": 0.034, "along": 0.051}, {"across": 0.069, "along": 0.023})
+    >>> [one.variant for one in distinct([Proposal("cam", "2 springs", numbers=size) for size in sizes])]
+    ['2 springs, 34 x 51 mm', '2 springs, 69 x 23 mm']
+    """
+    count = Counter((one.family, one.variant) for one in proposals)
+    sized = [_sized(one) if count[one.family, one.variant] > 1 else one for one in proposals]
+    count, seen = Counter((one.family, one.variant) for one in sized), Counter[tuple[str, str]]()
+    found = []
+    for one in sized:
+        seen[key := (one.family, one.variant)] += 1
+        found.append(replace(one, variant=f"{one.variant} ({seen[key]})") if count[key] > 1 else one)
+    return found
+
+
+def _sized(one: Proposal) -> Proposal:
+    across, along = (1e3 * float(one.numbers.get(side) or 0.0) for side in ("across", "along"))
+    return replace(one, variant=f"{one.variant}, {across:.3g} x {along:.3g} mm")
 
 
 def ordered(proposals: Sequence[Proposal], wish: Wish, prefer: Sequence[str]) -> list[Proposal]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.families.base import article
 from cfmkit.families.wishes import Wish
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Torque, format_short
@@ -55,7 +56,7 @@ class WishBlock(Model):
         description="box that it stays in, pressed or not, frame included: across the travel, along it, and the depth, "
         "which may be left out",
     )
-    material: MaterialField | tuple[MaterialField, ...] | None = Field(
+    material: MaterialField | Annotated[tuple[MaterialField, ...], Field(min_length=1)] | None = Field(
         None, description="what it may be made of: names from `show materials`, or values"
     )
     process: ProcessName | None = Field(
@@ -89,7 +90,9 @@ class WishBlock(Model):
         wanted, other = ("travel", "angle") if self.force is not None else ("angle", "travel")
         what = "force" if self.force is not None else "torque"
         if getattr(self, other) is not None:
-            raise ValueError(f"a {what} is constant over a {wanted}: '{other}' does not go with '{what}'")
+            raise ValueError(
+                f"a {what} is constant over {article(wanted)} {wanted}: '{other}' does not go with '{what}'"
+            )
         if getattr(self, wanted) is None:
             raise ValueError(f"'{wanted}' is missing: over which the {what} is constant")
         return self

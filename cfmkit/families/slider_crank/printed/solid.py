@@ -74,7 +74,7 @@ class SolidSolution:
     @cached_property
     def force(self) -> FloatArray:
         """Of all legs, at the points of the curve [N]: cubics between the poses."""
-        return read_only(self.spec.mechanism.legs * self.fine.course.effort(self.travel))
+        return read_only(self.spec.mechanism.sets * self.fine.course.effort(self.travel))
 
     @cached_property
     def stress(self) -> FloatArray:
@@ -105,7 +105,7 @@ class SolidSolution:
         """Mean force in the window [N]."""
         low, high = max(self.window[0], self.travel[0]), min(self.window[1], self.travel[-1])
         places = np.linspace(low, high, 401)
-        return float(self.spec.mechanism.legs * self.fine.course.effort(places).mean())
+        return float(self.spec.mechanism.sets * self.fine.course.effort(places).mean())
 
 
 def analyze(spec: SliderCrankSpec, run: Run) -> Result:
