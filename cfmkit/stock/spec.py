@@ -282,6 +282,13 @@ class PartProcess(Model):
     least_feature: FromZero | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
     least_radius: FromZero | None = Field(None, description="smallest inside radius")
 
+    @property
+    def smallest(self) -> float | None:
+        """Smallest inside radius [m]; None where neither a name nor a value says it."""
+        if self.least_radius is not None:
+            return self.least_radius
+        return PROCESSES[self.name].least_radius if self.name else None
+
     def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
         """Return what the process holds, and what the usual one does where it has no name."""
         known = PROCESSES[self.name] if self.name else usual
@@ -312,7 +319,9 @@ class CutPart(Model):
     )
 
     fillet: FromZero = Field(
-        0.0005, description="radius of inside corners: that of the cutter; 0: sharp, the stress there has no value"
+        0.0005,
+        description="radius of inside corners: that of the cutter; 0: sharp, the stress there has no value; default: "
+        "the smallest radius of `process`, where it has a name or says one, else 0.5 mm",
     )
     sheet: AboveZero | None = Field(
         None, description="thickness of the sheet that everything is cut from: every width must be equal to it"
@@ -320,6 +329,12 @@ class CutPart(Model):
     holes: Annotated[tuple[Hole, ...], Field(max_length=1000)] = Field(
         (), description="fixing pattern: [{at: [x, y], diameter: 4 mm}]"
     )
+
+    @model_validator(mode="after")
+    def _rounded_by_the_process(self) -> Self:
+        if "fillet" not in self.model_fields_set and self.process is not None and self.process.smallest is not None:
+            object.__setattr__(self, "fillet", self.process.smallest)  # not counted as set: it follows the process
+        return self
 
 
 class PaddedPart(CutPart):

@@ -81,3 +81,32 @@ def test_holes_of_the_fixing_pattern_are_cut_and_must_lie_in_the_part():
     )
     with pytest.raises(cfmkit.errors.GeometryError, match=r"is a hole at .*, outside every cut contour"):
         cfmkit.export(outside)
+
+
+@pytest.mark.parametrize("name", ["beam_lan2010", "vcfm_ding2022", "slider_crank_strip"])
+@pytest.mark.parametrize(
+    ("given", "radius"),
+    [
+        (["process=laser"], 0.1e-3),
+        (["process=mill"], 1e-3),
+        (["process={least_radius: 0.3 mm}"], 0.3e-3),
+        (["process={name: laser, least_radius: 0.3 mm}"], 0.3e-3),
+        (["process={position: 0.1 mm}"], 0.5e-3),
+        (["process=laser", "fillet=0 mm"], 0.0),
+        (["sheet=null"], 0.5e-3),
+    ],
+)
+def test_inside_corners_have_the_smallest_radius_of_the_process_unless_it_is_given(name, given, radius):
+    spec = cfmkit.load(f"configs/{name}.yaml", ["mechanism.part={}", *(f"mechanism.part.{one}" for one in given)])
+    assert spec.mechanism.part.fillet == pytest.approx(radius)
+    assert cfmkit.load(f"configs/{name}.yaml", ["mechanism.part={}"]).mechanism.part.fillet == 0.5e-3
+
+
+def test_a_fillet_follows_the_process_that_is_set_later():
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml", ["mechanism.part={process: laser}"])
+    milled = spec.replace({"mechanism.part.process": "mill"})
+    radii = {
+        edge.radius for contour in api.drawing(milled).contours for edge in contour.edges if hasattr(edge, "radius")
+    }
+    assert max(radii) == pytest.approx(1e-3)
+    assert min(radii) == pytest.approx(1e-3)
