@@ -57,6 +57,19 @@ def test_the_curve_is_stable_and_its_stress_map_is_drawn(straight):
     assert len(figure.axes) == 3
 
 
+def test_a_column_says_which_points_of_the_curve_are_poses_of_both_parts(straight):
+    """The rest, where both begin, and the end, where both end; with a preload the spring's last pose is another."""
+    nominal, pressed = straight["solid"].curves
+    solved = nominal.extra["solved"].values
+    poses = straight["solid"].state.sampler.pushed.solved.course.travel
+    assert solved[0] == "yes"
+    assert set(solved) == {"yes", "between"}
+    for travel in nominal.motion[solved == "yes"]:
+        assert np.abs(poses - travel).min() < 1e-9 * poses.max()
+    assert pressed.extra["solved"].values[-1] == "yes"
+    assert "solved" not in straight["exact"].curve.extra
+
+
 @pytest.mark.parametrize("positive", ["diamond", "folded", "straight", "u-shape"])
 @pytest.mark.parametrize("leaf", ["v-beam", "cosine", "hybrid"])
 def test_what_is_solved_is_a_part_of_what_is_drawn(leaf, positive):

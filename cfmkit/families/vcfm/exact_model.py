@@ -21,6 +21,8 @@ from cfmkit.families.vcfm.traced_network import traced
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.elastica.input_deck import DrivenNetwork
@@ -180,6 +182,9 @@ class ExactSampler:
         pressed, stretched = self.sides[0].at(np.maximum(place, 0.0)), self.sides[1].at(np.minimum(place, 0.0))
         force, stress = (np.where(place < 0, stretched[k], pressed[k]) for k in (0, 1))
         return self.chain.count * force, stress
+
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Return None: between its nodes a traced path is known to its tolerance."""
 
     @cached_property
     def character(self) -> Characteristics:

@@ -192,7 +192,7 @@ def _push(sampler: PartSampler, pose: tuple[float, float | None], grid: FloatArr
     if not known.all():
         travel, force, stress = travel[known], force[known], stress[known]
         leaves = type(leaves)(leaves.force[known], leaves.stress[known], leaves.stable[known], leaves.buckled[known])
-    return Push(preload, travel, leaves, force, stress, rest)
+    return Push(preload, travel, leaves, force, stress, rest, sampler.solved(travel, preload))
 
 
 def _as_run(spec: VcfmSpec) -> VcfmSpec:
@@ -216,6 +216,8 @@ def _curve(push: Push) -> Curve:
         "max_stress": Column(np.maximum(leaves.stress, push.spring_stress), "stress"),
         "leaf_form": Column(np.where(leaves.buckled, "buckled", "bent"), "text"),
     }
+    if push.solved is not None:
+        extra["solved"] = Column(np.where(push.solved, "yes", "between"), "text")
     branch = np.full(len(push.travel), "load")
     return Curve(push.travel, push.force, branch, leaves.stable, extra, label={"preload": (push.preload, "length")})
 
@@ -228,6 +230,9 @@ class LawSampler:
     def __init__(self, parts: Parts) -> None:
         """Keep the laws."""
         self.parts = parts
+
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Return None: closed forms know every travel."""
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]."""

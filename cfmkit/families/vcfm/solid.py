@@ -29,6 +29,8 @@ from cfmkit.stock.spec import CutPart
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.outline import SolvedPiece
@@ -127,6 +129,20 @@ class SolidSampler(ExactSampler):
             pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
+
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
+        found = _poses_at(travel, (self.pushed, self.pulled))
+        if self.coils is None:
+            found &= _poses_at(self.chain.travel * (travel + preload), self.sides)
+        return found
+
+
+def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
+    """Tell at which travels (n,) [m] one of some paths has a pose."""
+    known = np.concatenate([path.solved.course.travel for path in paths])
+    near = 1e-9 * float(np.abs(known).max(initial=0.0))
+    return np.asarray((np.abs(places[:, None] - known) <= near).any(axis=1))
 
 
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:

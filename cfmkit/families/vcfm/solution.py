@@ -18,6 +18,8 @@ from cfmkit.specs.units import between
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.build import Parts
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -66,6 +68,9 @@ class PartSampler(Protocol):
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
 
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Tell at which travels [m] leaves and spring were solved for, not interpolated; None where all are known."""
+
 
 @dataclass(frozen=True)
 class Push:
@@ -83,6 +88,8 @@ class Push:
         Of the spring [N, Pa].
     rest : float or None
         Where the shuttle rests [m]; None where nothing holds it short of the end.
+    solved : (n,) array of bool or None
+        Where leaves and spring were solved for, not interpolated; None where all is known.
     """
 
     preload: float
@@ -91,6 +98,7 @@ class Push:
     spring_force: FloatArray
     spring_stress: FloatArray
     rest: float | None
+    solved: NDArray[np.bool_] | None = None
 
     @cached_property
     def force(self) -> FloatArray:
