@@ -311,7 +311,7 @@ def _bad_cell(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo],
             cell = cells[column.index]
             if not block.dialect.is_number(cell):
                 refuse_group(cell, name)
-                what = "is empty" if not cell else f"holds {shown(cell)}, which is no number"
+                what = "is empty" if not cell else f"holds {shown(cell)}, which is not a number"
                 return f"{name}: line {number + 1}: column {column.label} {what}; remove the line or correct it"
     return f"{name}: the numbers from line {block.first + 1} on cannot be read"
 

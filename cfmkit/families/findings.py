@@ -80,8 +80,8 @@ def too_soft(share: float, where: str) -> str:
     if not share > TOO_SOFT:
         return ""
     return (
-        f"beams that are wide for their thickness cannot curl across their width: to bend them takes about "
-        f"{percent(share)} more energy {where}, and as much more force or a little more; clamped ends add to it"
+        f"beams that are wide for their thickness cannot curl across their width: bending them takes about "
+        f"{percent(share)} more energy {where}, and at least as much more force; clamped ends add to it"
     )
 
 
@@ -91,14 +91,14 @@ def bracket(width: float, thickness: float, poisson_ratio: float) -> str:
     Examples
     --------
     >>> bracket(10e-3, 1e-3, 0.35)
-    '10 mm wide at 1 mm of thickness: the force is between that of plane stress, as solved, and 14 % more, plane strain'
+    '10 mm wide, 1 mm thick: the force is between that of plane stress, as solved, and that of plane strain, 14 % more'
     """
     if not width > NARROW * thickness:
         return ""
     more = percent(1.0 / (1.0 - poisson_ratio**2) - 1.0)
     return (
-        f"{mm(width)} wide at {mm(thickness)} of thickness: the force is between that of plane stress, as solved, and "
-        f"{more} more, plane strain"
+        f"{mm(width)} wide, {mm(thickness)} thick: the force is between that of plane stress, as solved, and that of "
+        f"plane strain, {more} more"
     )
 
 

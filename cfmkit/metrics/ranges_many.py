@@ -255,7 +255,7 @@ def _solved_interval(
     reach = motion[:, -1] - motion[:, 0]
 
     def excess(at: FloatArray, rows: NDArray[np.intp], known: bool = False) -> FloatArray:
-        """Return by what share that exceeds its limit which does so most; NaN where one is no number."""
+        """Return by what share that exceeds its limit which does so most; NaN where one is not a number."""
         worst = (valid[rows, None] - at) / reach[rows, None]
         for branch in branches:
             if branch.exact is not None:

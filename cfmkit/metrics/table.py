@@ -379,7 +379,7 @@ def time_of(text: str) -> float:
     """
     found = read_quantity(text, "time")
     if found <= 0:
-        raise QuantityError(f"{text!r} is no time of a hold: it must be above 0")
+        raise QuantityError(f"{text!r} is not a time of a hold: it must be above 0")
     return found
 
 

@@ -35,7 +35,7 @@ class DrawnScale:
     values : (n,) array
         One for each point; indices into `words` where those are given.
     words : tuple of str
-        Of a parameter or a metric that is no number.
+        Of a parameter or a metric that is not a number.
     short : str
         What it is called beside others; the last part of the name where that is empty.
     about : str

@@ -205,7 +205,7 @@ def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
-    """Return the slider of a leaf; None if it is no number."""
+    """Return the slider of a leaf; None if it is not a number."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     unit = ""

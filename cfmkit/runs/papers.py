@@ -253,7 +253,7 @@ def number(text: str) -> Number:
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)
     digits, _, unit = rest.partition(" ")
     if not digits:
-        raise QuantityError(f"{visible(text)!r} is no number")
+        raise QuantityError(f"{visible(text)!r} is not a number")
     read_number(digits)
     return Number(sign, Decimal(digits), unit, float(unit_size(unit).factor) if unit else 1.0)
 

@@ -61,7 +61,7 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{shown(text)} is no formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
+        raise ValueError(f"{shown(text)} is not a formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
     try:
         _value(tree, np.ones(1))
     except RecursionError:

@@ -69,7 +69,7 @@ def _canonical(value: Any) -> Any:
         return value + 0.0
     if isinstance(value, Mapping):
         if odd := [key for key in value if not isinstance(key, str)]:
-            raise CfmError(f"{odd[0]!r} is a key that is no text: it has no identity")
+            raise CfmError(f"{odd[0]!r} is a key that is not a text: it has no identity")
         return {key: _canonical(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_canonical(item) for item in value]

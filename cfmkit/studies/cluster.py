@@ -70,7 +70,7 @@ class Cluster:
 def _refuse_odd(address: str) -> None:
     """Raise if an address cannot be one: Dask would try, and print its own errors."""
     if address != LOCAL and not ADDRESS.fullmatch(address):
-        raise UsageError(f"--cluster {address!r} is no address; write e.g. tcp://host:8786, or local")
+        raise UsageError(f"--cluster {address!r} is not an address; write e.g. tcp://host:8786, or local")
 
 
 @contextmanager

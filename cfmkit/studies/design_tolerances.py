@@ -99,7 +99,7 @@ def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
 
 
 def _made(spec: Spec, design: DesignBlock) -> bool:
-    """Tell whether it is said how parts are made: by a block `design`, or of a part whose yield is asked for."""
+    """Tell whether it is said how parts are made: by a block `design`, or of a part whose yield is requested."""
     if design.tolerances_of(spec)[0] or design.process is not None:
         return True
     part = getattr(getattr(spec, "mechanism", None), "part", None)

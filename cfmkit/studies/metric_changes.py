@@ -47,7 +47,7 @@ class MetricChange:
     unit : str
         Of both.
     relative : float or None
-        The difference over the larger of both; None where they are no numbers.
+        The difference over the larger of both; None where they are not numbers.
     beyond : bool
         Whether it is more than the tolerance.
     """

@@ -20,7 +20,7 @@ MOST_LOOKS, MOST_ANALYSES = 24, 12
 
 
 def most_parts(spec: Spec, by_looks: bool = True) -> int:
-    """Return how many parts near a design may be solved for an estimate that nobody asked for.
+    """Return how many parts near a design may be solved for an estimate that nobody requested.
 
     `by_looks`: whether the numbers can be had the quick way, where the family has one.
     """

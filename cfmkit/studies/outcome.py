@@ -198,7 +198,7 @@ def in_words(values: Any, spec: Spec, path: str) -> Any:
         return [in_words(value, spec, path) for value in values]
     if isinstance(values, np.ndarray):
         if values.ndim > 1:
-            raise UsageError(f"{path}: an array of {values.ndim} dimensions is no list of values; flatten it")
+            raise UsageError(f"{path}: an array of {values.ndim} dimensions is not a list of values; flatten it")
         values = values[()]
     if isinstance(values, np.ndarray):
         return [in_words(value, spec, path) for value in values]

@@ -61,7 +61,7 @@ def scales(
     shown : sequence of (n,) sequence
         Their values at every point, in border units.
     words : sequence of sequence of str
-        Of those that are no numbers: what they may be, in order.
+        Of those that are not numbers: what they may be, in order.
     """
     about = {key.path: key.description for key in keys(type(spec))}
     names = short_names([path for path, _ in varied])

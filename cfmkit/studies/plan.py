@@ -197,7 +197,7 @@ def sampled(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Plan:
     kind = qmc.LatinHypercube if draw.method == "lhs" else qmc.Sobol
     engine: Any = kind(len(axes), seed=np.random.default_rng(draw.seed))
     with warnings.catch_warnings():
-        # A Sobol sequence that is no power of two long is less balanced, not wrong.
+        # A Sobol sequence that is not a power of two long is less balanced, not wrong.
         warnings.simplefilter("ignore", UserWarning)
         unit = engine.random(draw.count)
     return Plan(tuple(_drawn(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)

@@ -190,7 +190,7 @@ def _range(found: Leaf, text: str, drawn: bool) -> Axis:
     parts = [part.strip() for part in text.split(":")]
     if found.kind in ("word", "switch"):
         words = ", ".join(map(str, found.choices)) or "a, b"
-        raise CannotVary(f"{text!r} is no list of words; write [{words}]")
+        raise CannotVary(f"{text!r} is not a list of words; write [{words}]")
     wanted = "start:stop" if drawn else "start:stop:n"
     if len(parts) != (2 if drawn else 3):
         more = "; samples are drawn from it, so that it has no number of steps" if drawn and len(parts) == 3 else ""

@@ -121,7 +121,7 @@ def _coordinate(cells: list[str], column: tuple[int, float], block: TextBlock, n
     cell = cells[index] if index < len(cells) else ""
     if not block.dialect.is_number(cell):
         refuse_group(cell, name)
-        raise DataError(f"{name}: line {number + 1}: {cell!r} is no number; remove the line or correct it")
+        raise DataError(f"{name}: line {number + 1}: {cell!r} is not a number; remove the line or correct it")
     return float(cell.replace(",", ".")) * unit
 
 

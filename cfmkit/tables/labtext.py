@@ -90,7 +90,7 @@ def decoded(data: bytes, name: str) -> tuple[str, str]:
     Raises
     ------
     cfmkit.errors.DataError
-        If it is no text.
+        If it is not a text.
     """
     encoding = next((told for mark, told in _MARKS if data.startswith(mark)), "")
     if not encoding and b"\0" in data[:4096]:

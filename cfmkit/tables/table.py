@@ -63,7 +63,7 @@ class TableColumn:
         if self.unit is not None and isinstance(self.values, tuple):
             for cell in self.values:
                 if isinstance(cell, str):
-                    raise CfmError(f"{cell!r} is no number: column {self.header!r} has a unit")
+                    raise CfmError(f"{cell!r} is not a number: column {self.header!r} has a unit")
 
     @property
     def header(self) -> str:

@@ -57,7 +57,7 @@ def test_arrays_are_taken_by_a_sensitivity_study():
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (np.ones((2, 2)), "an array of 2 dimensions is no list of values; flatten it"),
+        (np.ones((2, 2)), "an array of 2 dimensions is not a list of values; flatten it"),
         (range(10**30), "mechanism.roller_radius: a range of more than 1000000 values; take fewer"),
         (np.array([0.01, np.nan]), "mechanism.roller_radius: nan cannot be written"),
     ],

@@ -78,7 +78,7 @@ MORE = "beams:\n    beam: {start: root, end: tip}"
         (MORE, LOOSE, "mechanism.springs.s", "give either 'end'"),
         (MORE, f"{MORE}\n  loads: [{{kind: line, beam: bam}}]", "mechanism.loads.0.beam", "there is no beam 'bam'"),
         (MORE, f"{MORE}\n  copies: {{layers: 2}}", "mechanism.copies.layers", "of a node that is 'guided'"),
-        ("points: 21", FORMULA, "analysis.surface.profile.height", "is no formula"),
+        ("points: 21", FORMULA, "analysis.surface.profile.height", "is not a formula"),
         ("points: 21", FILE, "analysis.surface.profile.file", "there is no file 'no.csv'"),
         ("analysis:", RESCALE, "design.rescale", "'width' is given"),
     ],

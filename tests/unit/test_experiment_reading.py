@@ -109,7 +109,7 @@ BAD = {
     "empty": ("", "the file is empty"),
     "only text": ("no\nnumbers\nhere\n", "no block of lines with at least two numbers"),
     "binary": (bytes(range(256)) * 20, "is not a text file"),
-    "NaN": (csv_text(change=at(5, 2, "NaN")), "line 7: column 'F' [N] holds 'NaN', which is no number"),
+    "NaN": (csv_text(change=at(5, 2, "NaN")), "line 7: column 'F' [N] holds 'NaN', which is not a number"),
     "gap": (csv_text(change=at(5, 2, "")), "line 7: column 'F' [N] is empty"),
     "overflow sign": (csv_text(change=at(9, 1, "****")), "line 11: column 's' [mm] holds '****'"),
     "infinite": (csv_text(change=at(3, 2, "inf")), "line 5: column 'F' [N] holds 'inf'"),

@@ -56,8 +56,8 @@ def test_formulas_are_computed(text, expected):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x +", "is no formula"),
-        ("", "is no formula"),
+        ("x +", "is not a formula"),
+        ("", "is not a formula"),
         ("y*2", "'y' means nothing here"),
         ("__import__('os')", "means nothing here"),
         ("x.real", "means nothing here"),

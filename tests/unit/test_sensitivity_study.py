@@ -173,7 +173,7 @@ def test_the_parts_of_a_list_and_of_a_batch_are_tightened_together():
             "not among the parameters",
         ),
         ({"parameters": PARAMETERS | {"mechanism.springs.stiffness.0": {"uniform": "1 %"}}}, "is a parameter already"),
-        ({"parameters": {"mechanism.brace_length.*": {"uniform": "1 %"}}}, "is no list"),
+        ({"parameters": {"mechanism.brace_length.*": {"uniform": "1 %"}}}, "is not a list"),
         ({"parameters": {"mechanism.profile.offset": {"uniform": "1 %"}}}, "of zero is zero"),
         ({"parameters": {"mechanism.brace_length": {"uniform": "0 mm"}}}, "must be > 0"),
         ({"parameters": {"mechanism.brace_length": {"uniform": "1 mm", "normal": "1 mm"}}}, "either"),

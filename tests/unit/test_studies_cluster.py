@@ -128,7 +128,7 @@ def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
 @pytest.mark.parametrize("address", ["nonsense", "tcp://", "tcp://host", "", "local:", "a b:1"])
 def test_what_is_no_address_is_refused_before_dask_tries(address, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(UsageError, match=r"is no address; write e\.g\. tcp://host:8786, or local"):
+    with pytest.raises(UsageError, match=r"is not an address; write e\.g\. tcp://host:8786, or local"):
         run(work(2), Cluster(address))
 
 

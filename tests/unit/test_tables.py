@@ -153,7 +153,7 @@ def test_what_is_neither_number_nor_text_is_refused(value):
 
 
 def test_a_text_under_a_unit_is_refused():
-    with pytest.raises(CfmError, match=r"'fast' is no number: column 'force \[N\]' has a unit"):
+    with pytest.raises(CfmError, match=r"'fast' is not a number: column 'force \[N\]' has a unit"):
         TableColumn("force", [1.0, "fast"], "N")
 
 
@@ -263,10 +263,10 @@ def test_a_file_is_read_like_its_bytes_and_its_text(tmp_path):
         (b"a,a\n1,2\n", "two of a"),
         (b"a [mm],\n1,2\n", "'' is not a header such as 'force [N]'"),
         (b"force[N]\n1\n", "'force[N]' is not a header"),
-        (b"force [N]\n1.5\nfast\n", "'fast' is no number"),
-        (b"force [N]\n1.5\nnan\n", "'nan' is no number"),
-        (b"force [N]\n1_000\n", "'1_000' is no number"),
-        (b"force [N]\n.5\n", "'.5' is no number"),
+        (b"force [N]\n1.5\nfast\n", "'fast' is not a number"),
+        (b"force [N]\n1.5\nnan\n", "'nan' is not a number"),
+        (b"force [N]\n1_000\n", "'1_000' is not a number"),
+        (b"force [N]\n.5\n", "'.5' is not a number"),
     ],
 )
 def test_what_cfmkit_would_not_have_written_is_refused_with_its_place(data, message):

@@ -79,7 +79,7 @@ def test_a_number_is_read_exactly_when_it_is_a_plain_finite_decimal(text: str) -
         ("1.2.3", "'1.2.3' has more than one dot; write e.g. 1234.5"),
         ("1e999", "'1e999' is too large: at most 1.8e308"),
         ("-1e999", "'-1e999' is too large: at most 1.8e308"),
-        ("1e-999", "'1e-999' is too small to be told from zero; write 0 if zero is meant"),
+        ("1e-999", "'1e-999' is too small to differ from zero; write 0 if zero is meant"),
         ("", "there is no number"),
         ("five", "'five' is not a number; write e.g. 12, -0.5 or 1e-3"),
         (" 1", "' 1' is not a number; write e.g. 12, -0.5 or 1e-3"),
@@ -193,7 +193,7 @@ def test_68_mm_has_one_value_in_every_spelling() -> None:
         ("5*mm", "length", "'5*mm' is not a length; write e.g. '200 mm'"),
         ("", "angle", "the text is empty; an angle is needed, e.g. '30 deg'"),
         ("1e308 GPa", "stress", "'1e308 GPa' is too large"),
-        ("1e-320 um", "length", "'1e-320 um' is too small to be told from zero; write 0 if zero is meant"),
+        ("1e-320 um", "length", "'1e-320 um' is too small to differ from zero; write 0 if zero is meant"),
     ],
 )
 def test_a_wrong_quantity_is_refused_with_what_to_write(text: str, dimension: str, words: str) -> None:

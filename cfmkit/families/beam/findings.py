@@ -31,11 +31,11 @@ FINDINGS = {
     "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
     "self_contact": "the part as a solid touches itself: the curve ends there",
     "ends_early": "the path ends before the requested travel or load",
-    "inaccurate": "at some points the tolerance is not reached: they have no force",
+    "inaccurate": "at some points the tolerance is not reached: no force is reported there",
     "limit_point": "the load has an extremum on the path: under load control the mechanism snaps there",
     "bifurcation": "the path splits: the mechanism leaves the symmetric or straight form",
     "unstable": "a part of the path is not stable: the mechanism would leave it",
-    "flutter": "forces turn with their node, and two natural frequencies meet: it swings ever wider",
+    "flutter": "under forces that turn with their node two natural frequencies meet: oscillations grow",
     "flutter_not_judged": "forces turn with their node: stability is judged against divergence, not against flutter",
     "imperfection": "the beams were bent in the first buckling mode, as requested",
     "overstressed": "the stress exceeds the allowable one within the window",
@@ -43,7 +43,7 @@ FINDINGS = {
     "rescale_stress": "after scaling, the stress reaches the allowable one within the window",
     "design_unsound": "the best shape that was found fails its audit",
     "objective_ill_posed": "the objective of the paper rewards a force that falls",
-    "starts_lost": "worker processes died, and with them the starts they were searching from",
+    "starts_lost": "worker processes died, and the starts that they were working on are lost",
     "search_cut_short": "the time budget ended before all starts were done",
     "surface_out_of_reach": "following the surface takes more displacement than the solved travel",
     "tip_lifts_off": "the mechanism no longer presses on the surface: the tip lifts off",
@@ -249,7 +249,7 @@ def _events(solution: Solution) -> Iterator[Finding]:
 def _after(solution: Solution) -> str:
     """Say where the curve goes at a bifurcation."""
     if (solution.path.branch[solution.keep] == "primary").all():
-        return "; the curve stays on the path it came on"
+        return "; the curve stays on the primary path"
     side = "analysis.other_side=" + ("false" if solution.spec.analysis.other_side else "true")
     return f"; from there the curve follows the stable branch (its mirror image: --set {side})"
 
@@ -269,15 +269,15 @@ def _stability(solution: Solution) -> Iterator[Finding]:
     if solution.frequencies is None:
         yield finding(
             "flutter_not_judged",
-            "forces turn with their node: what is called stable does not diverge; flutter depends on masses: give "
-            "every material a density",
+            "forces turn with their node: 'stable' only means that nothing diverges here; flutter depends on masses: "
+            "give every material a density",
         )
     elif solution.frequencies.flutters.any():
         first = int(solution.keep[int(solution.frequencies.flutters.argmax())])
         yield finding(
             "flutter",
             f"two natural frequencies have met at {drive_text(solution.assembly, float(solution.path.drive[first]))}: "
-            "under forces that turn with their node it swings ever wider",
+            "under forces that turn with their node oscillations grow from there on",
         )
 
 
@@ -311,7 +311,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
     yield finding(
         "overstressed",
         f"the largest stress in the window is {format_short(worst, 'stress')}, at {place:.3f} of beam "
-        f"{beam}; allowable are {format_short(allowable, 'stress')}",
+        f"{beam}; the allowable stress is {format_short(allowable, 'stress')}",
     )
 
 
@@ -324,7 +324,7 @@ def _slenderness(solution: Solution) -> Iterator[Finding]:
             yield finding(
                 "thick_beam",
                 f"beam {name} is {format_short(length, 'length')} long and {format_short(thickest, 'length')} thick: "
-                f"below {THICK:g} times the thickness beam theory is rough",
+                f"below {THICK:g} times the thickness beam theory is inaccurate",
             )
 
 

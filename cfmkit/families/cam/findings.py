@@ -62,7 +62,7 @@ FINDINGS = {
     "overwritten": "a value of the profile that the design replaces by its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "a word of the specification that the next version will not accept",
-    "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or asks for a vertical path",
+    "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or needs a vertical path",
     "weight_too_large": "the target force does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
     "registration_weak": "the measured points determine the position of the cam poorly",
@@ -338,19 +338,19 @@ def _weak_registration(built: Built) -> Iterator[Finding]:
         yield finding(
             "width_error",
             f"the points are those of a cam with {mm(abs(built.registration.width))} {more} material on both flanks, "
-            f"± {mm(built.registration.width_deviation)} (one standard deviation), and are laid on the design so; "
-            "'mechanism.profile.registration: motion' takes it for a place, 'datum' moves nothing",
+            f"± {mm(built.registration.width_deviation)} (one standard deviation), which the registration allows for; "
+            "'mechanism.profile.registration: motion' takes it for a shift of the cam, 'datum' moves nothing",
         )
     if deviation > 0.1 * rmse and rmse > 0:
         names = ("the angle", "the shift in x", "the shift in y")
         parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
         taken = (
-            f"; and 0.01 mm more on both flanks would be taken for a cam that lies {mm(1e-5 * abs(lifted))} "
+            f"; and 0.01 mm more on both flanks would be mistaken for a cam that lies {mm(1e-5 * abs(lifted))} "
             f"{'lower' if lifted > 0 else 'higher'}: the flanks are steep"
         )
         yield finding(
             "registration_weak",
-            f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
+            f"the position of the cam is known to ± {mm(deviation)} (one standard deviation) along its weakest "
             f"direction: {', '.join(parts)}{'' if built.registration.width else taken}",
         )
 
@@ -366,14 +366,14 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
     if seen > TOO_NOISY * stated:
         yield finding(
             "noise_understated",
-            f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}: "
-            "the difference is taken for waves of the flank, and the force follows their slope",
+            f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}; "
+            "the difference is taken for waviness of the flank, and the force follows its slope",
         )
     elif root_mean_square(errors_used(built)) < 0.8 * stated:
         yield finding(
             "noise_overstated",
             f"the points are {mm(root_mean_square(errors_used(built)))} (rms) off the design, less than the stated "
-            f"noise of {mm(stated)}: nothing of the profile's errors is left to be seen",
+            f"noise of {mm(stated)}: the errors of the profile cannot be distinguished from noise",
         )
 
 

@@ -133,8 +133,8 @@ def _leaf_shape(solution: Solution) -> Iterator[Finding]:
     elif not straight:
         yield finding(
             "no_linear_region",
-            f"{told}{limits[1]}: the leaves do not buckle and their force is a curve; the constant-force window is "
-            "its top only. Use thinner or steeper leaves",
+            f"{told}{limits[1]}: the leaves do not buckle and their force curve is round; the constant-force window is "
+            "only its top. Use thinner or steeper leaves",
         )
 
 
@@ -379,7 +379,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
     if share > STOCKY and solution.spec.analysis.fidelity != "truss":
         yield finding(
             "theory_range",
-            f"leaves {percent(share)} as thick as long are no beams: no model here has their force or stress; "
+            f"leaves {percent(share)} as thick as long are not beams: no model here predicts their force or stress; "
             "use longer or thinner leaves",
         )
         return
@@ -390,26 +390,26 @@ def _range(solution: Solution) -> Iterator[Finding]:
         much = (
             f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
             f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
-            "pseudo-rigid bodies do not: the force is overrated, up to several times"
+            "pseudo-rigid bodies do not: the force is overestimated, by up to several times"
             if solution.parts.leaf.flexures_buckle
-            else "as pseudo-rigid bodies hybrid leaves have their force to about 10 % up to the peak, worse beyond"
+            else "modelled as pseudo-rigid bodies hybrid leaves have the right force to about 10 % up to the peak only"
         )
         yield finding(
             "theory_range",
-            f"{much}; their stress is up to half too low. Verify with 'analysis.fidelity: exact'",
+            f"{much}; their stress is too low, by up to a half. Verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     elif share > THICK:
         yield finding(
             "theory_range",
-            f"leaves {percent(share)} as thick as long: the closed forms are for thin ones, and off by 5 to 10 % and "
-            "more; verify with 'analysis.fidelity: exact'",
+            f"leaves {percent(share)} as thick as long: the closed forms are for thin ones, and here off by 5 to 10 % "
+            "or more; verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     elif angle > STEEP:
         yield finding(
             "theory_range",
-            f"leaves at {degrees(angle):.3g} deg: beyond 15 deg the closed forms are for small angles no more; "
+            f"leaves at {degrees(angle):.3g} deg: the closed forms hold for small angles, up to 15 deg; "
             "verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
@@ -417,7 +417,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "theory_range",
             f"the travel goes to {mm(float(solution.nominal.travel[-1]))}, beyond {RELIABLE} times the rise "
-            f"({mm(reach)}): the force there is off by percents; verify with 'analysis.fidelity: exact'",
+            f"({mm(reach)}): the force there is off by several per cent; verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     yield from _spring_range(solution)
@@ -440,7 +440,8 @@ def _spring_range(solution: Solution) -> Iterator[Finding]:
         return
     yield finding(
         "theory_range",
-        f"{told}; the closed form's constant stiffness is off by percents: verify with 'analysis.fidelity: exact'",
+        f"{told}; the closed form's constant stiffness is off by several per cent: verify with "
+        "'analysis.fidelity: exact'",
         "analysis.fidelity=exact",
     )
 
@@ -475,9 +476,9 @@ def _truss(solution: Solution) -> Iterator[Finding]:
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
     yield finding(
         "truss_law",
-        f"the paper's laws know no buckling and no clamping: against the corrected ones the peak of the leaves is "
-        f"{percent(high)} higher at {where:.2g} times the travel, their steepest slope {steep:.2g} times as steep, "
-        "and the sum with a spring never flat",
+        f"the paper's laws include neither buckling nor clamping: compared with the corrected ones the peak of the "
+        f"leaves is {percent(high)} higher, at {where:.2g} times the travel, their steepest slope is {steep:.2g} times "
+        "as steep, and with a spring the force is never flat",
         "analysis.fidelity=analytic",
     )
 

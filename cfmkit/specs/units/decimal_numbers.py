@@ -92,7 +92,7 @@ def _finite(text: str) -> float:
     if value in (float("inf"), float("-inf")):
         raise QuantityError(f"{shown(text)} is too large: at most 1.8e308")
     if value == 0 and re.search("[1-9]", re.split("[eE]", text)[0]):
-        raise QuantityError(f"{shown(text)} is too small to be told from zero; write 0 if zero is meant")
+        raise QuantityError(f"{shown(text)} is too small to differ from zero; write 0 if zero is meant")
     return value
 
 

@@ -182,7 +182,7 @@ def _scaled(number: str, unit: str, factor: Fraction) -> float:
     except OverflowError:
         raise QuantityError(f"{shown(f'{number} {unit}')} is too large") from None
     if value == 0:
-        raise QuantityError(f"{shown(f'{number} {unit}')} is too small to be told from zero; write 0 if zero is meant")
+        raise QuantityError(f"{shown(f'{number} {unit}')} is too small to differ from zero; write 0 if zero is meant")
     return value
 
 

@@ -150,7 +150,7 @@ def _items(spec: Spec, path: str) -> list[str]:
     except KeyError:
         values = None
     if not isinstance(values, tuple):
-        raise CannotVary(f"{before!r} is no list in this specification; leave the star out")
+        raise CannotVary(f"{before!r} is not a list in this specification; leave the star out")
     return [one for index in range(len(values)) for one in _items(spec, f"{before}.{index}{after}")]
 
 

@@ -266,7 +266,7 @@ def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...],
         told = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
         yield Finding("correlation_not_used", told)
     if block.method == "sobol" and samples & (samples - 1):
-        yield Finding("unbalanced", f"{samples} is no power of two: a Sobol sequence is balanced at 64, 128, 256, ...")
+        yield Finding("unbalanced", f"{samples} is not a power of two: Sobol sequences are balanced at 64, 128, 256")
     if block.method in MADE and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")
     yield from _followers(spec, parameters)

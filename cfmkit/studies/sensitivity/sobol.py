@@ -55,7 +55,7 @@ def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
     from SALib.sample import sobol
 
     with warnings.catch_warnings():
-        # A number of points that is no power of two is less balanced; the caller says so once.
+        # A number of points that is not a power of two is less balanced; the caller says so once.
         warnings.simplefilter("ignore", UserWarning)
         points = sobol.sample(problem(parameters), start + count, calc_second_order=False, seed=seed)
     blocks: FloatArray = np.asarray(points).reshape(start + count, parameters + 2, parameters)[start:]

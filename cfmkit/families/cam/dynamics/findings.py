@@ -44,7 +44,7 @@ def old_word(spec: CamSpec) -> tuple[Finding, ...]:
         return ()
     message = (
         "'analysis.dynamics.method: direct' is the old word for 'inverse': forces follow from a given motion, which is "
-        "inverse dynamics; the next version will not know it any more"
+        "inverse dynamics; the next version will no longer accept it"
     )
     return (finding("old_word", message, "analysis.dynamics.method=inverse"),)
 
@@ -65,7 +65,7 @@ def runs_on_corner(parts: Build) -> Finding:
     above = max(side.stretches[-1].span[0] for side in (parts.machine.right, parts.machine.left))
     return finding(
         "contact_not_single_valued",
-        "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
+        "on the corner of the cam the contact is not a function of its height, as the nine-coordinate model needs: "
         f"start above {mm(above)} ('analysis.dynamics.slider_position'), or use 'analysis.dynamics.method: inverse'",
     )
 
@@ -85,7 +85,7 @@ def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:
         yield finding(
             "slack_cable",
             f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: "
-            "a cable would go slack, the slider would have to be pushed",
+            "a cable would go slack, and the slider would have to be pushed",
         )
 
 
@@ -170,7 +170,7 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
     if dynamics and dynamics.method == "multibody" and spec.gravity and directions(spec.mechanism.mounting)[1]:
         yield finding(
             "friction_left_out",
-            "the nine-coordinate model has no weight across the slider's way, which 'mechanism.mounting' asks for; "
+            "the nine-coordinate model has no weight across the slider's way, which 'mechanism.mounting' implies; "
             "'analysis.dynamics.method: inverse' has it",
         )
 

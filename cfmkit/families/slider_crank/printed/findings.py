@@ -56,7 +56,7 @@ def friction_left_out(spec: SliderCrankSpec) -> Iterator[Finding]:
         yield finding(
             "friction_left_out",
             f"{' and '.join(stated)} {'counts' if len(stated) == 1 else 'count'} in the model with springs only: the "
-            "force of the part of one piece is that without friction",
+            "force of a one-piece part is computed without friction",
         )
 
 
@@ -87,8 +87,8 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     if solution.chain.side == 0:
         yield finding(
             "straight_start",
-            f"the chain is exactly straight: it holds {newton(float(solution.force[1]))} before it "
-            "moves sideways, and any 0.1 um decides to which side; give it a kink of 0.25 to 0.5 mm by "
+            f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it moves "
+            "sideways, and a deviation of 0.1 um decides to which side; give it a kink of 0.25 to 0.5 mm with "
             "'mechanism.unloaded_offset'",
         )
         return
@@ -103,8 +103,8 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     if run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1] and off > 1e-3 * solution.chain.length:
         yield finding(
             "long_run_in",
-            f"with a kink of {mm(off)} the force needs {mm(run_in)} of travel to 98 % of its level; a smaller kink is "
-            "quicker",
+            f"with a kink of {mm(off)} the force needs {mm(run_in)} of travel to reach 98 % of its level; a smaller "
+            "kink shortens it",
         )
 
 

@@ -47,7 +47,7 @@ def _of_friction(solution: Solution) -> Iterator[Finding]:
             first, last = (place(solution, float(solution.motion[held][end])) for end in (0, -1))
             yield finding(
                 "self_locks",
-                f"on the way {name} the mechanism holds itself from {first} to {last}: the line of force runs inside "
+                f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
                 "the friction circles of the pins; use thinner or smoother pins ('mechanism.pins'), or keep off the "
                 "stretched position",
             )
@@ -65,8 +65,8 @@ def _of_class(solution: Solution) -> Iterator[Finding]:
         side = "has" if found.kind in (SNAPS, BISTABLE, TRISTABLE) else "just misses"
         yield finding(
             "class_boundary",
-            f"the lowest effort after the peak is {100 * (1 - found.drop):.2g} % of the peak: the mechanism {side} a "
-            "second equilibrium, and springs a little stiffer or softer change that",
+            f"the lowest {solution.assembly.drive} after the peak is {100 * (1 - found.drop):.2g} % of the peak: the "
+            f"mechanism {side} a second equilibrium, and springs a little stiffer or softer change that",
         )
     start = solution.assembly.start
     if found.low <= start <= found.high and _restless(solution):
@@ -90,7 +90,7 @@ def _of_torque(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "spring_winds_up",
             f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
-            "wound up: the next turn has another torque; only springs at slider and slider pin repeat",
+            "wound up: the torque differs in the next turn; only springs at slider and slider pin repeat",
         )
     rests = [item.motion for item in found.equilibria if item.stable]
     again = [(a, b) for a in rests for b in rests if a < b and _same_pose(a, b)]
@@ -99,7 +99,7 @@ def _of_torque(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "same_position_twice",
             f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {found.name} curve has "
-            f"{different} different stable positions on the circle",
+            f"{different} different stable positions in a full turn",
         )
 
 
@@ -115,14 +115,14 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         found = solution.character.effort(0.0)
         yield finding(
             "stretched_start",
-            f"the slider starts stretched, where its force is 0/0: the limit is {newton(found)}, "
-            "as of a column that buckles; a kink smaller than the part's tolerance decides to which side it gives way",
+            f"the linkage starts stretched, where the force is 0/0: its limit is {newton(found)}, "
+            "the buckling load of a column; a kink smaller than the part's tolerance decides which way it goes",
         )
         if spec.analysis.side is None:
             yield finding(
                 "two_positions",
                 "from the stretched position the crank can go either way, and 'analysis.side' does not say which: "
-                "beyond is taken; with an offset the other way has another force",
+                "'beyond' is assumed; with an offset the force on the other side differs",
                 "analysis.side=before",
             )
     elif math.isnan(assembly.rest) and abs(knee) < RUN_IN and solution.motion[0] <= 0.0:
@@ -140,7 +140,7 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         yield finding(
             "force_unbounded",
             f"at {mm(low)} of travel crank and coupler are in one line and the springs are not relaxed: no finite "
-            "force takes the slider there; keep away from it",
+            "force moves the slider there; keep away from it",
         )
 
 
@@ -150,13 +150,13 @@ def _run_in(solution: Solution) -> Iterator[Finding]:
     force = solution.assembly.rates @ solution.assembly.units(motion).effort
     there = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * motion[-1], motion, force)))
     lead = solution.assembly.unloaded - solution.assembly.linkage.stretched_angle
-    until = f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never comes up"
+    until = f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never reaches 95 %"
     kink = abs(math.sin(lead)) * solution.assembly.linkage.crank
     yield finding(
         "run_in",
-        f"the springs are relaxed {deg(abs(lead))} beside the stretched position, a kink of {mm(kink)} at the crank "
-        f"pin: the force begins at zero, and {until} of that half way; a part made less exactly than that may give "
-        "way to the other side. 'unloaded_offset: 0' starts at the full force",
+        f"the springs are relaxed {deg(abs(lead))} off the stretched position, a kink of {mm(kink)} at the crank "
+        f"pin: the force begins at zero, and {until} of that at mid-travel; a part made less accurately may bend "
+        "to the other side. 'unloaded_offset: 0' starts at the full force",
     )
 
 
@@ -168,8 +168,8 @@ def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     elif found.low <= reference <= found.high and solution.band is None:
         yield finding(
             "reference_zero",
-            f"at the reference {place(solution, reference)} the effort is zero, and a band stated in per cent "
-            "of it has no width; choose another reference",
+            f"at the reference {place(solution, reference)} the {solution.assembly.drive} is zero, and a "
+            "band stated in per cent of zero has no width; choose another reference",
         )
     if window is None:
         return
@@ -201,4 +201,4 @@ def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             dimension = "length" if name == "slider" else "angle"
             told, allowed = format_short(value, dimension), format_short(limit, dimension)
             what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
-            yield finding("joint_overrotated", f"the {what} is moved by {told}, its limit is {allowed}")
+            yield finding("joint_overrotated", f"the {what} is moved by {told}; its limit is {allowed}")
