@@ -239,21 +239,20 @@ class Result:
 
     def to_pandas(self) -> Any:
         """Return the curves as one tidy `pandas.DataFrame` in border units (mm, N, ...)."""
-        import pandas as pd
-
         from cfmkit.tables import curve_table
+        from cfmkit.tables.optional_libraries import library
 
-        return pd.DataFrame(dict(curve_table(self.curves).as_dict()))
+        return library("pandas", "to_pandas").DataFrame(dict(curve_table(self.curves).as_dict()))
 
     def to_xarray(self) -> Any:
         """Return the curves as an `xarray.Dataset` over the dimension ``point``, in border units, which it names."""
         import numpy as np
-        import xarray
 
         from cfmkit.tables import curve_table
+        from cfmkit.tables.optional_libraries import library
 
         table = curve_table(self.curves)
-        found = xarray.Dataset()
+        found = library("xarray", "to_xarray").Dataset()
         for column in table.columns:
             attributes = {} if column.unit is None else {"units": column.unit}
             found[column.name] = ("point", np.asarray(column.values), attributes)

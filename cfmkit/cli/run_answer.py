@@ -36,6 +36,13 @@ if TYPE_CHECKING:
     from cfmkit.runs.run_findings import Report
 
 
+NO_MOTION = (
+    "--animate: no film was written, because this run has no poses to draw: it has no curve, its family draws none, "
+    "or the cam is lifted in time or measured as cut"
+)
+"""What is said where a film was requested and there is none."""
+
+
 def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = False) -> Answer:
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
@@ -46,7 +53,11 @@ def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = Fal
 
         require_ffmpeg()
     with terminal.progress() as progress:
-        return answer(carry_out(verb, wanted, terminal.arguments, progress), everything=terminal.verbose > 0)
+        outcome = carry_out(verb, wanted, terminal.arguments, progress)
+    found = answer(outcome, everything=terminal.verbose > 0)
+    if wanted.animate and f"figures/motion.{wanted.animate}" not in outcome.written:
+        return replace(found, complaints=(*found.complaints, NO_MOTION))
+    return found
 
 
 def folder_of(options: OneSpec, verb: str) -> str:

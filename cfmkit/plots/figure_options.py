@@ -126,7 +126,8 @@ def form_of(
     >>> form_of("svg, pdf", "84 mm").formats
     ('svg', 'pdf')
     """
-    names = tuple(dict.fromkeys(name.strip().lower() for name in (formats or "png").split(",") if name.strip()))
+    listed = ("png" if formats is None else formats).split(",")
+    names = tuple(dict.fromkeys(name.strip().lower() for name in listed if name.strip()))
     if unknown := [name for name in names if name not in FORMATS] or ([""] if not names else []):
         raise UsageError(f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FORMATS)}")
     return FigureForm(names, None if width is None else _width(width), titles, () if style is None else settings(style))

@@ -94,17 +94,18 @@ class StudyResult:
 
     def to_pandas(self) -> Any:
         """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""
-        import pandas as pd
+        from cfmkit.tables.optional_libraries import library
 
-        return pd.DataFrame(dict(self.table.as_dict()))
+        return library("pandas", "to_pandas").DataFrame(dict(self.table.as_dict()))
 
     def to_xarray(self) -> Any:
         """Return the points as an `xarray.Dataset`: one dimension per varied value where they are a grid.
 
         Points that are no grid stand along the dimension ``point``. Units stand in the attribute ``units``.
         """
-        import xarray
+        from cfmkit.tables.optional_libraries import library
 
+        xarray = library("xarray", "to_xarray")
         frame = self.to_pandas()
         axes = list(self.varied)
         size = int(np.prod([frame[name].nunique() for name in axes])) if axes else 0

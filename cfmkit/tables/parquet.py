@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import UsageError
+from cfmkit.tables.optional_libraries import library
 
 if TYPE_CHECKING:
     from cfmkit.tables.table import Table
@@ -22,10 +22,7 @@ def require_pyarrow() -> None:
     cfmkit.errors.UsageError
         With the command that installs it.
     """
-    from importlib.util import find_spec
-
-    if find_spec("pyarrow") is None:
-        raise UsageError("--table parquet needs pyarrow: pip install 'cfmkit[table]'")
+    library("pyarrow", "--table parquet")
 
 
 def parquet(table: Table) -> bytes:

@@ -63,6 +63,13 @@ def test_the_option_writes_the_file(tmp_path):
     assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["motion.gif"]
 
 
+def test_a_run_without_poses_says_that_it_has_no_film(tmp_path, capsys):
+    lift = ["analyze", "configs/cam_dynamics.yaml", "--animate", "gif", "--no-plots", "-q"]
+    assert main([*lift, "-o", str(tmp_path / "out")]) == 0
+    assert "no film was written" in capsys.readouterr().err
+    assert not os.path.exists(tmp_path / "out" / "figures")
+
+
 def test_a_sensitivity_study_has_a_page_with_indices_and_shares(tmp_path):
     out = tmp_path / "out"
     command = ["sensitivity", "configs/studies/cam_tolerance.yaml", "--samples", "20", "--report", "--no-plots"]

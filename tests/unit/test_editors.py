@@ -1,5 +1,6 @@
 """What editors and shells are told: metrics, the line that finds the schema, keys of --set; what the recipe lists."""
 
+import contextlib
 import json
 import re
 import tomllib
@@ -68,6 +69,16 @@ def test_keys_of_set_are_those_of_the_family_on_the_command_line():
     assert "mechanism.bistable.length=" not in completed("mechanism.", spec=cam)
     assert "mechanism.bistable.length=" in completed("mechanism.b", spec="nowhere.yaml")
     assert "mechanism.bistable.length=" in completed("mechanism.b", specs=(str(ROOT / "configs/vcfm_pla.yaml"),))
+
+
+@pytest.mark.parametrize("verb", ["sweep", "sensitivity"])
+def test_vary_is_completed_with_the_same_keys(verb, monkeypatch, capsys):
+    monkeypatch.setenv("_CFMKIT_COMPLETE", "complete_zsh")
+    spec = ROOT / "configs" / "cam.yaml"
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", f"cfmkit {verb} {spec} --vary mechanism.roller_r")
+    with contextlib.suppress(SystemExit):
+        main([])
+    assert "mechanism.roller_radius=" in capsys.readouterr().out
 
 
 def test_after_the_sign_of_equality_come_the_words_of_a_closed_choice():

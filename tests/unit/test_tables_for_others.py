@@ -1,6 +1,7 @@
 """Points and curves for pandas, xarray and Parquet: the same numbers, grids as grids, nothing without its package."""
 
 import io
+import sys
 
 import numpy as np
 import pytest
@@ -77,7 +78,13 @@ def test_an_unknown_format_or_a_missing_package_is_told_first(tmp_path, monkeypa
     ]
     assert main([*command, "--table", "xlsx"]) == 2
     assert "there are csv, parquet" in capsys.readouterr().err
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    for name in ("pyarrow", "pandas", "xarray"):
+        monkeypatch.setitem(sys.modules, name, None)  # as where it is not installed
     with pytest.raises(UsageError, match=r"pip install 'cfmkit\[table\]'"):
         parquet(Table(()))
     assert not (tmp_path / "out").exists()
+    result = cfmkit.analyze("configs/cam.yaml")
+    with pytest.raises(UsageError, match=r"^to_pandas needs pandas: pip install 'cfmkit\[xarray\]'$"):
+        result.to_pandas()
+    with pytest.raises(UsageError, match=r"^to_xarray needs xarray: pip install 'cfmkit\[xarray\]'$"):
+        result.to_xarray()

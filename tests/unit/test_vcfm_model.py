@@ -474,3 +474,12 @@ def test_a_bend_that_is_tighter_than_its_leaf_is_thick_is_not_drawn():
     spec = cfmkit.load(CONFIGS / "vcfm_u_shape.yaml").replace({"mechanism.positive.radius": 1e-6})
     with pytest.raises(GeometryError, match="use a radius above 0"):
         cfmkit.export(spec)
+
+
+@pytest.mark.parametrize("config", ["vcfm_cosine", "vcfm_u_shape"])
+def test_a_travel_of_nanometres_behind_a_preload_needs_no_billion_points(config):
+    spec = cfmkit.load(
+        CONFIGS / f"{config}.yaml", ["analysis.travel=7.5e-9 mm", "analysis.window=null", "requirements=[]"]
+    )
+    found = cfmkit.analyze(spec)
+    assert all(len(curve) <= 30 * spec.analysis.points for curve in found.curves)

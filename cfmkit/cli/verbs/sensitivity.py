@@ -7,6 +7,7 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
@@ -93,6 +94,7 @@ class SensitivityOptions(Studying):
             metavar="A.B=SPREAD",
             text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
             "mechanism.roller_radius='normal:0.05 mm', 'uniform:2 %'. Repeatable; replaces the spec's parameters.",
+            autocompletion=completion.changes,
         ),
     ] = None
     on_failure: Annotated[

@@ -6,6 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
@@ -56,6 +57,7 @@ class SweepOptions(Studying):
             metavar="A.B=VALUES",
             text="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
             "Repeatable; replaces what the spec's block sweep varies.",
+            autocompletion=completion.changes,
         ),
     ] = None
     zip: Annotated[bool, flag("--zip", text="Vary values in step instead of in all combinations.")] = False

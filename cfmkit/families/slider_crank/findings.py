@@ -22,7 +22,7 @@ FINDINGS = {
     "no_zero_stiffness": "no choice of these springs makes the torque constant around the stretched position",
     "reference_zero": "the force or torque at the reference is zero: no band around it exists",
     "reference_outside": "the reference is outside the motion",
-    "stretched_outside_window": "the window leaves out the stretched position, around which force or torque are flat",
+    "stretched_outside_window": "the window leaves out the stretched position, around which force or torque is flat",
     "friction_left_out": "the model of a one-piece part leaves out friction that is specified",
     "self_locks": "friction holds the mechanism: no force, however large, moves it",
     "force_unbounded": "towards the stretched position the force grows without bound",

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
+MOST_BACK = 20
+"""The way from the rest position to the as-made pose has at most so many times the points of the travel: a travel of
+some nanometres would take them by the billion."""
+
 LEAST = 5
 """Points below which there is no curve to speak of."""
 
@@ -182,7 +186,7 @@ def _push(sampler: PartSampler, pose: tuple[float, float | None], grid: FloatArr
     preload, rest = pose
     start = rest or 0.0
     if start < 0:
-        step = grid[1]
+        step = max(grid[1], -start / (MOST_BACK * len(grid)))
         back = -step * np.arange(int(-start / step), 0, -1)
         grid = np.concatenate([back[back > start + 1e-9 * step], grid])
     travel = np.concatenate([[start], grid[grid > start + 1e-12]])

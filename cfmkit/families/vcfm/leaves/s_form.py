@@ -119,7 +119,7 @@ def end_curvature(z: FloatArray) -> FloatArray:
         c, s = np.cos(q), np.sin(q) / q
         w = -2.0 * z * s / (c - s)
         t = np.tanh(q) / q
-    w = np.where(z < -SERIES, -2.0 * z * t / (1.0 - t), w)
+        w = np.where(z < -SERIES, -2.0 * z * t / (1.0 - t), w)
     near = np.abs(z) <= SERIES
     if near.any():
         w[near] = _series(z[near], _W)
