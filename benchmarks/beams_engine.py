@@ -17,7 +17,7 @@ rest their plain slopes in Python, no function more than 0.05. A design of a bat
 calls, 0.02 its network, the rest the same Python as around a single curve; what designs share is kept between them
 (numbering, mesh), but decisions, paths and checks are made for each. Of a whole process (`analyze` of Lan, warm, 0.58 s
 of processor time) imports are four fifths: numpy 0.09, pydantic and the specification's models 0.13, typer 0.09.
-No module of the package takes more than a fiftieth; some 180 dataclasses and 60 models are made anew in each process.
+Some 180 dataclasses and 60 models are made anew in each process.
 Where Python may not keep bytecode (PYTHONDONTWRITEBYTECODE) each process compiles 150 modules, a quarter more.
 The first compilation of the solver is numba's typing for two thirds,
 optimisation for a fifth, translation for a tenth.
