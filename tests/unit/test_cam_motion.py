@@ -325,8 +325,22 @@ def test_the_multibody_method_says_that_it_leaves_rolling_resistance_out():
 
 def test_the_quasi_static_model_says_that_it_is_symmetric():
     assert "symmetric_model" in names(analyze(cam(errors__slider_deviation="1 deg")))
-    assert "symmetric_model" in names(analyze(cam(left__roller_radius="15 mm")))
+    accepted = {"analysis__fidelity": "quasi-static"}
+    assert "symmetric_model" in names(analyze(cam(left__roller_radius="15 mm", **accepted)))
     assert "symmetric_model" not in names(analyze(cam(errors__slider_deviation="0 deg")))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"left__roller_radius": "15 mm"},
+        {"left__brace_length": "190 mm"},
+        {"left__profile": {"force_constant": "11 mm"}},
+    ],
+)
+def test_the_force_of_unlike_sides_is_not_stated_as_that_of_two_right_ones(change):
+    with pytest.raises(SpecError, match=r"mechanism\.left: the quasi-static model is symmetric"):
+        analyze(cam(**change))
 
 
 def test_displacements_of_both_models_are_the_same():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
+from cfmkit.errors import Problem, SpecError
 from cfmkit.families.cam.bought_parts import parts_of
 from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.clearance import smallest, touching
@@ -40,6 +41,11 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
+UNLIKE = (
+    "the quasi-static model is symmetric and would give the force of two right sides: add 'analysis.dynamics' with a "
+    "slow motion, or accept that with analysis.fidelity: quasi-static"
+)
+
 
 def analyze(spec: CamSpec, run: Run) -> Result:
     """Return the force-displacement loop of a cam that is moved slowly, with everything that is wrong with it.
@@ -56,11 +62,19 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     Result
         Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
         be built, PARTIAL if the curve ends before the requested travel.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If the two sides differ and nobody has said that the symmetric model will do.
     """
     if spec.mechanism.profile.file is not None:
         from cfmkit.families.cam.as_built import analyze_built
 
         return analyze_built(spec)
+    left = spec.mechanism.left
+    if left is not None and left.moves_differently and spec.analysis.fidelity is None:
+        raise SpecError([Problem("", 0, 0, "mechanism.left", UNLIKE)])
     try:
         assembly = assemble(spec)
         check_first_pose(assembly)

@@ -214,6 +214,11 @@ class Left(Model):
     profile: Profile | None = Field(None, description="left flank, whole: what it leaves out follows the left side")
     masses: LeftMasses | None = Field(None, description="of the left brace and roller")
 
+    @property
+    def moves_differently(self) -> bool:
+        """Whether its geometry differs, and with it the force at any speed; masses count in a motion only."""
+        return bool(self.brace_length or self.roller_radius or self.profile)
+
 
 class Errors(Model):
     """Angles at which the flanks stand wrongly, turned about the origin that `analysis.dynamics.origin` names."""
