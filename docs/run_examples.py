@@ -112,10 +112,20 @@ def _import_ahead() -> None:
         import_module("cfmkit.families").family(name)
 
 
+SEARCH = 10
+"""A search over all families takes as long as so many other commands: tens of seconds."""
+
+
+def _work(path: Path) -> int:
+    """Return about how long the examples of a file take, in commands."""
+    text = path.read_text(encoding="utf-8")
+    return text.count("\n$ ") + (SEARCH - 1) * text.count("\n$ cfmkit suggest")
+
+
 def main() -> int:
     """Run the examples of the files named on the command line, as many files at once as there are processors."""
     failures = 0
-    longest_first = sorted(map(Path, sys.argv[1:]), key=lambda path: -path.read_text(encoding="utf-8").count("\n$ "))
+    longest_first = sorted(map(Path, sys.argv[1:]), key=_work, reverse=True)
     os.environ.update(import_module("cfmkit.studies.executors").ONE_THREAD)  # before any process imports numpy
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _import_ahead) as pool:
         for failed, told in pool.map(run_file, longest_first):
