@@ -134,7 +134,7 @@ def _json(data: Mapping[str, Any]) -> str:
 def _renderables(block: TextLine | Paragraph | CellGrid, width: int) -> Iterator[RenderableType]:
     """Yield what rich prints of a block; of a paragraph line by line."""
     if isinstance(block, CellGrid):
-        yield _table(block)
+        yield _table(block, width)
     elif isinstance(block, Paragraph):
         import textwrap
 
@@ -163,17 +163,33 @@ def _text(*spans: Span, whole: bool = False) -> Text:
     return text
 
 
-def _table(block: CellGrid) -> Table:
+SHORTEST = 8
+"""Columns that a cell of several lines gets at least: most words of the pages are not longer."""
+
+
+def _least_width(block: CellGrid, rows: Sequence[Sequence[Text]]) -> int:
+    """Return how wide a page has to be for a table of which only the columns of texts wrap."""
+    widths = (2 if block.indented else 0) + block.gap * (len(block.columns) - 1)
+    for place, column in enumerate(block.columns):
+        longest = max([len(column.head), *(row[place].cell_len for row in rows if place < len(row))])
+        widths += min(longest, SHORTEST) if column.wraps else longest
+    return widths
+
+
+def _table(block: CellGrid, width: int) -> Table:
     from rich.table import Table
 
     headed = any(column.head for column in block.columns)
     table = Table(box=None, show_header=headed, header_style=FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
     if block.indented:
         table.add_column("", width=0)
+    rows = [[_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row] for row in block.rows]
+    # Where the page is too narrow for what should not wrap, this is folded, too: a number that loses its last digit
+    # or its unit at the margin would be a wrong one.
+    folded = _least_width(block, rows) > width
     for column in block.columns:
-        table.add_column(column.head, overflow="fold", no_wrap=not column.wraps)
-    for row in block.rows:
-        cells = (_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row)
+        table.add_column(column.head, overflow="fold", no_wrap=not (column.wraps or folded))
+    for cells in rows:
         table.add_row(*([""] if block.indented else []), *cells)
     return table
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 import cfmkit
-from cfmkit.cli.verbs.suggest import room, seconds
+from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
@@ -55,6 +55,12 @@ def test_options_replace_keys_of_a_file(tmp_path):
     assert block.wish().banded
     assert block.wish().low == pytest.approx(9.0)
     assert block.wish().travel == pytest.approx(3e-3)
+
+
+def test_a_material_named_again_is_one_more_and_replaces_none():
+    assert keys(SuggestOptions(material=["pom", "pla,abs"])) == {"material": "[pom,pla,abs]"}
+    assert keys(SuggestOptions(material=["[pom]"], prefer=[])) == {"material": "[pom]"}
+    assert keys(SuggestOptions(material=["[pom, pla]", "abs"])) == {"material": "[pom, pla,abs]"}
 
 
 def test_a_room_and_a_time_may_be_written_short():

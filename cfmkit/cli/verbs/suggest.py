@@ -53,7 +53,9 @@ class SuggestOptions(Common):
     room: Annotated[
         str | None, _key("room", "AxBxCmm", "Across the travel, along it, and the depth, which may be left out.")
     ] = None
-    material: Annotated[str | None, _key("material", "A,B", "What it may be made of: `show materials`.")] = None
+    material: Annotated[
+        list[str] | None, _key("material", "A,B", "What it may be made of: `show materials`. May be repeated.")
+    ] = None
     process: Annotated[str | None, _key("process", "NAME", "fdm, sls, laser, wire-edm or mill.")] = None
     adjustable: Annotated[str | None, _key("adjustable", "A,B", "Between which forces it is adjusted: 15N,25N.")] = None
     hysteresis: Annotated[str | None, _key("hysteresis", "SHARE", "Largest loss of a cycle, over its work.")] = None
@@ -61,9 +63,10 @@ class SuggestOptions(Common):
         str | None, _key("cycles", "N", "Presses that it has to survive; judged of a material with fatigue data.")
     ] = None
     made_well: Annotated[str | None, _key("yield", "SHARE", "Share of made parts that meet the wish.")] = None
-    prefer: Annotated[str | None, _key("prefer", "A,B", "What decides the order: size,ripple,parts,stress,depth.")] = (
-        None
-    )
+    prefer: Annotated[
+        list[str] | None,
+        _key("prefer", "A,B", "What decides the order: size,ripple,parts,stress,depth. May be repeated."),
+    ] = None
     time_budget: Annotated[
         str, option("--time-budget", metavar="TIME", shown=True, text="Time for everything: 60s, 10min.")
     ] = BUDGET
@@ -148,8 +151,10 @@ def keys(options: SuggestOptions) -> dict[str, str]:
     found = {}
     for one in fields(options):
         value = getattr(options, one.name)
-        if one.name not in KEYS or value is None:
+        if one.name not in KEYS or value is None or value == []:
             continue
+        if isinstance(value, list):
+            value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
         if one.name == "room":
             value = room(value)
         elif one.name in LISTS and not value.strip().startswith("["):
@@ -206,8 +211,11 @@ def _folder(options: SuggestOptions) -> str:
     return str(Path("cfm-out") / f"{stem}-suggest")
 
 
-HEADS = ("", "", "mean", "ripple", "room", "hysteresis", "safety", "parts")
-"""Of the table; "yield" follows where one is wished."""
+HEADS = ("", "", "mean", "ripple", "room", "safety", "parts")
+"""Of the table; "hysteresis" follows where a proposal has some, and "yield" where one is wished."""
+
+VARIANT = 1
+"""The column whose cells may take several lines; a number is never broken."""
 
 
 def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterator[Block]:
@@ -215,9 +223,13 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     yield TextLine((Span("suggest", LABEL), Span(f"  {data['message']}")), f"{written.seconds:.1f} s")
     if data["proposals"]:
         yield BLANK
-        rows = [_row(str(number), one, data) for number, one in enumerate(data["proposals"], 1)]
-        heads = (*HEADS, "yield") if "yield" in data["wish"] else HEADS
-        yield CellGrid(tuple(GridColumn(head, False) for head in heads), rows, gap=2, indented=True)
+        more = _more(data)
+        rows = [
+            [*_row(str(number), one, data), *(_share(one[name]) for name in more)]
+            for number, one in enumerate(data["proposals"], 1)
+        ]
+        heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
+        yield CellGrid(heads, rows, gap=2, indented=True)
     if data["near_misses"]:
         yield BLANK
         yield line("misses one wish", LABEL)
@@ -237,6 +249,12 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     yield written.block(everything)
 
 
+def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the shares that follow the other columns of the table."""
+    lossy = any(one["hysteresis"] is not None for one in data["proposals"])
+    return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in data["wish"] else ()))
+
+
 def _silent(one: Mapping[str, Any]) -> list[str]:
     """Return why a family has no proposal, and the nearest wish that it could meet."""
     nearest = ", ".join(f"{key} {value}" for key, value in one["nearest"].items())
@@ -246,23 +264,17 @@ def _silent(one: Mapping[str, Any]) -> list[str]:
 def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[str]:
     unit = "N*mm" if "torque" in data["wish"] else "N"
     sides = [one["across"], one["along"], one["depth"]]
-    told = " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm"
+    room_needed = " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm"
     return [
         f"{number} {one['family']}",
         one["variant"],
         f"{one['mean']:.4g} {unit}",
-        _percent(one["ripple"]),
-        told,
-        _percent(one["hysteresis"]),
+        "-" if one["ripple"] is None else f"{100 * one['ripple']:.2g} %",
+        room_needed,
         "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
         str(one["parts"]),
-        *([_share(one["yield"])] if "yield" in data["wish"] else []),
     ]
 
 
 def _share(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.3g} %"
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.2g} %"

@@ -43,7 +43,10 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
         factor = values.get("safety_factor")
         used = 1.0 / factor if factor else 0.0
         color = LINES[kinds.index(one.family) % len(LINES)]
-        ax.scatter([area], [ripple], s=20.0 + 200.0 * used, color=color, alpha=0.55, linewidths=0.6, edgecolors=INK)
+        ax.scatter(
+            [area], [ripple], s=20.0 + 200.0 * used, color=color, alpha=0.55, linewidths=0.6, edgecolors=INK,
+            clip_on=False, zorder=3,
+        )  # fmt: skip
         ax.annotate(str(number), (area, ripple), ha="center", va="center", fontsize=SMALL, zorder=5)
         areas.append(area)
         ripples.append(ripple)

@@ -227,11 +227,28 @@ def _outside(wish: Wish, space: Room | None) -> Iterator[str]:
         sides, given = sorted(sides), sorted(given)
     for name, need, have in zip(("across the travel", "along the travel"), sides, given, strict=True):
         if need > have * (1.0 + SLACK):
-            yield f"needs {format_short(need, 'length')} {name}: {format_short(have, 'length')} given"
+            needed, given_side = _apart(need, have)
+            yield f"needs {needed} {name}: {given_side} given"
     if wish.depth is not None and space.depth is None:
         yield f"its depth is not known: {space.assumed}"
     elif wish.depth is not None and space.depth is not None and space.depth > wish.depth * (1.0 + SLACK):
-        yield f"needs a depth of {format_short(space.depth, 'length')}: {format_short(wish.depth, 'length')} given"
+        needed, given_depth = _apart(space.depth, wish.depth)
+        yield f"needs a depth of {needed}: {given_depth} given"
+
+
+def _apart(one: float, other: float) -> tuple[str, str]:
+    """Return two lengths that differ with as many digits as it takes to see that they do.
+
+    Examples
+    --------
+    >>> _apart(0.012, 0.010), _apart(0.01000004, 0.010)
+    (('12 mm', '10 mm'), ('10.00004 mm', '10 mm'))
+    """
+    for digits in range(4, 17):
+        texts = format_short(one, "length", digits), format_short(other, "length", digits)
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def _too_short(wish: Wish, result: Result) -> Iterator[str]:
