@@ -11,6 +11,8 @@ import pickle
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -205,6 +207,35 @@ def test_code_that_cannot_be_loaded_is_compiled_anew(
     said = [record.message for record in caplog.records]
     assert said == ["compiling the beam engine, once: states along beams, a moment"]
     assert len(list(folder.glob("*.code"))) == 1
+
+
+def test_who_comes_while_another_process_compiles_waits_and_takes_what_that_has_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The code appears while the lock is held: nothing is compiled a second time."""
+    assert not list(folder.iterdir())
+    from cfmkit.elastica.kernels import build
+
+    code = machine_code.Code((), b"")
+    monkeypatch.setattr(build, "compiled", lambda *_all: pytest.fail("compiled although another process did"))
+    monkeypatch.setattr(machine_code, "loaded", lambda found: found)
+    monkeypatch.setattr(disk_cache, "linked", lambda *_all: None)
+    got: list[Any] = []
+    waiting = threading.Thread(target=lambda: got.append(compiled._got("slopes")))
+    with caplog.at_level(logging.INFO), disk_cache.one_at_a_time("slopes"):
+        waiting.start()
+        while not caplog.records:
+            time.sleep(0.01)
+        assert "waiting" in caplog.records[0].message
+        disk_cache.write("slopes", code)
+    waiting.join(timeout=10.0)
+    assert got == [code]
+
+
+def test_a_process_that_never_ends_does_not_stop_the_others(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(disk_cache, "LONGEST_WAIT", 0.2)
+    with disk_cache.one_at_a_time("slopes"), disk_cache.one_at_a_time("slopes"):
+        assert list(folder.glob("slopes-*.lock"))
 
 
 def _states_with(call: Any) -> Any:

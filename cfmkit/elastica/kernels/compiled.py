@@ -63,13 +63,26 @@ class Door:
 
 
 def _got(name: str) -> Callable[[bytes, Any], int]:
-    """Return a door's code: what is kept, else what numba makes of the sources now."""
+    """Return a door's code: what is kept, else what numba makes of the sources now, in one process at a time."""
+    if kept := _kept(name):
+        return kept
+    with disk_cache.one_at_a_time(name):
+        return _kept(name) or _made(name)
+
+
+def _kept(name: str) -> Callable[[bytes, Any], int] | None:
+    """Return a door's code as it is kept; None if it has not been compiled here yet."""
     with contextlib.suppress(machine_code.Strange):
         if path := disk_cache.library(name):
             return machine_code.in_library(path)
     with contextlib.suppress(machine_code.Strange):
         if found := disk_cache.read(name):
             return machine_code.loaded(found)
+    return None
+
+
+def _made(name: str) -> Callable[[bytes, Any], int]:
+    """Return a door's code as numba makes it now, and keep it."""
     with reported(name) as report:
         from cfmkit.elastica.kernels import build
 

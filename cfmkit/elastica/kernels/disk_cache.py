@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib.util
 import json
 import logging
 import os
 import sys
 import tempfile
+import time
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,6 +108,63 @@ def _found(name: str, ending: str) -> Iterator[Path]:
             yield path
         else:
             _LOG.info("compiled code in %s is not used: others can write there", folder)
+
+
+LONGEST_WAIT = 120.0
+"""How long a process waits for another one that compiles the same door [s]: several times what the longest takes; a
+process that was stopped must not stop all others."""
+
+_POLLED = 0.05
+"""Between two looks whether the other process is ready [s]; nobody notices so little after many seconds."""
+
+
+@contextlib.contextmanager
+def one_at_a_time(name: str) -> Iterator[None]:
+    """Let one process compile a door while others wait, and then read what it has kept.
+
+    Several workers that begin with an empty cache would each spend the same seconds on the same code, and on few
+    cores each would take that many times as long. Where there is no place or no lock for it, nobody waits.
+    """
+    descriptor = _lock_file(name)
+    if descriptor is None:
+        yield
+        return
+    try:
+        _wait(descriptor, name)
+        yield
+    finally:
+        os.close(descriptor)  # this unlocks, too
+
+
+def _lock_file(name: str) -> int | None:
+    """Return an open file that processes can lock, beside the code; None where there is none."""
+    if importlib.util.find_spec("fcntl") is None:
+        return None
+    for folder in _lasting():
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=0o755, parents=True, exist_ok=True)
+            if trusted(folder):
+                return os.open(folder / _file(name, "lock"), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+    return None
+
+
+def _wait(descriptor: int, name: str) -> None:
+    """Lock a file; go on without the lock after the longest wait, or where the file system has no locks."""
+    import fcntl
+
+    ends = time.monotonic() + LONGEST_WAIT
+    waited = False
+    while time.monotonic() < ends:
+        try:
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not waited:
+                _LOG.warning("another process compiles the beam engine ('%s'): waiting for it", name)
+            waited = True
+            time.sleep(_POLLED)
+        except OSError:
+            return None
+    return None
 
 
 def library(name: str) -> Path | None:
