@@ -20,7 +20,7 @@ from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.studies.suggest import good_parts, search
-from cfmkit.studies.suggest.proposal import OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
@@ -231,6 +231,19 @@ def test_a_candidate_whose_time_is_up_is_not_made():
     offer = function_named(family("cam").propose)(asked, Run())
     one = made(ProposalJob("cam", offer.candidates[0], asked, 0, deadline=1.0))
     assert (one.text, one.message) == ("", OUT_OF_TIME)
+
+
+def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next_run(monkeypatch):
+    monkeypatch.setattr("cfmkit.studies.suggest.proposal.LONGEST", 0.0)
+    asked = wish()
+    offer = function_named(family("slider-crank").propose)(asked, Run())
+    designed = next(one for one in offer.candidates if one.design)
+    assert made(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
+    kept = []
+    monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY))
+    notes = SimpleNamespace(find=lambda _key: -1, add=lambda *one: kept.append(one))
+    assert not suggest(wish(), Run(notes=notes)).proposals
+    assert not kept
 
 
 def test_a_family_out_of_reach_says_what_it_would_need():

@@ -30,6 +30,7 @@ LONGEST = 15.0
 """Seconds that one design may search."""
 
 OUT_OF_TIME = "the time budget ended before it was made and judged"
+ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
 SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
@@ -133,9 +134,11 @@ def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     if clock.late():
         return None, OUT_OF_TIME
     if job.candidate.design and record.design is not None:
-        design = record.design(spec, Run(job.seed, time_budget=_seconds(clock)))
+        seconds, begun = _seconds(clock), time.time()
+        design = record.design(spec, Run(job.seed, time_budget=seconds))
         if design.spec is None or design.status is not Status.COMPLETE:
-            return None, OUT_OF_TIME if clock.late() else design.message
+            ended = time.time() - begun >= seconds
+            return None, OUT_OF_TIME if clock.late() else ENDED_EARLY if ended else design.message
         spec = design.spec
     if clock.late():
         return None, OUT_OF_TIME

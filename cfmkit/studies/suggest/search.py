@@ -23,7 +23,7 @@ from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.identity import code_stamp, stable_hash
 from cfmkit.studies.pool import until
-from cfmkit.studies.suggest.proposal import OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.verification import unverified, verified
 
 if TYPE_CHECKING:
@@ -156,7 +156,8 @@ def suggest(
             proposal = _survived(jobs[index], outcome)
             if proposal.message != OUT_OF_TIME:
                 known[index] = proposal
-                run.notes.add(keys[index], proposal.as_record())
+                if proposal.message != ENDED_EARLY:  # a machine with less to do may finish it next time
+                    run.notes.add(keys[index], proposal.as_record())
             tried += 1
             run.progress(min(0.99, (tried + reused) / max(total, 1)), f"{sum(one.good for one in done)} proposals")
         done += [known[index] for index in sorted(known)]
