@@ -58,7 +58,7 @@ class Entry:
     data : tuple of (str, str)
         The data files that the specification names, and the hashes of their content.
     written, reused : bool
-        Whether it wrote its folder, and whether that was done by an earlier batch.
+        Whether its folder holds its run, and whether that was done by an earlier batch.
     """
 
     spec: str

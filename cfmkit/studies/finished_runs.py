@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,7 +70,10 @@ class KeptRuns:
         if not entry.verb:
             return entry
         data_there = all(_hash_beside(spec, name) == digest for name, digest in told["data"])
-        return entry if data_there and self._untouched(folder, told["manifest"]) else None
+        if not data_there or not self._untouched(folder, told["manifest"]):
+            return None
+        # pages link to its folder, and comparisons read it, as if it had been written now
+        return replace(entry, written=told["manifest"] is not None)
 
     def keep(self, entry: Entry) -> None:
         """Note how a specification ended, unless that may be different tomorrow."""

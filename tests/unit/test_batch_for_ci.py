@@ -55,6 +55,23 @@ def test_a_batch_compared_with_itself_has_no_changes_and_one_that_changed_return
     assert wide.compared.changes
 
 
+def test_what_an_earlier_batch_finished_is_compared_too(folder):
+    cfmkit.batch("a.yaml", "before", verb="analyze", plots=False)
+    thicker = ["mechanism.positive.width=10.01 mm"]
+    cfmkit.batch("a.yaml", "out", verb="analyze", plots=False, changes=thicker)
+    again = batch(compare="before", changes=thicker)
+    assert again.entries[0].reused
+    assert again.exit_code is ExitCode.REQUIREMENT_MISSED
+    assert "force_mean" in {change.name for change in again.compared.changes}
+
+
+def test_the_page_of_a_second_run_still_leads_to_the_page_of_each(folder):
+    for reused in (False, True):
+        found = batch(page=True)
+        assert found.entries[0].reused is reused
+        assert '<a href="a/report.html">' in (folder / "out" / "report.html").read_text()
+
+
 def one(**more):
     return replace(Entry("a.yaml", "a", "analyze", "vcfm", "a", "complete", written=True), **more)
 
