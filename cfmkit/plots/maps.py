@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.plots.rounding import is_level, levelled
 from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
-from cfmkit.plots.style import SMALL, axes_mm, new_figure, styled
+from cfmkit.plots.style import INK, SMALL, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -156,7 +156,13 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     lines = axes.contour(
         across.value(x), up.value(y), np.ma.masked_invalid(values), levels=levels, colors="white", linewidths=0.7
     )
-    axes.clabel(lines, fontsize=SMALL, fmt="%.4g")
+    from matplotlib import patheffects
+
+    # white is read on the dark end of the colours only; a dark outline carries it over the light end
+    outline = [patheffects.withStroke(linewidth=1.6, foreground=INK)]
+    lines.set_path_effects(outline)
+    for label in axes.clabel(lines, fontsize=SMALL, fmt="%.4g"):
+        label.set_path_effects(outline)
 
 
 def _between(low: float, high: float) -> FloatArray:

@@ -19,7 +19,7 @@ from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
-from cfmkit.studies.suggest import good_parts, search
+from cfmkit.studies.suggest import figures, good_parts, search
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import ordered, suggest
 
@@ -290,3 +290,21 @@ def test_the_same_seed_gives_the_same_texts():
     offers = [function_named(family("cam").propose)(asked, Run(3)) for _ in range(2)]
     texts = [[cfmkit.dumps(one.spec) for one in offer.candidates] for offer in offers]
     assert texts[0] == texts[1]
+
+
+def long_names(count):
+    spec = cfmkit.load(WISHES.parents[1] / "configs" / "cam.yaml")
+    numbers = {"across": 0.05, "along": 0.05, "ripple": 0.01, "safety_factor": 1.5}
+    variant = "catalogue springs of the widest sort, 138 x 93.8 mm (2)"
+    return [SimpleNamespace(family="cam", variant=variant, spec=spec, numbers=numbers) for _ in range(count)]
+
+
+@pytest.mark.parametrize("drawn", [figures.pareto, figures.to_one_scale])
+def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
+    figure = drawn(long_names(12), wish())
+    figure.draw_without_rendering()
+    titles = [ax.title if ax.title.get_text() else ax._left_title for ax in figure.axes]
+    boxes = [one.get_window_extent() for one in [*figure.texts, *titles] if one.get_text()]
+    assert len(boxes) >= 13
+    assert all(0 <= box.x0 and box.x1 <= figure.bbox.x1 and 0 <= box.y0 and box.y1 <= figure.bbox.y1 for box in boxes)
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])

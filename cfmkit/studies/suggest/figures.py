@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,13 @@ MOST = 12
 """Proposals that are drawn."""
 
 
+LINE = 3.4
+"""Between lines of small text [mm]: 7 pt with a third of it between them."""
+
+LETTER = 1.4
+"""Room of one letter of small text [mm]: names of proposals take 1.33 on average (DejaVu Sans, 7 pt)."""
+
+
 def named(number: int, proposal: Proposal) -> str:
     """Return what a proposal is called in tables and pictures."""
     return f"{number} {proposal.family}, {proposal.variant}"
@@ -32,8 +40,11 @@ def named(number: int, proposal: Proposal) -> str:
 @styled
 def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     """Return the area that each proposal needs against its ripple; the larger the bubble, the more it is stressed."""
-    figure = new_figure(160.0, 100.0)
-    ax = axes_mm(figure, (17.0, 13.0, 100.0, 76.0))
+    names = [_within(38.0, named(number, one)) for number, one in enumerate(proposals[:MOST], 1)]
+    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was wished"
+    height = max(100.0, 18.0 + LINE * sum(len(text.split("\n")) for text in [*names, key]) + 1.2 * len(names))
+    figure = new_figure(160.0, height)
+    ax = axes_mm(figure, (17.0, 13.0, 100.0, height - 24.0))
     kinds = list(dict.fromkeys(one.family for one in proposals))
     areas, ripples = [], []
     for number, one in enumerate(proposals, 1):
@@ -57,13 +68,12 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     ax.set_ylim(0.0, 1.12 * max([100.0 * wish.ripple, *ripples]))
     ax.set_xlabel("room needed in the plane [cm²]")
     ax.set_ylabel("ripple over the travel [%]")
-    figure.text(0.02, 0.965, "what the proposals need, and how flat they are", fontsize=NORMAL, color=INK)
-    told = [(named(number, one), one.family) for number, one in enumerate(proposals, 1)][:MOST]
-    for row, (text, kind) in enumerate(told):
-        color = LINES[kinds.index(kind) % len(LINES)]
-        figure.text(0.745, 0.88 - 0.045 * row, text, fontsize=SMALL, color=color)
-    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was wished"
-    figure.text(0.745, 0.88 - 0.045 * (len(told) + 2), key, fontsize=SMALL, color=GREY)
+    figure.text(0.02, 1.0 - 3.5 / height, "what the proposals need, and how flat they are", fontsize=NORMAL, color=INK)
+    top = 10.0
+    for text, kind in [*zip(names, (one.family for one in proposals), strict=False), (key, None)]:
+        color = GREY if kind is None else LINES[kinds.index(kind) % len(LINES)]
+        figure.text(0.745, 1.0 - top / height, text, fontsize=SMALL, color=color, va="top")
+        top += LINE * len(text.split("\n")) + 1.2
     return figure
 
 
@@ -75,20 +85,27 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
     rows = -(-len(drawn) // COLUMNS)
     columns = min(COLUMNS, len(drawn))
+    names = [_within(150.0 / columns - 2.0, named(number, one)) for number, one in enumerate(proposals[:MOST], 1)]
+    above = 3.5 + LINE * max(len(text.split("\n")) for text in names)
     scale = min(150.0 / (columns * wide), 190.0 / (rows * high), 90.0 / max(wide, high))
     cell = wide * scale, high * scale
-    figure = new_figure(160.0, rows * (cell[1] + 7.0) + 14.0)
+    figure = new_figure(160.0, rows * (cell[1] + above) + 14.0)
     total = figure.get_figheight() * 25.4
     for number, ((moving, space), size) in enumerate(zip(drawn, sizes, strict=True)):
         row, column = divmod(number, COLUMNS)
         left = 5.0 + column * (150.0 / columns) + 0.5 * (150.0 / columns - cell[0])
-        ax = axes_mm(figure, (left, total - 8.0 - (row + 1) * (cell[1] + 7.0), *cell))
+        ax = axes_mm(figure, (left, total - 8.0 - (row + 1) * (cell[1] + above), *cell))
         moving.draw(ax, 0)
         _frame(ax, space, size, (wide, high))
-        ax.set_title(named(number + 1, proposals[number]), fontsize=SMALL, loc="left", pad=1.5)
+        ax.set_title(names[number], fontsize=SMALL, loc="left", pad=1.5)
     figure.text(0.02, 1.0 - 5.0 / total, "the proposals to one scale, each in the room given", fontsize=NORMAL)
     figure.text(0.02, 1.5 / total, _scale_told(wish), fontsize=SMALL, color=GREY)
     return figure
+
+
+def _within(width: float, text: str) -> str:
+    """Return small text on as many lines as a width [mm] asks for."""
+    return textwrap.fill(text, int(width / LETTER))
 
 
 def _scale_told(wish: Wish) -> str:
