@@ -306,5 +306,5 @@ def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
     titles = [ax.title if ax.title.get_text() else ax._left_title for ax in figure.axes]
     boxes = [one.get_window_extent() for one in [*figure.texts, *titles] if one.get_text()]
     assert len(boxes) >= 13
-    assert all(0 <= box.x0 and box.x1 <= figure.bbox.x1 and 0 <= box.y0 and box.y1 <= figure.bbox.y1 for box in boxes)
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 and box.y1 <= figure.bbox.y1 for box in boxes)
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
