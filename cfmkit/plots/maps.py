@@ -159,7 +159,7 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     from matplotlib import patheffects
 
     # white is read on the dark end of the colours only; a dark outline carries it over the light end
-    outline = [patheffects.withStroke(linewidth=1.6, foreground=INK)]
+    outline: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=1.6, foreground=INK)]
     lines.set_path_effects(outline)
     for label in axes.clabel(lines, fontsize=SMALL, fmt="%.4g"):
         label.set_path_effects(outline)
