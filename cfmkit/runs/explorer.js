@@ -8,6 +8,7 @@
   }));
   const COLOURS = ["#0072B2", "#D55E00", "#1A1A1A", "#9933FF", "#C28570", "#663300"];
   const SVG = "http://www.w3.org/2000/svg";
+  const STOPPED = { problem: ["the explorer has been stopped; start cfmkit explore again"] };
   let busy = false, waiting = false, resting = 0;
 
   const changes = () => keys.filter((key) => key.now !== null)
@@ -26,7 +27,7 @@
     busy = true;
     try {
       do { waiting = false; show(await ask("answer")); } while (waiting);
-    } catch { show({ problem: ["the explorer has been stopped; start cfmkit explore again"] }); }
+    } catch { show(STOPPED); }
     busy = false;
     clearTimeout(resting);
     resting = setTimeout(draw, 350);
@@ -139,19 +140,19 @@
   });
   by("reset").addEventListener("click", () => {
     for (const key of keys) {
-      key.range.value = key.value; key.text.value = String(Number(key.value)); set(key, key.value);
+      key.range.value = key.value; key.text.value = key.text.defaultValue; set(key, key.value);
     }
     update();
   });
   by("copy").addEventListener("click", async () => {
-    const found = await ask("yaml");
+    const found = await ask("yaml").catch(() => STOPPED);
     const text = found.yaml || found.problem.join("\n");
     by("yaml").textContent = text; by("yaml").hidden = false;
     try { await navigator.clipboard.writeText(text); by("said").textContent = "copied"; }
     catch { by("said").textContent = "select and copy the text below"; }
   });
   by("save").addEventListener("click", async () => {
-    const found = await ask("save", { name: by("name").value.trim() });
+    const found = await ask("save", { name: by("name").value.trim() }).catch(() => STOPPED);
     by("said").textContent = found.saved ? `saved as ${found.saved}` : found.problem.join("; ");
   });
   show(data.first);

@@ -37,6 +37,11 @@ MOST_POINTS = 600
 SPAN = 0.5
 """Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
 
+PAIRS = {name: ("x", "y") for name in ("at", "mirror")} | {
+    name: ("from", "to") for name in ("window", "over", "travel")
+}
+"""What the two numbers of a list are called."""
+
 OWN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.ya?ml")
 """Names of files that the page may save: no folder, nothing hidden."""
 
@@ -67,6 +72,15 @@ class Slider:
     unit: str
     about: str
     whole: bool
+
+    @property
+    def label(self) -> str:
+        """What stands beside it: the key, or what a number of a list is."""
+        *_, group, key = ("", *self.path.split("."))
+        if not key.isdecimal():
+            return key.replace("_", " ")
+        pair = PAIRS.get(group, ())
+        return pair[int(key)] if int(key) < len(pair) else f"number {int(key) + 1}"
 
 
 @dataclass
@@ -183,13 +197,19 @@ class Explorer:
         text: str = template("explorer.html.j2").render(
             title=spec.name,
             family=spec.family,
-            groups=groups,
+            groups={name: (_legend(name, spec), sliders) for name, sliders in groups.items()},
             data=escaped_json(data),
             style=part("report.css") + part("explorer.css"),
             script=part("explorer.js"),
             suggestion=f"{Path(self.source).stem}-explored.yaml",
         )
         return text.encode()
+
+
+def _legend(group: str, spec: Spec) -> str:
+    """Return what stands above a group of sliders: its path; of a requirement, also which metric it is about."""
+    match = re.match(r"requirements\.(\d+)", group)
+    return f"{group}: {spec.requirements[int(match[1])].metric}" if match else group
 
 
 def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -25,7 +25,8 @@ pytestmark = [
 
 @pytest.fixture
 def page(tmp_path):
-    (tmp_path / "cam.yaml").write_text((CONFIGS / "cam.yaml").read_text())
+    text = (CONFIGS / "cam.yaml").read_text().replace("200 mm", "200.00012345 mm", 1)  # more digits than a field shows
+    (tmp_path / "cam.yaml").write_text(text)
     server = ExplorerServer(Explorer.of(str(tmp_path / "cam.yaml")))
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
     thread.start()
@@ -85,3 +86,30 @@ def test_a_value_that_is_not_allowed_says_why_and_keys_can_be_found(page):
     page.locator("#find").fill("roller radius")
     expect(page.locator('.key[data-path="mechanism.roller_radius"]')).to_be_visible()
     expect(field).to_be_hidden()
+
+
+def test_the_numbers_of_a_list_and_the_requirements_say_what_they_are(page):
+    names = {
+        path: page.locator(f'.key[data-path="{path}"] label') for path in ("analysis.window.0", "analysis.window.1")
+    }
+    assert [one.inner_text() for one in names.values()] == ["from", "to"]
+    assert "requirements.0: force_ripple" in page.locator("legend").all_inner_texts()
+    assert page.locator("figcaption").first.inner_text().startswith("dashed: as in the file")
+
+
+def test_what_was_moved_goes_back_to_what_stood_there(page):
+    fields = page.locator('.key input[type="text"]')
+    before = [one.input_value() for one in fields.all()]
+    page.get_by_role("slider", name="mechanism.springs.stiffness").press("ArrowRight")
+    assert [one.input_value() for one in fields.all()] != before
+    page.locator("#reset").click()
+    assert [one.input_value() for one in fields.all()] == before
+
+
+def test_an_explorer_that_was_stopped_says_so_at_every_button(page):
+    page.evaluate("() => { window.fetch = () => Promise.reject(new TypeError('no connection')); }")
+    for button in ("#copy", "#save"):
+        page.locator(button).click()
+        sync_api.expect(
+            page.locator("#said, #yaml").filter(has_text="start cfmkit explore again").first
+        ).to_be_visible()
