@@ -7,6 +7,8 @@ search for new ones is requested: ``CFMKIT_TEST_SEARCH=1 pytest`` draws new exam
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import blas_threads  # noqa: F401 before numpy
@@ -19,6 +21,14 @@ plugin_support.register()
 settings.register_profile("repeat", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("search" if os.environ.get("CFMKIT_TEST_SEARCH") else "repeat")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the beam engine beside the first tests, where several processes test: else all of them wait for one."""
+    if not hasattr(config, "workerinput") and getattr(config.option, "numprocesses", None):
+        command = [sys.executable, "-m", "cfmkit", "warm", "--quiet"]
+        warming = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        config.add_cleanup(warming.wait)
 
 
 SLOW_CASES = Path(__file__).parent / "tests" / "slow_cases.txt"

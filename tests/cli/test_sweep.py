@@ -166,7 +166,7 @@ def test_exit_codes(cli, arguments, code, message):
 
 
 def test_a_time_limit_costs_its_points_only(cli, tmp_path):
-    slow = ("--vary", "analysis.points=[21, 1000000]", "--timeout-per-point", "0.25")
+    slow = ("--vary", "analysis.points=[21, 1000000]", "--timeout-per-point", "1")
     done = cli("sweep", str(CAM), *slow, "-o", "out", "--no-plots")
     assert done.code == 6
     assert [row["status"] for row in rows(tmp_path / "out")] == ["complete", "timeout"]
@@ -174,7 +174,7 @@ def test_a_time_limit_costs_its_points_only(cli, tmp_path):
 
 SOME, MANY = (
     ("--vary", "mechanism.roller_radius=8 mm:16 mm:50", "--vary", f"mechanism.springs.stiffness=0.5 N/mm:0.9 N/mm:{n}")
-    for n in (16, 40)
+    for n in (8, 40)
 )
 
 
@@ -182,16 +182,16 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     command = ("sweep", str(CAM), *SOME, "-o", "out", *FEW, "-j", "2")
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
-    until(lambda: journal.exists() and journal.stat().st_size > 20_000)
+    until(lambda: journal.exists() and journal.stat().st_size > 10_000)
     process.send_signal(signal.SIGINT)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 130
     assert b"run the same command again to go on" in complaints
     part = rows(tmp_path / "out")
-    assert 0 < len(part) < 800
+    assert 0 < len(part) < 400
     assert cli(*command).code == 0
     whole = rows(tmp_path / "out")
-    assert len(whole) == 800
+    assert len(whole) == 400
     assert [row for row in whole if row in part] == part
 
 
@@ -224,7 +224,7 @@ def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
     assert not (tmp_path / "out" / "results.csv").exists()
 
 
-@pytest.mark.parametrize(("kills", "points"), [(2, SOME), pytest.param(100, MANY, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "points"), [(1, SOME), pytest.param(100, MANY, marks=pytest.mark.slow)])
 def test_kills_at_random_moments_lose_no_row_and_change_no_byte(cli, tmp_path, kills, points):
     """Every record that was in the journal stays until all are in the table, which is that of an undisturbed run."""
     quiet = (*points, *FEW, "-q")
