@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -51,6 +52,14 @@ class Made:
     spec: Spec
     seed: int
     points: int
+
+
+def command_of_a_point(options: Studying, redesigns: bool) -> str:
+    """Return the command that computes a point of a study, but for what the study varies."""
+    spec = options.spec if options.spec != "-" else "SPEC"
+    said = ["design" if redesigns else "analyze", spec, *(part for one in options.changes for part in ("--set", one))]
+    said += ["--fidelity", options.fidelity] if options.fidelity else []
+    return shlex.join(["cfmkit", *said, *(["--seed", str(options.seed)] if options.seed else [])])
 
 
 def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manifest:

@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const data = JSON.parse(document.getElementById("study-data").textContent);
-  const { head, columns, varied, curves, source } = data;
+  const { head, columns, varied, curves, command } = data;
   const total = columns.length ? columns[0].length : 0;
   const PAGE = 50; // rows at a time: a table of thousands is slow to scroll and nobody reads it
   const body = document.querySelector("#table tbody");
@@ -10,9 +10,9 @@
   const count = document.getElementById("count");
   const point = document.getElementById("point");
   const chosen = new Map();
-  let order = { column: -1, up: true }, first = 0, found = [];
+  let order = { column: -1, up: true }, first = 0, found = [], shown = -1;
 
-  const text = (value) => (value === null ? "" : String(value));
+  const text = (value) => (value === null ? "" : String(typeof value === "number" ? Number(value.toPrecision(6)) : value));
   const create = (name, properties = {}, ...inner) => {
     const made = Object.assign(document.createElement(name), properties);
     made.append(...inner);
@@ -52,11 +52,14 @@
   const draw = () => {
     body.replaceChildren(...found.slice(first, first + PAGE).map((row) => {
       const line = create("tr", { className: "pick" }, ...columns.map((column) => create("td", { textContent: text(column[row]) })));
-      act(line, () => open(row));
+      line.classList.toggle("chosen", row === shown);
+      act(line, () => { open(row); point.scrollIntoView({ block: "nearest" }); });
       return line;
     }));
     const last = Math.min(first + PAGE, found.length);
     count.textContent = `${found.length ? first + 1 : 0} to ${last} of ${found.length}, ${total} points in all`;
+    document.getElementById("less").disabled = first === 0;
+    document.getElementById("more").disabled = last >= found.length;
   };
 
   const SVG = "http://www.w3.org/2000/svg";
@@ -74,7 +77,7 @@
     return marks;
   };
   const chart = (branches) => {
-    const [W, H, L, B, R, T] = [640, 320, 64, 44, 12, 12];
+    const [W, H, L, B, R, T] = [640, 340, 64, 44, 12, 32]; // names of the branches stand above the diagram
     const all = Object.values(branches), xs = all.flatMap((one) => one[0]), ys = all.flatMap((one) => one[1]);
     const span = (values) => [Math.min(...values), Math.max(...values)];
     const [x0, x1] = span(xs), [low, high] = span([0, ...ys]);
@@ -96,21 +99,24 @@
       const [color, dash] = looks[number % looks.length];
       const points = px.map((value, at) => `${x(value).toFixed(1)},${y(py[at]).toFixed(1)}`).join(" ");
       made.append(shape("polyline", { points, fill: "none", stroke: color, "stroke-width": 2, "stroke-dasharray": dash }));
-      if (name) made.append(shape("text", { x: L + 10 + 110 * number, y: T + 14, "font-size": 13, fill: color }, name));
+      if (name) made.append(shape("text", { x: L + 10 + 110 * number, y: T - 12, "font-size": 13, fill: color }, name));
     });
     return made;
   };
   const open = (row) => {
     const told = varied.map((column) => {
       const [, path, unit] = /^(.*?)(?: \[(.*)\])?$/.exec(head[column]);
-      return [path, `${text(columns[column][row])}${unit && unit !== "1" ? ` ${unit}` : ""}`];
+      const value = columns[column][row], behind = unit && unit !== "1" ? ` ${unit}` : "";
+      return { path, shown: `${text(value)}${behind}`, exact: `${value === null ? "" : value}${behind}` };
     });
-    const title = create("h3", { textContent: `point ${row + 1}: ${told.map((pair) => pair.join(" ")).join(", ")}` });
+    const title = create("h3", { textContent: `point ${row + 1}: ${told.map((one) => `${one.path} ${one.shown}`).join(", ")}` });
     const branches = curves.points && curves.points[row];
     const figure = branches
       ? create("figure", {}, chart(branches))
-      : create("pre", {}, create("code", { textContent: ["cfmkit analyze SPEC", ...told.map(([path, value]) => `--set '${path}=${value}'`)].join(" ") + `   # SPEC: the file of ${source}` }));
+      : create("pre", {}, create("code", { textContent: [command, ...told.map((one) => `--set '${one.path}=${one.exact}'`)].join(" ") }));
     point.replaceChildren(title, figure);
+    shown = row;
+    [...body.children].forEach((line, at) => line.classList.toggle("chosen", found[first + at] === row));
   };
 
   heads.forEach((cell, column) => {

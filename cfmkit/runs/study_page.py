@@ -49,6 +49,7 @@ def page(
     files: Mapping[str, bytes],
     command: str,
     drawn: Mapping[str, Figure] = MappingProxyType({}),
+    point: str = "cfmkit analyze SPEC",
 ) -> bytes:
     """Return the page of a study.
 
@@ -64,6 +65,8 @@ def page(
         How the study was started.
     drawn : mapping of str to Figure
         The pictures of the study, by their names.
+    point : str
+        The command that computes one point as the study did, but for what was varied.
     """
     from cfmkit.plots.vector_formats import inline, svg
 
@@ -74,10 +77,10 @@ def page(
     kept = _fitting(head, rows, paths, list(summary.get("metrics", {})))
     columns = [[row[head.index(name)] for row in rows] for name in kept]
     data = {
-        "source": spec.name,
+        "command": point,
         "head": kept,
         "varied": [kept.index(name) for name in paths],
-        "columns": [_numbers(column) for column in columns],
+        "columns": [_numbers(column, exact=name in paths) for name, column in zip(kept, columns, strict=True)],
         "curves": _curves(files.get("curves.csv"), paths, [[row[head.index(path)] for row in rows] for path in paths]),
     }
     best = summary.get("best") or {}
@@ -136,7 +139,10 @@ def _fitting(
     head: Sequence[str], rows: Sequence[Sequence[str]], paths: Sequence[str], shown: Sequence[str]
 ) -> list[str]:
     """Return the columns that the page has room for, in the order of the file."""
-    size = {name: sum(len(_short(row[at])) + 3 for row in rows) for at, name in enumerate(head)}
+    size = {
+        name: sum(len(row[at] if name in paths else _short(row[at])) + 3 for row in rows)
+        for at, name in enumerate(head)
+    }
     first = [name for name in head if name in paths or name in PLAIN or name.partition(" [")[0] in shown]
     kept, used = set(), 0
     for name in dict.fromkeys((*paths, "status", *first, *head)):
@@ -163,12 +169,15 @@ def _short(text: str) -> str:
     return f"{value:.{DIGITS}g}" if math.isfinite(value) else text
 
 
-def _numbers(column: Sequence[str]) -> list[Any]:
-    """Return a column for the script: numbers where there are any, else texts; None where nothing stands."""
+def _numbers(column: Sequence[str], exact: bool) -> list[Any]:
+    """Return a column for the script: numbers where there are any, else texts; None where nothing stands.
+
+    What was varied keeps every digit: the command of a point is made of it.
+    """
     found: list[Any] = []
     for text in column:
         try:
-            value = float(_short(text))
+            value = float(text if exact else _short(text))
         except ValueError:
             found.append(text or None)
         else:

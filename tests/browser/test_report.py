@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
+import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -178,7 +182,39 @@ def test_tables_sort_and_points_open_from_the_keyboard(opened, pages):
         assert rows.first.locator("td").first.inner_text() == first
     rows.first.focus()
     page.keyboard.press("Space")
-    assert "cfmkit analyze SPEC --set 'mechanism.roller_radius=12 mm'" in page.locator("#point").inner_text()
+    spec = CONFIGS / "cam.yaml"
+    assert f"cfmkit analyze {spec} --set 'mechanism.roller_radius=12 mm'" in page.locator("#point").inner_text()
+    assert page.locator("#point").evaluate("one => one.getBoundingClientRect().top < innerHeight")
+    assert rows.first.get_attribute("class") == "pick chosen"
+    assert page.locator("#less").is_disabled()
+    assert page.locator("#more").is_disabled()
     page.locator("#filter").fill("(.*[")
     assert rows.count() == 0
     assert page.locator("#count").inner_text().startswith("0 to 0 of 0")
+
+
+def test_the_command_of_a_point_computes_that_point(opened, tmp_path):
+    changed = ["--set", "mechanism.rolling_friction=0.003", "--fidelity", "quasi-static"]
+    vary = ["--vary", "mechanism.roller_radius=8 mm:9 mm:4", "--metrics", "force_mean"]
+    run("sweep", CONFIGS / "cam.yaml", *changed, *vary, "--report", "--no-plots", "-o", tmp_path / "sweep")
+    page = opened(tmp_path / "sweep" / "report.html")
+    page.locator("#table tbody tr").nth(1).click()
+    _, *command = shlex.split(page.locator("#point code").inner_text())
+    run(*command, "--no-plots", "-o", tmp_path / "point")
+    row = list(csv.DictReader((tmp_path / "sweep" / "results.csv").read_text().splitlines()))[1]
+    assert f"mechanism.roller_radius={row['mechanism.roller_radius [mm]']} mm" in command
+    point = json.loads((tmp_path / "point" / "metrics.json").read_text())["metrics"]
+    assert float(row["force_mean [N]"]) == pytest.approx(point["force_mean"]["value"], rel=1e-12)
+
+
+def test_names_of_branches_stand_above_the_curves(opened, tmp_path):
+    run(
+        *("sweep", CONFIGS / "cam.yaml", "--vary", "mechanism.roller_radius=[8 mm, 9 mm]", "--curves"),
+        *("--metrics", "force_mean", "--report", "--no-plots", "-o", tmp_path),
+    )
+    page = opened(tmp_path / "report.html")
+    page.locator("#table tbody tr").first.click()
+    lines = [one.bounding_box()["y"] for one in page.locator("#point polyline").all()]
+    for name in ("load", "unload"):
+        box = page.locator("#point text", has_text=re.compile(f"^{name}$")).bounding_box()
+        assert box["y"] + box["height"] <= min(lines)

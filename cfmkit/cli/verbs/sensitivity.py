@@ -152,7 +152,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
         if options.report:
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
-            page = study_page.page(found.setup.study.spec, found.setup.paths, kept, command, shown)
+            study = found.setup.study
+            point = study_verbs.command_of_a_point(options, study.design)
+            page = study_page.page(study.spec, found.setup.paths, kept, command, shown, point)
             place.folder.write(study_page.NAME, page)
         made = study_verbs.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = study_verbs.commit(place, made, terminal, exit_code(found))

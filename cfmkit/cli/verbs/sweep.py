@@ -115,7 +115,8 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
-            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command, shown))
+            point = study_verbs.command_of_a_point(options, work.study.design)
+            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command, shown, point))
         code = exit_code(records, summary)
         made = study_verbs.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = study_verbs.commit(place, made, terminal, code)
