@@ -16,8 +16,8 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import DataError, UsageError
-from cfmkit.specs.units.decimal_numbers import shown
-from cfmkit.tables.labheaders import ROLES, ColumnInfo, column_of, describe, is_unit_row, read_units, split_header
+from cfmkit.specs.units.number_text import shown
+from cfmkit.tables.lab_headers import ROLES, ColumnInfo, column_of, describe, is_unit_row, read_units, split_header
 from cfmkit.tables.labtext import SEPARATORS, TextBlock, block_of, decoded, header_cells, refuse_group
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from cfmkit import api
 from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
 from cfmkit.runs.run_page import ENDS, escaped_json, part, template
 from cfmkit.runs.specfile import bind, changed, read_spec
-from cfmkit.specs.units.decimal_numbers import NUMBER
+from cfmkit.specs.units.number_text import NUMBER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -13,9 +13,9 @@ import cfmkit
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_entries import Entry, folders, message, requirements_table, results_table, sources
-from cfmkit.studies.finished_runs import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
+from cfmkit.studies.reused_batch_runs import KeptRuns
 
 
 @pytest.fixture
@@ -241,7 +241,7 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
     monkeypatch.setattr(
-        "cfmkit.studies.finished_runs.origin", lambda libraries: origin(libraries) | {"content": "another"}
+        "cfmkit.studies.reused_batch_runs.origin", lambda libraries: origin(libraries) | {"content": "another"}
     )
     assert recalled() is None
 

@@ -20,7 +20,7 @@ from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
 from cfmkit.plots.moving_svg import poses
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_page, run_findings, run_page, study_page, suggestions_page
+from cfmkit.runs import batch_page, run_findings, run_page, study_page, suggestion_page
 from cfmkit.studies.batch_entries import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -219,7 +219,7 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip
-    text = suggestions_page.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
+    text = suggestion_page.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
     outline = Outline(text)
     assert outline.unbalanced == []
     assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})

@@ -14,7 +14,7 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
-from cfmkit.runs.suggestions import exit_code
+from cfmkit.runs.suggestion_files import exit_code
 from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength

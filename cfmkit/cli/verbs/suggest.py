@@ -100,7 +100,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli.study_verbs import noting
     from cfmkit.designing.starts import Clock
     from cfmkit.families.base import Run
-    from cfmkit.runs import suggestions
+    from cfmkit.runs import suggestion_files
     from cfmkit.runs.run import long_run
     from cfmkit.runs.wish_file import wish_of
     from cfmkit.store import RunFolder
@@ -128,11 +128,13 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
             found = suggest(block.wish(), working, block.prefer, kept)
             left = max(ends - reserve - time.time(), 0.0)
             found = with_better_models(found, replace(working, time_budget=left), options.verify)
-            deadlines = suggestions.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
+            deadlines = suggestion_files.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
-            for name, content in suggestions.files(found, block, working, not options.no_plots, deadlines, command):
+            for name, content in suggestion_files.files(
+                found, block, working, not options.no_plots, deadlines, command
+            ):
                 folder.write(name, content)
-        code = suggestions.exit_code(found)
+        code = suggestion_files.exit_code(found)
         manifest = folder.commit(
             {
                 "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
@@ -141,7 +143,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
             }
         )  # fmt: skip
     written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
-    data = suggestions.as_json(found, block) | written.data | {"reused": found.reused}
+    data = suggestion_files.as_json(found, block) | written.data | {"reused": found.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
     return Answer(data, _page(data, written, terminal.verbose > 0), code, quiet_complaints=complaints)
 

@@ -96,7 +96,7 @@ def _of_file(given: FileProfile) -> SurfaceCourse:
 
     from scipy.interpolate import CubicSpline
 
-    from cfmkit.tables.labpoints import read_profile
+    from cfmkit.tables.measured_outline import read_profile
 
     x, y = read_profile(getattr(given.file, "path", Path(given.file)))
     rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _ROWS)]))

@@ -40,7 +40,7 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.data_files import DataSource
-from cfmkit.tables.labpoints import read_sides
+from cfmkit.tables.measured_outline import read_sides
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,6 @@ knows the exact size of a unit (pint, loaded on first use), `quantities` reads a
 writes text, `fields` holds the annotated types for specifications.
 """
 
-from cfmkit.specs.units.decimal_numbers import read_number
 from cfmkit.specs.units.fields import (
     Acceleration,
     Angle,
@@ -46,6 +45,7 @@ from cfmkit.specs.units.fields import (
     Volume,
     quantity,
 )
+from cfmkit.specs.units.number_text import read_number
 from cfmkit.specs.units.quantities import decimal_text, format_quantity, read_one_of, read_quantity
 from cfmkit.specs.units.registry import unit_table
 from cfmkit.specs.units.rounded import format_short

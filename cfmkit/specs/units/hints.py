@@ -7,7 +7,7 @@ import itertools
 import re
 from typing import TYPE_CHECKING
 
-from cfmkit.specs.units.decimal_numbers import shown
+from cfmkit.specs.units.number_text import shown
 from cfmkit.specs.units.registry import border_size, is_unit, unit_size
 from cfmkit.specs.units.table import SYMBOLS, UNITS
 

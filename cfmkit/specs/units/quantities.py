@@ -1,6 +1,6 @@
 """Text with a unit to an SI float and back, both to the last bit.
 
-The number is read by `cfmkit.specs.units.decimal_numbers`, never by pint. Sizes of units are
+The number is read by `cfmkit.specs.units.number_text`, never by pint. Sizes of units are
 exact fractions, so that the result is the correctly rounded float: "68 mm",
 "6.8 cm" and "0.068 m" are the same number.
 """
@@ -14,8 +14,8 @@ from decimal import Context, Decimal
 from fractions import Fraction
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.decimal_numbers import NUMBER, number_complaint, odd_character, read_number, shown
 from cfmkit.specs.units.hints import unit_complaint
+from cfmkit.specs.units.number_text import NUMBER, number_complaint, odd_character, read_number, shown
 from cfmkit.specs.units.registry import Size, border_size, is_unit, unit_size
 from cfmkit.specs.units.table import COMMON, DIMENSIONS, UNITLESS, dimension_of
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.decimal_numbers import odd_character
+from cfmkit.specs.units.number_text import odd_character
 from cfmkit.specs.units.quantities import decimal_text
 from cfmkit.specs.yamlio.allowed_keys import Slot
 from cfmkit.specs.yamlio.scalars import read_plain

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cfmkit.errors import UsageError
-from cfmkit.specs.units.decimal_numbers import shown
+from cfmkit.specs.units.number_text import shown
 from cfmkit.specs.yamlio.paths import dotted
 from cfmkit.specs.yamlio.source_text import Fault
 from cfmkit.specs.yamlio.tree_builder import DEEPEST, read

@@ -5,7 +5,7 @@ is explicit, and whole arrays of designs are one array operation. The formulas a
 of `geometry` and `statics`, in the same order, for a cam with its own brace and
 roller, without weight. An undercut cam is one of these from the end of its corner on (`undercut`).
 One cut cam of any profile with other braces, rollers, springs and weights around it has a solver of its
-own (`around_one_cam`). Everything else (a stroke that the brace does not reach, a jam within it) is left to the
+own (`same_cam_other_parts`). Everything else (a stroke that the brace does not reach, a jam within it) is left to the
 model of one cam.
 """
 
@@ -19,7 +19,6 @@ import numpy as np
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.cam.build import assemble, weights
 from cfmkit.families.cam.geometry.many_tracks import ManyTracks
-from cfmkit.families.cam.many_designs.around_one_cam import Around, BuiltSlab
 from cfmkit.families.cam.many_designs.corner_forces import CornerSlab, shapes
 from cfmkit.families.cam.many_designs.forces import Designs, Slab
 from cfmkit.families.cam.many_designs.measures import (
@@ -31,6 +30,7 @@ from cfmkit.families.cam.many_designs.measures import (
     WINDOWED,
     measured,
 )
+from cfmkit.families.cam.many_designs.same_cam_other_parts import Around, BuiltSlab
 from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 

@@ -1,4 +1,4 @@
-"""A run that goes from a wish to designs: read it, ask the families, write one folder for each proposal."""
+"""Files of the suggestions for a wish: a folder for each proposal, a table, figures, metrics.json; the exit code."""
 
 from __future__ import annotations
 
@@ -173,11 +173,11 @@ def files(
         for name, figure in drawn.items():
             yield f"figures/{name}.png", png(figure)
     if command is not None:
-        from cfmkit.runs import suggestions_page
+        from cfmkit.runs import suggestion_page
 
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.proposals, 1)}
         unit = "N" if found.wish.kind == "force" else "N*mm"
-        yield suggestions_page.NAME, suggestions_page.page(as_json(found, block), texts, drawn, unit, command)
+        yield suggestion_page.NAME, suggestion_page.page(as_json(found, block), texts, drawn, unit, command)
     work = partial(_made, (plots, command is not None), deadlines, found.proposals)
     made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.proposals))), lambda: False))
     for index, one in enumerate(found.proposals):
