@@ -10,7 +10,22 @@ import pytest
 from beam_equilibrium import Judge
 from beam_networks import drives, network
 
-from cfmkit.elastica import Control, LineLoad, Loading, Path, PathStatus, PointLoad, trace
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    LineLoad,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    Support,
+    Taper,
+    trace,
+)
 
 FINE = Control(tolerance=1e-9)
 
@@ -80,3 +95,30 @@ def test_energy_grows_by_the_work_of_dead_loads_that_are_driven() -> None:
     shift = path.effort[at] - path.effort[0]
     work = shift[-1] - 0.5 * weights @ shift[1:-1]
     assert path.energy[at[-1]] - path.energy[0] == pytest.approx(work + dead_work(path, int(at[-1])), rel=1e-7)
+
+
+def pulled_strip(thin: float) -> Path:
+    """Return a clamped strip whose thickness at a quarter of its length is `thin` [m], its end pulled."""
+    thickness = Taper(np.linspace(0, 1, 5), np.array([1e-3, thin, 0.9e-3, 1.1e-3, 1e-3]))
+    section = Section(1.8e9, 5e-3, thickness, shear=True)
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.12, 0.0, Support(rotation=True))}
+    net = Network(nodes, {"ab": Beam("a", "b", section)})
+    return trace(net, Loading((PointLoad("b", 2.0, 0.1),), np.linspace(0.1, 1.0, 10)), Control(tolerance=1e-7))
+
+
+@pytest.mark.parametrize(("thin", "most"), [(0.1e-3, 8), (0.04e-3, 16)])
+def test_a_thin_place_in_a_strip_takes_segments_there_and_not_everywhere(thin: float, most: int) -> None:
+    """Shared out by length they were 64 and 256: the thin place bears a thousandth of what its neighbours do."""
+    path = pulled_strip(thin)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.error <= 1e-7
+    assert path.solver.mesh.segments <= most
+    judge = Judge(path, -1)
+    gap, _ = judge.gaps("ab")
+    np.testing.assert_allclose(gap / [0.12, 0.12, 1.0], 0.0, atol=2e-6)
+
+
+def test_thicknesses_of_a_usual_strip_leave_its_segments_as_they_are() -> None:
+    """Up to four times as thick at one place as at another, they are shared out by length."""
+    path = pulled_strip(0.3e-3)
+    assert np.ptp(np.diff(path.solver.cut.segment_step)) == 0

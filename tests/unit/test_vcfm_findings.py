@@ -10,6 +10,7 @@ from vcfm_support import CONFIGS, MM, analyzed, message, names, table_i
 
 import cfmkit
 from cfmkit import api
+from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.exact_model import ExactSampler
@@ -437,3 +438,14 @@ def test_a_spring_so_slender_that_rounding_roughens_its_path_is_not_traced_ever_
     assert not sampler.problem
     for side in sampler.sides:
         assert len(side.points.places) < 1000  # 197; with 3e-8 of the force asked of a path good to 1e-5, thousands
+
+
+def test_a_preload_of_a_thousand_kilometres_is_refused_with_its_place(tmp_path, capsys):
+    """The exact model would follow the leaves all the way back."""
+    spec = str(CONFIGS / "vcfm_hybrid.yaml")
+    changes = ["--set", "analysis.preloads=[0 mm, 1e9 mm]", "--fidelity", "exact"]
+    assert main(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
+    assert main(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
+    told = capsys.readouterr().err
+    assert "analysis.preloads" in told
+    assert "at most 3500 mm" in told

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.outcome.path import Path
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
+_MOST_SEGMENTS = 512  # of a beam: singular points are looked at with nothing condensed out, for 2000 minutes a solution
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
@@ -112,11 +113,11 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
         problem = PathProblem(layout, mesh, control, first_only)
         followed = follow(problem)
         trail, last = followed.trail, round_ == _ROUNDS - 1
+        cut = mesh.shorter(4 if _early(problem, trail) else 2)
         if trail.ending.too_long and before is not None and not _further(problem, trail, before):
             trail = ending.stop(problem, trail, STALLED).trail
-        elif trail.ending.too_long and not last:
-            before = trail
-            mesh = mesh.shorter(4 if _early(problem, trail) else 2)
+        elif trail.ending.too_long and not last and cut.segments <= _MOST_SEGMENTS:
+            before, mesh = trail, cut
             continue
         status = trail.ending.status
         if status is PathStatus.NO_START and round_ < _STARTS and followed.share > borne + _GAIN:

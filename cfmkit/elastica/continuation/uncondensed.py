@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import PathProblem, Trail
 
 _STRAIGHT = 1e3  # largest dimensionless force of beams that are not pulled straight
+_MOST_SEGMENTS = 600  # of a network: the tangent is full, 6 unknowns a segment; 2000 segments take minutes a solution
 _SHORT = 1e-4  # share of the drive's range that is a short step
 
 
@@ -37,11 +38,15 @@ def pulled_straight(trail: Trail) -> bool:
 def uncondensed(problem: PathProblem, trail: Trail, wrong: int = 0) -> Resume | None:
     """Go on with nothing condensed out; None where the path does so already, is only judged, or pulled straight.
 
+    None, too, where that would take more than `_MOST_SEGMENTS`.
+
     The last points that are `wrong` are taken back, and short steps before: what they led to may be a limit point, not
     to be jumped over.
     """
     plain = trail.solver
     if pulled_straight(trail) or isinstance(plain, UncondensedSolver) or problem.control.branch == "stop":
+        return None
+    if plain.n_segments > _MOST_SEGMENTS:
         return None
     trail = replace(trail, solver=UncondensedSolver(plain)).up_to(len(trail.points) - wrong)
     while _may_be_shorter(problem, trail):

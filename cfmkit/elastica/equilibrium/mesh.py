@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.section import Section
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
+_STEEP = 4.0
+"""How many times as thick a beam may be in one place as in another before its segments are shared out by softness.
+
+A strip of about 1 mm with 0.075 mm in one place was cut into 128 segments everywhere, where 32 do; nothing changes for
+strips whose optimum is sought between 0.5 mm and 2 mm.
+"""
+
 PRESTRESS, LOADS = "prestress", "constant loads"  # what may be applied before the drive begins
 
 
@@ -90,16 +97,19 @@ class Grid:
 
 
 def grid(layout: Layout, mesh: Mesh) -> Grid:
-    """Cut every beam at its corners and stations, then evenly."""
+    """Cut every beam at its corners, at its stations, and where its thickness has grown `_STEEP` times; then evenly.
+
+    Where the thickness varies more than that along a beam, segments are shared out by how much load a length bears.
+    """
     if not layout.bundle.others:
         return _even(len(layout.network.beams), mesh.segments, mesh.steps)
     breaks = []
     for name, beam in layout.network.beams.items():
         fitted = layout.fits[name]
-        stations = [fitted.parameter(float(u)) for u in beam.section.stations[1:-1]]
+        stations = [fitted.parameter(float(u)) for u in _graded(beam.section)[1:-1]]
         marks = np.unique(np.concatenate([fitted.course.breaks, stations]))
         marks = marks[np.concatenate([[True], np.diff(marks) > SAME])]
-        breaks.append((marks, np.real(fitted.arc(marks))))
+        breaks.append((marks, _shares(beam.section, np.real(fitted.arc(marks)))))
     cut = _cut(breaks, mesh)
     inside = cut.middle.copy()
     for number, name in enumerate(layout.network.beams):
@@ -109,21 +119,55 @@ def grid(layout: Layout, mesh: Mesh) -> Grid:
     return replace(cut, inside=inside)
 
 
+def _graded(section: Section) -> FloatArray:
+    """Return the stations of a section, and places between those whose thicknesses are more than `_STEEP` apart.
+
+    Fractions of the arc length; from one place to the next the thickness changes by one factor, `_STEEP` at most.
+    """
+    if not isinstance(section.thickness, Taper):
+        return section.stations
+    places, values = np.real(section.thickness.stations), np.real(section.thickness.values)
+    found = [places]
+    for (left, right), (one, other) in zip(itertools.pairwise(places), itertools.pairwise(values), strict=True):
+        count = int(np.ceil(abs(np.log(other / one)) / np.log(_STEEP) - 1e-9))
+        if count > 1 and right > left:
+            between = one * (other / one) ** (np.arange(1, count) / count)
+            found.append(left + (right - left) * (between - one) / (other - one))
+    return np.unique(np.concatenate(found))
+
+
+def _shares(section: Section, arcs: FloatArray) -> FloatArray:
+    """Return which share of its segments each smooth piece of a beam gets: that of its length, or of its softness.
+
+    A segment is too long for a thrust P where the integral of sqrt(P/EI) ds over it is: with a linear thickness from a
+    to b the mean of t^(-3/2) is 2/(sqrt(a b) (sqrt(a) + sqrt(b))).
+    """
+    lengths = np.diff(arcs)
+    if not isinstance(section.thickness, Taper) or np.ptp(np.log(np.real(section.thickness.values))) <= np.log(_STEEP):
+        return lengths
+    ends = [
+        [float(np.real(section.thickness_at(place, 0.5 * (left + right)))) ** 0.5 for place in (left, right)]
+        for left, right in itertools.pairwise(arcs.tolist())
+    ]
+    softness = lengths * np.array([2 / (a * b * (a + b)) for a, b in ends])
+    return np.asarray(softness / softness.sum())
+
+
 @lru_cache(maxsize=64)
 def _even(beams: int, segments: int, steps: int) -> Grid:
     """Return the grid of beams without corners or stations whose parameter is the fraction of the arc length."""
     whole = np.array([0.0, 1.0])
-    return _cut([(whole, whole)] * beams, Mesh(segments, steps))
+    return _cut([(whole, np.ones(1))] * beams, Mesh(segments, steps))
 
 
 def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
-    """Cut beams given the parameters of their smooth pieces' ends and the fractions of the arc length there."""
+    """Cut beams given the parameters of their smooth pieces' ends and the shares of the segments that these get."""
     edges: list[tuple[float, float]] = []
     segment_step, beam_segment, beam_of_step = [0], [0], []
     piece: list[int] = []
-    for number, (marks, arcs) in enumerate(breaks):
+    for number, (marks, shares) in enumerate(breaks):
         count = len(segment_step) - 1
-        for (left, right), share in zip(itertools.pairwise(marks.tolist()), np.diff(arcs).tolist(), strict=True):
+        for (left, right), share in zip(itertools.pairwise(marks.tolist()), shares.tolist(), strict=True):
             pieces = max(1, int(np.ceil(mesh.segments * share - 1e-9)))
             steps = np.linspace(left, right, pieces * mesh.steps + 1)
             edges += list(zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True))

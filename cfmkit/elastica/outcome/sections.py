@@ -45,7 +45,8 @@ class Sampler:
 
         self.solver, self.layout = solver, solver.layout
         rows = _ROWS if solver.tolerance > _TIGHT else 2 * _ROWS
-        mesh = Mesh(solver.mesh.segments, max(rows, solver.mesh.steps))
+        panel = len(_CLOSED) - 1  # integrals take whole panels; steps of coils come in any number
+        mesh = Mesh(solver.mesh.segments, panel * -(-max(rows, solver.mesh.steps) // panel))
         self.per_segment = mesh.steps + 1
         self.cut = grid(self.layout, mesh)
         self.model = assemble_model(self.layout, self.cut, table(self.layout, self.cut))

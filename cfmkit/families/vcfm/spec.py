@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
+from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
@@ -40,6 +40,10 @@ class LeafMaterial(MaterialSpec):
             self.model_fields_set.discard("allowable_stress")
             self.model_fields_set.add("yield_strength")
         return self
+
+
+MOST_PRELOAD = 100.0
+"""Lengths of a leaf that a preload may be: every spring closes, or tears, long before."""
 
 
 def _slender(length: float, thickness: float) -> None:
@@ -388,6 +392,18 @@ class VcfmSpec(Spec):
         spring = self.mechanism.positive
         own = {} if spring is None else {"positive.width": spring.width}
         return {"bistable.width": self.mechanism.bistable.width} | own
+
+    @model_validator(mode="after")
+    def _preloads_are_within_reach(self) -> Self:
+        most = MOST_PRELOAD * self.mechanism.bistable.length
+        faults = {
+            ("analysis", "preloads", index): f"is more than {MOST_PRELOAD:g} times the length of a leaf "
+            f"('mechanism.bistable.length'): at most {format_short(most, 'length')}"
+            for index, preload in enumerate(self.analysis.preloads)
+            if abs(preload) > most
+        }
+        refuse("Spec", faults)
+        return self
 
     @model_validator(mode="after")
     def _wide_leaves_are_traced(self) -> Self:
