@@ -396,7 +396,7 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _preloads_are_within_reach(self) -> Self:
         most = MOST_PRELOAD * self.mechanism.bistable.length
-        faults = {
+        faults: dict[tuple[str | int, ...], str] = {
             ("analysis", "preloads", index): f"is more than {MOST_PRELOAD:g} times the length of a leaf "
             f"('mechanism.bistable.length'): at most {format_short(most, 'length')}"
             for index, preload in enumerate(self.analysis.preloads)
