@@ -20,7 +20,7 @@ class Measuring(Common):
         option(
             "--units",
             metavar="s=mm,F=N",
-            text="Units by column name or number, where the header names none; also picks columns.",
+            text="Units by column name or number, if the header states none; also selects columns.",
         ),
     ] = None
     tare: Annotated[

@@ -68,16 +68,14 @@ def flag(*names: str, text: str) -> Any:
 Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
 Fidelity = Annotated[
     str | None,
-    option(
-        "--fidelity", metavar="NAME", text="Which model computes it; `cfmkit show FAMILY` names them at `fidelity`."
-    ),
+    option("--fidelity", metavar="NAME", text="Model to use; `cfmkit show FAMILY` lists the models under `fidelity`."),
 ]
-Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of everything random.")]
-Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")]
+Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of all random numbers.")]
+Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only problems.")]
 NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
 Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Processes; default: all cores.")]
 Timeout = Annotated[
-    float | None, option("--timeout-per-point", metavar="S", text="Give up on a point after S seconds.")
+    float | None, option("--timeout-per-point", metavar="S", text="Stop the computation of a point after S seconds.")
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse nothing of an earlier run.")]
 Tables = Annotated[
@@ -91,7 +89,9 @@ Tables = Annotated[
 ]
 Animate = Annotated[
     Literal["gif", "mp4"] | None,
-    option("--animate", text="Write the mechanism in motion beside its curve, figures/motion.gif; mp4 needs ffmpeg."),
+    option(
+        "--animate", text="Write an animation of the mechanism beside its curve, figures/motion.gif; mp4 needs ffmpeg."
+    ),
 ]
 WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
 
@@ -139,10 +139,10 @@ class FigureChoice(Common):
         option(
             "--figure-width",
             metavar="84mm",
-            text="Width of the figures in print, default: 160mm; letters keep their size.",
+            text="Printed width of the figures; the text keeps its size. Default: 160mm.",
         ),
     ] = None
-    no_titles: Annotated[bool, flag("--no-titles", text="Draw no headings above the figures.")] = False
+    no_titles: Annotated[bool, flag("--no-titles", text="Omit the titles of the figures.")] = False
     figure_style: Annotated[
         str | None,
         option("--figure-style", metavar="FILE", text="Style file of matplotlib (.mplstyle), on top of cfmkit's own."),

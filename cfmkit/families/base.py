@@ -251,7 +251,7 @@ def article(word: str) -> str:
 
 SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
-    OLD_KEY: "a key has another name now; the old one is still read by this version",
+    OLD_KEY: "a key has been renamed; this version still reads the old name",
 }
 """Findings that are made of any family's result."""
 

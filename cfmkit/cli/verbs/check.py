@@ -45,7 +45,7 @@ class Checked:
 
 
 def run(options: CheckOptions, terminal: Terminal) -> Answer:
-    """Check specs without computing anything: every fault of every file, with its line and column."""
+    """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
     found = [_checked(name, options.changes, len(files) > 1) for name in files]
 

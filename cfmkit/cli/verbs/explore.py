@@ -31,7 +31,7 @@ class ExploreOptions(Changing):
 
 
 def run(options: ExploreOptions, terminal: Terminal) -> Answer:
-    """Move the numbers of a spec by sliders in the browser and see curve, metrics and requirements follow.
+    """Change the numbers of a spec with sliders in the browser; curve, metrics and requirements follow.
 
     The page is served on this computer only, and only to whoever has the address with its token. It reads and writes
     nothing outside the spec's folder. Ctrl-C ends it.

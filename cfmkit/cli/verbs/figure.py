@@ -33,7 +33,7 @@ class FigureOptions(Changing, FigureChoice):
 
 
 def run(options: FigureOptions, terminal: Terminal) -> Answer:
-    """Draw several pictures of several runs as one figure, with letters; the file says which, and how wide."""
+    """Combine plots of several runs in one lettered figure; a file states which plots, and how wide."""
     from cfmkit.errors import UsageError
     from cfmkit.runs.composed_figure import panels, read
     from cfmkit.store import RunFolder

@@ -27,7 +27,9 @@ EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 class MeasureOptions(Measuring, FigureChoice):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, perhaps time.", completion.tables)]
+    data: Annotated[
+        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", completion.tables)
+    ]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")
     ] = None

@@ -31,11 +31,11 @@ class PapersOptions(Common):
         str | None, argument("PAPER|FAMILY", "Only this paper, or those of this family: lan-2010, cam; default: all.")
     ] = None
     everything: Annotated[bool, flag("--all", text="Compute what takes a minute, too.")] = False
-    quiet: Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")] = False
+    quiet: Annotated[bool, flag("-q", "--quiet", text="Print only problems.")] = False
 
 
 def run(options: PapersOptions, terminal: Terminal) -> Answer:
-    """Compute the numbers that the papers print again, and say which agree; exit 5 if a verdict does not hold."""
+    """Recompute the numbers printed in the papers and report which agree; exit 5 if a verdict does not hold."""
     from cfmkit.cli.progress import watching
     from cfmkit.runs.papers import check, chosen
 

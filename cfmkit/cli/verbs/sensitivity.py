@@ -85,7 +85,7 @@ class SensitivityOptions(Studying):
     ] = None
     seed: Annotated[
         int | None,
-        option("--seed", metavar="N", low=0, text="Seed of everything random; default: the spec's, else 0."),
+        option("--seed", metavar="N", low=0, text="Seed of all random numbers; default: the spec's, else 0."),
     ] = None  # type: ignore[assignment]
     vary: Annotated[
         list[str] | None,
@@ -117,7 +117,7 @@ class SensitivityOptions(Studying):
 
 
 def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
-    """Find out which values matter most, and what share of manufactured parts will meet the requirements.
+    """Find out which values matter most, and which share of manufactured parts will meet the requirements.
 
     The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
     interruption, run the same command again to continue.

@@ -133,13 +133,14 @@ _ZOOMS, _FINE = 5, 65  # each makes the places 32 times as dense
 
 
 DEFINITIONS = {
-    "tip_force_min": ("force", "smallest axial force of the tip between the ends of the way along the surface"),
-    "tip_force_max": ("force", "largest axial force of the tip between the ends of the way along the surface"),
+    "tip_force_min": ("force", "smallest axial force of the tip along the surface"),
+    "tip_force_max": ("force", "largest axial force of the tip along the surface"),
     "tip_force_band": ("ratio", "(max - min)/max of the axial force along the surface"),
-    "surface_relief": ("length", "largest height of the surface less the smallest, as far as it is followed"),
-    "contact_force_max": ("force", "largest normal force between tip and surface, whichever way it moves"),
-    "lateral_force_max": ("force", "largest force against the motion along the surface, whichever way it moves"),
-    "surface_reach": ("length", "how far along the surface the mechanism can follow it"),
+    "surface_relief": ("length", "largest minus smallest height of the surface, as far as it is followed"),
+    "contact_force_max": ("force", "largest normal force between tip and surface, in both directions of the motion"),
+    "lateral_force_max": ("force", "largest force against the motion along the surface, in both directions of "
+    "the motion"),
+    "surface_reach": ("length", "distance along the surface that the mechanism can follow"),
     "surface_stress_max": ("stress", "largest stress in the mechanism along the surface"),
     "surface_safety_factor": (
         "factor", "allowable stress over the largest stress along the surface; 1 or more is within the limit"

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 BUILT_DEFINITIONS = {
     "profile_rmse": ("length", "root mean square distance of the measured points from the design, along its normal"),
     "profile_sd": ("length", "standard deviation (n - 1) of those distances"),
-    "profile_mean": ("length", "mean of those distances: positive where material is left"),
+    "profile_mean": ("length", "mean of those distances; positive: too much material"),
     "profile_rmse_x": ("length", "root mean square error in x at the same y [SS, fig. 3]"),
     "profile_sd_x": ("length", "standard deviation (n - 1) of the error in x"),
-    "profile_outliers": ("count", "measured points that the registration gave no weight"),
-    "registration_angle": ("angle", "turn that lays the measured points on the design"),
-    "registration_x": ("length", "shift in x after that turn"),
-    "registration_y": ("length", "shift in y after that turn"),
+    "profile_outliers": ("count", "measured points that the registration ignored"),
+    "registration_angle": ("angle", "rotation that registers the measured points to the design"),
+    "registration_x": ("length", "shift in x after that rotation"),
+    "registration_y": ("length", "shift in y after that rotation"),
     "registration_width": (
         "length",
         "material on both flanks, along the normal, that the registration fitted; 0: none",
@@ -46,11 +46,11 @@ BUILT_DEFINITIONS = {
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
     "registration_y_per_width": (
         "ratio",
-        "shift in y with which the registration answers a cam that is wider on both flanks, per width along its normal",
+        "shift in y that the registration finds for a cam that is wider on both flanks, per width along its normal",
     ),
-    "profile_force_sd": ("force", "standard deviation (n - 1) of what the profile's errors add to the force"),
-    "profile_force_share": ("ratio", "that, over the mean force of the design [SS, fig. 13: 0.8 %]"),
-    "rest_force_mean": ("force", "mean of what the springs' rest length adds to the force of the design"),
+    "profile_force_sd": ("force", "standard deviation (n - 1) of the force error due to the profile"),
+    "profile_force_share": ("ratio", "that standard deviation over the mean force of the design [SS, fig. 13: 0.8 %]"),
+    "rest_force_mean": ("force", "mean force error due to the rest length of the springs"),
     "manufacturing_force_share": (
         "ratio",
         "median over the sampled cams of the standard deviation of the force error along the travel, over the "
@@ -68,24 +68,31 @@ DEFINITIONS = {
     "spring_stiffness": ("stiffness", "K, the sum of all parallel springs"),
     "theoretical_force": (
         "force",
-        "4 K A, plus the weights that the profile is shaped to carry: without friction, with the parts it is cut for; "
-        "of a curve the largest",
+        "4 K A, plus the weights that the profile is shaped to carry: without friction, with the parts that it is "
+        "cut for; for a target curve the largest value",
     ),
-    "undercut_travel": ("length", "travel at the start that runs on a corner of the cam; 0 if the roller fits"),
+    "undercut_travel": (
+        "length",
+        "travel at the start over which the roller runs on a corner of the cam; 0 if there is no corner",
+    ),
     "roller_radius_max": ("length", "smallest radius of curvature of the roller path: the largest roller that fits"),
     "force_constant_min": ("length", "smallest force constant whose path the roller can follow"),
     "corner_force_max": (
         "force",
         "largest force on the way up while the roller pivots on the corner; none if friction holds it there",
     ),
-    "jam_travel": ("length", "travel at the start over which friction lets no force move the slider up"),
+    "jam_travel": ("length", "travel at the start over which the mechanism self-locks: no force moves the slider up"),
     "spring_elongation_max": ("length", "largest elongation of the springs"),
     "contact_force_max": ("force", "largest contact force between a roller and the cam"),
-    "pressure_angle_max": ("angle", "largest angle between a brace's pull and its roller's motion, on the flank"),
+    "pressure_angle_max": (
+        "angle",
+        "largest angle between the force of a brace and the motion of its roller, on the flank",
+    ),
     "brace_angle_max": ("angle", "largest angle of a brace from the axis"),
     "friction_half_gap_max": (
         "ratio",
-        "largest (up - down)/(up + down) on the flank: set by friction and geometry, no choice of profile removes it",
+        "largest (up - down)/(up + down) on the flank: fixed by friction and geometry, no choice of the profile "
+        "removes it",
     ),
     **{
         f"loop_{what}_{kind}": (
@@ -106,7 +113,7 @@ DEFINITIONS = {
     },
     "contact_force_least": (
         "force",
-        "smallest contact force beyond the first point; not positive where a roller leaves the cam",
+        "smallest contact force beyond the first point; zero or negative if a roller leaves the cam",
     ),
     "clearance_min": ("length", "smallest distance of the moving parts from plate, screws and each other"),
     "bearing_load_max": ("force", "largest radial load of one roller bearing"),
@@ -125,14 +132,17 @@ DEFINITIONS = {
     "roller_speed_max": ("angular_velocity", "largest speed at which a roller turns"),
     "slider_speed_max": ("velocity", "largest speed of the slider"),
     "slider_acceleration_max": ("acceleration", "largest acceleration of the slider"),
-    "dead_weight_peak": ("ratio", "largest acceleration over g: what the motion adds to the force of a dead weight"),
+    "dead_weight_peak": (
+        "ratio",
+        "largest acceleration over g: relative increase of the force of a dead weight",
+    ),
     "moving_mass_max": ("mass", "largest mass that, fixed to the slider, would have the same kinetic energy"),
-    "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the force at rest in the same place"),
+    "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the static force at the same position"),
     "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes sign"),
     "force_peak_over_slow": ("ratio", "largest F/F_1 - 1, F_1 the force of the same motion within 1 s [SS, Fig. 14]"),
     "angle_error_effect": (
         "ratio",
-        "static force at the end of the motion over that with flanks at the right angles, less 1 [SS, Fig. 15 and 16]",
+        "static force at the end of the motion over that without the angular error, minus 1 [SS, Fig. 15 and 16]",
     ),
     **WIRE_DEFINITIONS,
 } | BUILT_DEFINITIONS

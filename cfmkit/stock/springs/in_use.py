@@ -31,8 +31,8 @@ WIRE_DEFINITIONS = {
     ),
     "spring_life": (
         "count",
-        "cycles of the whole travel that a bought spring lasts: by the S-N data of its wire and Goodman's line, else "
-        "as its maker states",
+        "life of a bought spring in cycles of the whole travel: from the S-N data of its wire and Goodman's line, "
+        "or as its manufacturer states",
     ),
 }
 

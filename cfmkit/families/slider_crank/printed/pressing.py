@@ -66,7 +66,7 @@ class PressingEnd(Enum):
     """How pressing a chain ended."""
 
     COMPLETE = "every requested point is a stable equilibrium on the requested branch"
-    LIMIT_POINT = "the slider cannot be pressed further in equilibrium: a limit point of the travel"
+    LIMIT_POINT = "there is no equilibrium for a further displacement of the slider: a limit point of the travel"
     UNSTABLE = "stability is lost: the chain would jump"
     NOT_CONVERGED = "no step converged, or the tolerance was not reached"
     WRONG_BRANCH = "the chain bends to the side opposite to the requested one"

@@ -25,7 +25,7 @@ DEFINITIONS = {
     "stiffness_class": (
         "text",
         "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
-        "tristable over the motion; a fall of at most twice `analysis.tolerance` is zero [LH, sec. 3]",
+        "tristable over the motion; a drop of at most twice `analysis.tolerance` counts as zero [LH, sec. 3]",
     ),
     "stiffness_drop": (
         "ratio",
@@ -33,7 +33,7 @@ DEFINITIONS = {
         "from 1 on there is a second equilibrium",
     ),
     "stable_positions": ("count", "stable equilibria in the motion, the unloaded position included"),
-    "unstable_positions": ("count", "unstable equilibria in the motion: behind each the mechanism snaps through"),
+    "unstable_positions": ("count", "unstable equilibria in the motion; beyond each the mechanism snaps through"),
     "snap_through_angle": ("angle", "crank angle of the first unstable equilibrium from the unloaded position"),
     "snap_through_travel": ("length", "slider travel of the first unstable equilibrium from the unloaded position"),
     "second_stable_angle": ("angle", "crank angle of the next stable equilibrium from the unloaded position"),
@@ -67,13 +67,13 @@ DEFINITIONS = {
     "loop_share_guide": ("ratio", "the share of the loop's area that the slider's guide takes"),
     "force_per_anchor": (
         "stiffness",
-        "by how much the force rises per travel of the anchor of the slider's spring: alike over the whole motion, so "
-        "that a trim leaves the shape of the curve as it is",
+        "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
+        "that a trim does not change the shape of the curve",
     ),
     "force_per_degree": (
         "force",
-        "by how much the mean force in the window rises when the unloaded angle is turned by one degree, at the same "
-        "places of the slider",
+        "increase of the mean force in the window per degree of the unloaded angle, at the same positions of the "
+        "slider",
     ),
     "stretched_angle": ("angle", "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]"),
     "folded_angle": ("angle", "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]"),
@@ -84,7 +84,7 @@ DEFINITIONS = {
     "slider_pin_rotation_max": ("angle", "largest rotation of the spring at the slider pin"),
     "slider_travel_max": ("length", "largest travel of the slider from the unloaded position"),
     "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
-    "guide_force_max": ("force", "largest force of the slider of one leg on its guide, across its way"),
+    "guide_force_max": ("force", "largest transverse force of the slider of one leg on its guide"),
     **WIRE_DEFINITIONS,
 }
 
