@@ -6,7 +6,7 @@ import signal
 import traceback
 from contextlib import suppress
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import typer
 
@@ -24,7 +24,15 @@ ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 class Stopped(BaseException):
-    """A signal asked the process to end; not an Exception, so that nothing swallows it."""
+    """A signal asked the process to end; not an Exception, so that nothing swallows it.
+
+    Attributes
+    ----------
+    began : bool
+        Whether the command has opened a journal, in which it keeps what it has finished; the same for all signals.
+    """
+
+    began: ClassVar[bool] = False
 
     def __init__(self, number: int) -> None:
         """Keep the signal's number."""
@@ -35,6 +43,10 @@ class Stopped(BaseException):
     def goes_on(self, fresh: bool) -> None:
         """Add that what is finished is kept; a command that was to reuse nothing goes on without that option."""
         self.told += f"; what is finished is kept: {go_on(fresh)}"
+
+    def nothing_begun(self) -> None:
+        """Add that there is nothing to go on with yet, neither computed nor cleared away by ``--fresh``."""
+        self.told += "; nothing was computed yet: run the same command again"
 
     def starts_over(self) -> None:
         """Add that nothing was finished that could be kept: short searches and first points are computed again."""

@@ -108,7 +108,13 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     )
     if wishes.verbose:
         _tell_more()
-    answer = call.run(call.options, wishes)
+    Stopped.began = False
+    try:
+        answer = call.run(call.options, wishes)
+    except Stopped as stop:
+        if hasattr(call.options, "fresh") and not Stopped.began:
+            stop.nothing_begun()
+        raise
     hidden = wishes.json or wishes.quiet
     wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
     if wishes.json:

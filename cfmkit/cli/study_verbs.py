@@ -89,6 +89,7 @@ def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
     from cfmkit.cli.failures import Stopped
     from cfmkit.studies.journal import Journal
 
+    Stopped.began = True
     with Journal(folder.journal, fresh) as journal:
         try:
             yield journal

@@ -92,6 +92,29 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
     assert told == [f"terminated; {more if finished else anew}"]
 
 
+EARLY = """
+import signal, sys
+from cfmkit.cli import main, run_answer
+from cfmkit.runs import batch, wish_file
+
+def ended(*_, **__):
+    signal.raise_signal(signal.SIGTERM)
+
+run_answer.folder_of = run_answer.execute = batch.batch = wish_file.wish_of = ended
+print(main.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("verb", ["sweep", "sensitivity", "batch", "design", "suggest"])
+@pytest.mark.parametrize("fresh", [(), ("--fresh",)])
+def test_a_signal_before_anything_is_computed_says_that_nothing_is(tmp_path, verb, fresh):
+    """With --fresh, too: what an earlier run has kept is not cleared away yet, and is not what was asked for."""
+    command = [sys.executable, "-c", EARLY, verb, "cam.yaml", *fresh]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    told = "error    terminated; nothing was computed yet: run the same command again\n"
+    assert (done.stdout, done.stderr) == ("143\n", told)
+
+
 LOST = """
 import signal, time
 from cfmkit.cli import main
