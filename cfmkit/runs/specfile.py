@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import glob
 import os
 import re
 import sys
@@ -265,11 +266,22 @@ def _similar(name: str) -> str:
     """Return a hint with the names in that folder that look alike."""
     folder, base = os.path.split(name)
     if folder and not os.path.isdir(folder):
-        return f" (nor a folder {visible(folder)})"
+        return f" (nor a folder {visible(folder)}){_shipped(base)}"
     # without their endings: those are alike in any two names
     files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
     near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
-    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else ""
+    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else _shipped(base)
+
+
+def _shipped(base: str) -> str:
+    """Return how an example of that name is had: pages name it as it lies in the sources."""
+    from cfmkit.runs.shipped import shipped_folder
+
+    try:
+        there = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None
+    except UsageError:
+        return ""
+    return f"; `cfmkit examples {there.stem}` copies the one that is shipped" if there is not None else ""
 
 
 def _inside(folder: str) -> str:

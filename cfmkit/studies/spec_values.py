@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -93,6 +94,23 @@ class Leaf:
                 raise CannotVary(f"{given} is not a whole number")
             return int(given), "count"
         return float(given), "ratio"
+
+
+def length_to_vary(spec: Spec) -> tuple[str, float]:
+    """Return the path and the value [mm] of the first length of a mechanism, for hints that show how to vary one."""
+    from cfmkit.specs.yamlio import dump, read_document
+
+    mechanism = read_document(dump(spec, False), "spec").tree["mechanism"]
+    return next(_lengths(mechanism, "mechanism"), ("mechanism.LENGTH", 10.0))
+
+
+def _lengths(tree: Any, path: str) -> Iterator[tuple[str, float]]:
+    for key, value in tree.items():
+        below = f"{path}.{key}"
+        if isinstance(value, dict):
+            yield from _lengths(value, below)
+        elif isinstance(value, str) and (found := re.fullmatch(r"([0-9.]+) mm", value)) and float(found[1]) > 0:
+            yield below, float(found[1])
 
 
 def leaf(spec_type: type[Spec], path: str) -> Leaf:

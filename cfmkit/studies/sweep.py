@@ -10,6 +10,7 @@ from cfmkit.families import family
 from cfmkit.studies.engine import Work
 from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
+from cfmkit.studies.spec_values import length_to_vary
 from cfmkit.studies.study import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
@@ -26,10 +27,7 @@ if TYPE_CHECKING:
 MOST_CURVES = 100
 """Curves in one picture; of studies with more points only the metrics are drawn."""
 
-NOTHING = (
-    "nothing to vary: give --vary 'mechanism.roller_radius=8 mm:16 mm:5', "
-    "or add a block 'sweep: {vary: {...}}' to the spec"
-)
+NOTHING = "nothing to vary: give --vary '{example}', or add a block 'sweep: {vary: {...}}' to the spec"
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
     block = spec.sweep
     asked = request.vary or (wishes(block.vary) if block else ())
     if not asked:
-        raise UsageError(NOTHING)
+        raise UsageError(NOTHING.replace("{example}", _example(spec)))
     plan = _plan(spec, request, asked)
     design = _given(request.design, block.design if block else False)
     drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES
@@ -90,6 +88,12 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
     names = request.metrics or (block.metrics if block else ())
     metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
     return Work(Study(spec, plan.paths, metrics, design, curves, request.seed), plan)
+
+
+def _example(spec: Spec) -> str:
+    """Return how a length of a specification's own mechanism is varied, by a tenth down and up."""
+    path, value = length_to_vary(spec)
+    return f"{path}={0.9 * value:.4g} mm:{1.1 * value:.4g} mm:5"
 
 
 def writes_curves(spec: Spec, request: SweepRequest) -> bool:

@@ -263,3 +263,22 @@ def test_closed_streams_are_no_error(cli, cam):
     process = cli.shell(script)
     assert process.wait(timeout=60) == 0
     assert (cli.folder / "out/manifest.json").exists()
+
+
+def test_a_missing_file_that_is_shipped_says_how_to_have_it(cli):
+    for name in ("configs/cam.yaml", "cam.yaml", "configs/studies/cam_tolerance.yaml"):
+        told = cli("analyze", name)
+        assert told.code == 2
+        assert f"`cfmkit examples {name.rpartition('/')[2].removesuffix('.yaml')}`" in told.err
+    assert "cfmkit examples" not in cli("analyze", "mine.yaml").err
+
+
+@pytest.mark.parametrize("name", ["cam", "vcfm", "slider-crank", "beam"])
+def test_the_hint_for_a_sweep_of_nothing_varies_a_value_of_that_mechanism(cli, name):
+    assert cli("new", name, "-o", "mine.yaml").code == 0
+    told = cli("sweep", "mine.yaml")
+    assert told.code == 2
+    hint = re.search(r"--vary '([^']+)'", told.err)[1]
+    assert cli("sweep", "mine.yaml", "--vary", hint, "--max-points", "4").err.count("5 points") == 1
+    told = cli("sensitivity", "mine.yaml").err
+    assert f"--vary '{hint.partition('=')[0]}=normal" in told

@@ -17,6 +17,7 @@ from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
+from cfmkit.studies.spec_values import length_to_vary
 from cfmkit.studies.study import Study
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ MADE = ("tolerance", "inverse")
 
 NOTHING = (
     "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
-    "or give --vary 'mechanism.roller_radius=normal:0.05 mm'"
+    "or give --vary '{path}=normal:0.05 mm'"
 )
 
 
@@ -142,7 +143,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     """
     block = spec.sensitivity
     if block is None:
-        raise UsageError(NOTHING)
+        raise UsageError(NOTHING.replace("{path}", length_to_vary(spec)[0]))
     parameters = parameters_of(spec, block)
     _suits(spec, block, parameters)
     chosen = seed if seed is not None else block.seed or 0
