@@ -172,10 +172,13 @@ class SolidProblem:
     ----------
     elements : Elements
     supports : Supports
+    obstacles : tuple of (n, 2) arrays
+        Polygons that stand and that the part must not enter [m].
     """
 
     elements: Elements
     supports: Supports
+    obstacles: tuple[FloatArray, ...] = ()
 
     @cached_property
     def _scale(self) -> float:

@@ -86,6 +86,8 @@ class Part:
         Polygons of another width [m].
     largest : float
         Side of an element where the part is thick, in those of its thinnest place.
+    obstacles : tuple of (n, 2) arrays
+        Polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one.
     """
 
     rings: tuple[Ring, ...]
@@ -95,6 +97,7 @@ class Part:
     places: tuple[HeldOrDriven, ...]
     regions: tuple[tuple[FloatArray, float], ...] = ()
     largest: float = 1.0
+    obstacles: tuple[FloatArray, ...] = ()
 
     def meshed(self, size: float) -> Meshed:
         """Return the part with elements of a size [m].
@@ -111,7 +114,7 @@ class Part:
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         unjudged = held | self._beside_clamps(grid, held)
-        return Meshed(SolidProblem(elements, Supports(grid.nodes, groups)), unjudged)
+        return Meshed(SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles), unjudged)
 
     def _beside_clamps(self, grid: Mesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tell which nodes are close to where an edge runs into the face of a rigid piece, not along it."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -157,7 +157,7 @@ def follow(
 
 
 def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
-    """Return where the boundary crosses itself at a pose (2,) [m]; None where it does not.
+    """Return where the boundary crosses itself or a frame at a pose (2,) [m]; None where it does not.
 
     What moves as one rigid piece cannot cross itself. Edges are lines between nodes: two that touch overlap by their
     sagitta at most.
@@ -173,6 +173,8 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
         rigid[group.nodes] = number
     of = np.where(rigid[pieces[:, 0]] == rigid[pieces[:, 1]], rigid[pieces[:, 0]], -1)
     lines = linestrings(places[pieces])
+    if (spot := _at_obstacle(problem, pieces, lines)) is not None:
+        return spot
     own, others = STRtree(lines).query(lines)
     apart = (own < others) & ((of[own] < 0) | (of[own] != of[others]))
     own, others = own[apart], others[apart]
@@ -182,6 +184,21 @@ def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
     if not len(met):
         return None
     return np.asarray(lines[own[met[0]]].intersection(lines[others[met[0]]]).coords[0])
+
+
+def _at_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray | None:
+    """Return where a piece of the boundary, of two nodes each, is in a frame that it was not in at rest [m]."""
+    if not problem.obstacles:
+        return None
+    from shapely import Polygon, intersects, linestrings, union_all
+
+    stands = union_all([Polygon(one) for one in problem.obstacles])
+    entered = intersects(lines, stands)
+    entered[entered] = ~intersects(linestrings(problem.elements.mesh.nodes[pieces[entered]]), stands)
+    if not entered.any():
+        return None
+    common = lines[np.flatnonzero(entered)[0]].intersection(stands)
+    return np.asarray(common.representative_point().coords[0])
 
 
 def bends(state: Balance, found: Balance, steepest: float) -> bool:

@@ -309,6 +309,25 @@ ProcessField = Annotated[PartProcess, BeforeValidator(_process_block, json_schem
 """The type of a key that says how something is made."""
 
 
+class PartFrame(Model):
+    """What stands and what is moved, around the elastic part: thicknesses in the plane."""
+
+    wall: AboveZero | None = Field(None, description="thickness of what is held, behind the roots")
+    shuttle: AboveZero | None = Field(None, description="thickness of what is driven, behind the roots")
+    ground: AboveZero | None = Field(
+        None, description="thickness of what joins all that is held to one piece; default: nothing joins it"
+    )
+    clearance: AboveZero = Field(0.002, description="between that and what moves, over the whole travel")
+
+
+class AroundFrame(PartFrame):
+    """The same of a part with a closed frame around it."""
+
+    inside: tuple[tuple[Length, Length], tuple[Length, Length]] | None = Field(
+        None, description="two corners of its opening, [[x, y], [x, y]]; default: as small as the clearance allows"
+    )
+
+
 class CutPart(Model):
     """How a part is cut: what every family that is cut from a sheet can say."""
 
@@ -342,6 +361,9 @@ class PaddedPart(CutPart):
 
     pad: tuple[AboveZero, AboveZero] | None = Field(
         None, description="depth behind the end and breadth across it, of pads at what is held and driven"
+    )
+    frame: AroundFrame | None = Field(
+        None, description="{wall, shuttle, ground}: depths of the pads, and a frame around the part that joins them"
     )
 
 

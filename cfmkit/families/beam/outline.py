@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,6 +48,9 @@ EYE, HOLE = 2.5, 1.2
 
 ROUGH = 1e-6
 """A beam that ends nearer to its node than this stands on it [m]."""
+
+SWEPT = 25
+"""Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
 
 _CORNERS = 64
 _ON_AXIS = 0.5
@@ -125,7 +128,7 @@ def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], b
     about = assembly.network.nodes[node]
     at = np.array([about.x, about.y])
     if _padded(assembly, node):
-        pads = [_pad(assembly, strip, last) for strip, last in ends]
+        pads = [_pad(assembly, strip, last, _moves(assembly, node)) for strip, last in ends]
         return HeldPlace(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
     strip, last = ends[0]
     index = -1 if last else 0
@@ -154,18 +157,21 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     fits = Layout(network, assembly.drive()).fits
     beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
     pieces, holes = _pieces(assembly, beams, SHARE * tolerance)
+    frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for found in beams.values() for strip in found]
     if (axis := mirror_axis(assembly)) is not None:
         pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis)]
         holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
         lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
     part = spec.mechanism.part or PartSpec()
+    pieces = [*pieces, *frame]
     contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = {assembly.driven, spec.mechanism.drive.node}
     places = _held_places(assembly, beams, tolerance)
     marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
+    marks += [mark(shape, False) for shape in frame]
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
@@ -173,6 +179,76 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     return Drawing(
         "beams", (*contours, *paths, *marks), tables, notes, _sheet(assembly, beams), dimensions=dimensions, facts=facts
     )
+
+
+def standing_frame(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[FloatArray, ...]:
+    """Return the polygons of the frame around the part and of the bars to its pads [m], if one is asked for."""
+    assembly = assemble(spec)
+    network = assembly.network
+    fits = Layout(network, assembly.drive()).fits
+    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
+    return _frame(assembly, beams, tolerance)
+
+
+def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
+    """Return the same for a mechanism that is built."""
+    from cfmkit.export.ground_frame import ground_frame
+
+    part = assembly.spec.mechanism.part or PartSpec()
+    if part.frame is None or part.frame.ground is None:
+        return ()
+    nodes, moving = assembly.network.nodes, {assembly.driven, assembly.spec.mechanism.drive.node}
+    pads: dict[str, FloatArray] = {}
+    covered: list[FloatArray] = []
+    places = tuple(_held_places(assembly, beams, tolerance))
+    for place in places:
+        about = nodes[place.node].support
+        clamped = about.along and about.across and about.rotation and place.node not in moving
+        if clamped and len(place.shapes[0]) == 4:
+            pads |= {f"{place.name} ({k})" if k else place.name: shape for k, shape in enumerate(place.shapes)}
+        else:
+            covered += list(place.shapes)
+            covered += [place.at + EYE / HOLE * (shape - place.at) for shape in place.shapes if len(shape) > 4]
+    return ground_frame(
+        pads, _swept(assembly, places), covered, part.frame.ground, part.frame.clearance, part.frame.inside
+    ).pieces
+
+
+def _swept(assembly: Assembly, places: tuple[HeldPlace, ...]) -> Any:
+    """Return all that beams, and pads that move, cover at rest and over the travel."""
+    from cfmkit.export.ground_frame import moved, swept
+    from cfmkit.families.beam.model import solve
+
+    spec, axis = assembly.spec, mirror_axis(assembly)
+    solid = spec.analysis.fidelity == "solid"
+    path = (solution := solve(spec.replace({"analysis.fidelity": "inextensible"}) if solid else spec)).path
+    chosen = np.unique(np.linspace(0, max(len(solution.keep) - 1, 0), SWEPT).astype(int))
+    points = [int(solution.keep[one]) for one in chosen] if len(solution.keep) else []
+    rest = list(_all_strips(assembly))
+    lines = [one.points for one in rest]
+    lines += [path.shape(name, point) for point in points for name in path.layout.network.beams]
+    shapes = []
+    for place in places:
+        motion = path.motion(place.node)
+        if not np.abs(motion).max(initial=0.0) > 0:
+            continue
+        own = place.name == place.node
+        for x, y, turn in motion[points].tolist():
+            by = np.array([x, y])
+            if not own and axis is not None:
+                by, turn = mirrored(by[None], 0j, axis[1])[0], -turn
+            shapes += [moved(shape, by, turn, place.at) for shape in place.shapes if len(shape) > 2]
+    if axis is not None:
+        lines += [mirrored(line, *axis) for line in lines]
+    half = 0.5 * max(float(one.thickness.max()) for one in rest)
+    return swept(lines, half, shapes)
+
+
+def _all_strips(assembly: Assembly) -> Iterator[BeamStrip]:
+    network = assembly.network
+    fits = Layout(network, assembly.drive()).fits
+    for name in network.beams:
+        yield from strips(network, fits, name)
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
@@ -238,7 +314,7 @@ def _pieces(
             pieces.append(_disc(at, 0.5 * size, bulge))
             support = network.nodes[node].support
             if _padded(assembly, node):
-                pieces.append(_pad(assembly, strip, last))
+                pieces.append(_pad(assembly, strip, last, _moves(assembly, node)))
             elif support.across and not support.rotation:
                 pieces.append(_disc(at, EYE * size, bulge))
                 holes.append(_disc(at, HOLE * size, bulge))
@@ -272,11 +348,18 @@ def _on_axis(assembly: Assembly, node: str) -> bool:
     return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
 
 
+def _moves(assembly: Assembly, node: str) -> bool:
+    """Tell whether a pad at a node moves: it is driven, guided or linked."""
+    about = assembly.network.nodes[node].support
+    driven = node in {assembly.driven, assembly.spec.mechanism.drive.node}
+    return driven or not (about.along and about.across and about.rotation)
+
+
 def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
     """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
     ends = _ends(assembly, beams, node)
     if ends and _padded(assembly, node):
-        middle: FloatArray = _pad(assembly, *ends[0]).mean(axis=0)
+        middle: FloatArray = _pad(assembly, *ends[0], _moves(assembly, node)).mean(axis=0)
         return middle
     found = assembly.network.nodes[node]
     return np.array([found.x, found.y])
@@ -301,7 +384,7 @@ def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def _pad(assembly: Assembly, strip: BeamStrip, last: bool) -> FloatArray:
+def _pad(assembly: Assembly, strip: BeamStrip, last: bool, driven: bool) -> FloatArray:
     """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
     part = assembly.spec.mechanism.part
     index = -1 if last else 0
@@ -311,6 +394,8 @@ def _pad(assembly: Assembly, strip: BeamStrip, last: bool) -> FloatArray:
     depth, half = PAD * size, 0.5 * PAD * size
     if part is not None and part.pad is not None:
         depth, half = part.pad[0], 0.5 * part.pad[1]
+    if part is not None and part.frame is not None:
+        depth = (part.frame.shuttle if driven else part.frame.wall) or depth
     return np.array(
         [at + half * side, at - half * side, at - half * side + depth * out, at + half * side + depth * out]
     )
@@ -333,11 +418,16 @@ def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, di
         if not ends or _on_axis(assembly, node):
             continue
         padded = _padded(assembly, node)
-        middle = _pad(assembly, *ends[0])[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
+        middle = _pad(assembly, *ends[0], True)[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
         other = mirrored(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
-            found.append(_bar(middle, other, PAD * thick))
+            found.append(_bar(middle, other, _shuttle(assembly) or PAD * thick))
     return found
+
+
+def _shuttle(assembly: Assembly) -> float | None:
+    part = assembly.spec.mechanism.part
+    return part.frame.shuttle if part is not None and part.frame is not None else None
 
 
 def _line(strip: BeamStrip) -> Smooth:

@@ -17,7 +17,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.outline import drawing, regions
+from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.families.findings import bracket
@@ -176,12 +176,27 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
-    cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
+    frame = standing_frame(spec)
+    cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
-    return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
+    return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places), obstacles=frame)
+
+
+def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
+    """Return what bends: without the frame, which stands, and the holes in it."""
+    from cfmkit.export.ground_frame import outside
+
+    part = spec.mechanism.part
+    if not frame or part is None or part.frame is None:
+        return spec
+    pads = [one for place in regions(spec) for one in place.shapes if len(one) == 4]
+    kept = outside([one.at for one in part.holes], frame, pads)
+    holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
+    alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
 
 
 def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:

@@ -32,6 +32,8 @@ from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.build import RIM, strip_of
+from cfmkit.families.vcfm.spec import VcfmPart
+from cfmkit.families.vcfm.standing_frame import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import CutPart
 
@@ -57,6 +59,7 @@ Item = Point | Arc | Smooth
 
 def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line."""
+    sizes = _sizes(spec)
     leaves, low = leaves_contours(spec)
     bought = spec.mechanism.springs is not None
     places, heights, _ = _centre_line(spec)
@@ -67,25 +70,29 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
     notes = sharp_notes([place for _, sharp in rounded for place in sharp], part.fillet)
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
-    contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring))
-    return Drawing("vcfm", contours, (table,), (*_notes(spec), *notes), _sheet(spec, spring), dimensions, facts)
+    contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring, sizes))
+    notes = (*_notes(spec), *frame_notes(spec, sizes), *notes)
+    return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts)
 
 
-def _marks(spec: VcfmSpec, spring: Sequence[Contour]) -> Iterator[Contour]:
+def _marks(spec: VcfmSpec, spring: Sequence[Contour], sizes: FrameSizes) -> Iterator[Contour]:
     """Yield walls, shuttle and blocks of the spring on the layers of what stands and of what is driven.
 
-    The block of the spring that stands is the seat of the preload, which moves it before use.
+    Without a seat in the frame the block of the spring that stands is that of the preload, which moves it before use.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
     half, levels = 0.5 * frame.shuttle_width, -(-about.half_beams // 2)
     strip = strip_of(about, spec.mechanism.material)
-    wall, rise = half + float(strip.reach), float(strip.rise)
+    wall = half + float(strip.reach)
     top, bottom = (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
     yield mark(_box(-half, bottom, half, top), driven=True)
-    for x in (wall, -wall - frame.block):
-        yield mark(
-            _box(x, -rise - frame.block, x + frame.block, (levels - 1) * frame.spacing - rise + frame.block), False
-        )
+    if sizes.stopped:
+        yield mark(_box(-sizes.out, sizes.under, sizes.out, sizes.under + sizes.shuttle), driven=True)
+    for x in (wall, -sizes.out):
+        low = sizes.wall_bottom if sizes.floor is None else sizes.floor
+        yield mark(_box(x, low, x + sizes.out - wall, sizes.wall_top), False)
+    if sizes.floor is not None:
+        yield mark(_box(-sizes.out, sizes.floor - sizes.ground, sizes.out, sizes.floor), False)
     if not spring:
         return
     x0, y0, x1, y1 = spring[0].extents
@@ -110,6 +117,13 @@ def _dimensions(spec: VcfmSpec) -> Iterator[DrawnDimension]:
     yield DrawnDimension("rise h", (half, 0.0), (half + reach, -rise), "y")
     yield DrawnDimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
     yield DrawnDimension("shuttle", (-half, 0.0), (half, 0.0), "x")
+    sizes = _sizes(spec)
+    if sizes.stopped:
+        yield DrawnDimension("stop", (sizes.out, sizes.wall_top), (sizes.out, sizes.under), "y")
+    given = (spec.mechanism.part or VcfmPart()).frame
+    if sizes.floor is not None and given is not None and given.seat is not None:
+        face = max(y for _, y in sizes.ledge)
+        yield DrawnDimension("seat of the spring", (0.0, face), (0.0, -spec.mechanism.frame.clearance), "y")
 
 
 def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
@@ -155,20 +169,36 @@ def _notes(spec: VcfmSpec) -> Iterator[str]:
 def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     """Return the outline of shuttle, leaves and walls with the holes between them, and its lowest point [m]."""
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    strip, levels = strip_of(about, spec.mechanism.material), -(-about.half_beams // 2)
-    half, top, bottom = 0.5 * frame.shuttle_width, (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
-    wall, rise = half + float(strip.reach), float(strip.rise)
-    wall_top, wall_bottom = (levels - 1) * frame.spacing - rise + frame.block, -rise - frame.block
+    levels, sizes = -(-about.half_beams // 2), _sizes(spec)
+    half, bottom, wall, out = 0.5 * frame.shuttle_width, -frame.clearance, sizes.wall, sizes.out
     upper = [_edge(spec, 1.0, (half, level * frame.spacing)) for level in range(levels)]
     lower = [_edge(spec, -1.0, (half, level * frame.spacing)) for level in range(levels)]
-    out = wall + frame.block
-    right: list[Item] = [(0.0, top), (half, top), *upper[-1], (wall, wall_top), (out, wall_top)]
-    right += [(out, wall_bottom), (wall, wall_bottom), *_back(lower[0]), (half, bottom), (0.0, bottom)]
-    contours = [_contour([*right, *_mirrored(right)])]
+    top = (levels - 1) * frame.spacing + frame.clearance
+    right: list[Item] = [(0.0, top), (half, top)]
+    if sizes.stopped:
+        head = sizes.under + sizes.shuttle
+        right = [(0.0, head), (out, head), (out, sizes.under), (half, sizes.under)]
+    right += [*upper[-1], (wall, sizes.wall_top), (out, sizes.wall_top)]
+    contours = []
+    if sizes.floor is None:
+        right += [(out, sizes.wall_bottom), (wall, sizes.wall_bottom), *_back(lower[0]), (half, bottom), (0.0, bottom)]
+        contours = [_whole(right)]
+    else:
+        right += [(out, sizes.floor - sizes.ground), (0.0, sizes.floor - sizes.ground)]
+        inner: list[Item] = [(0.0, bottom), (half, bottom), *lower[0], (wall, sizes.floor), *sizes.ledge]
+        contours = [_whole(right), _contour([*inner, *_mirrored(inner)], hole=True)]
     for below, above in pairwise(range(levels)):
         hole = [*lower[above], *_back(upper[below])]
         contours += [_contour(hole, hole=True), _contour(_mirrored(hole), hole=True)]
-    return contours, min(bottom, wall_bottom)
+    low = sizes.wall_bottom if sizes.floor is None else sizes.floor - sizes.ground
+    return contours, min(bottom, low)
+
+
+def _sizes(spec: VcfmSpec) -> FrameSizes:
+    """Return the sizes of what stands around leaves, and holds the spring."""
+    frame = spec.mechanism.part.frame if spec.mechanism.part is not None else None
+    seated = frame is not None and frame.seat is not None
+    return frame_sizes(spec, spring_contours(spec, 0.0)[0].extents if seated else None)
 
 
 def _centre_line(spec: VcfmSpec) -> tuple[FloatArray, FloatArray, FloatArray]:

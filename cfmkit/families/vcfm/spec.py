@@ -12,7 +12,15 @@ from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
+from cfmkit.stock.spec import (
+    CutPart,
+    MaterialSpec,
+    PartFrame,
+    PositiveStress,
+    SafetyFactor,
+    material_input,
+    sheet_faults,
+)
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
@@ -176,6 +184,25 @@ class Frame(Model):
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
 
+class StandingFrame(PartFrame):
+    """What joins the walls, stops the shuttle and holds the preload of the spring."""
+
+    stop: PositiveLength | None = Field(
+        None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
+    )
+    seat: NonNegativeLength | None = Field(
+        None, description="preload that the spring has when it stands on the ground below the shuttle; default: no seat"
+    )
+
+
+class VcfmPart(CutPart):
+    """How both parts are cut, and what of them stands."""
+
+    frame: StandingFrame | None = Field(
+        None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
+    )
+
+
 class Mechanism(Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
@@ -192,7 +219,7 @@ class Mechanism(Model):
         "clamped ends left out",
     )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
-    part: CutPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes")
+    part: VcfmPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes, frame")
 
     @model_validator(mode="before")
     @classmethod
@@ -384,6 +411,22 @@ class VcfmSpec(Spec):
         if self.design is not None and part.part is not None and part.part.sheet is not None:
             refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
         refuse("Spec", sheet_faults(part.part, self.out_of_plane_widths))
+        return self
+
+    @model_validator(mode="after")
+    def _stop_and_seat_leave_the_travel(self) -> Self:
+        frame = self.mechanism.part.frame if self.mechanism.part is not None else None
+        if frame is None:
+            return self
+        if frame.stop is not None and frame.stop < self.travel * (1 - 1e-9):
+            stop, travel = (format_short(one, "length") for one in (frame.stop, self.travel))
+            told = (
+                f"the stop holds the shuttle at {stop}, but the travel is {travel}: make the stop or 'analysis' agree"
+            )
+            refuse("Spec", {("mechanism", "part", "frame", "stop"): told})
+        if frame.seat is not None and self.mechanism.springs is not None:
+            told = "a seat is drawn for a spring of leaves; these springs are bought: leave it out"
+            refuse("Spec", {("mechanism", "part", "frame", "seat"): told})
         return self
 
     @property

@@ -8,14 +8,26 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.contours import Contour, Curve2D, Drawing, DrawnDimension, Line, Region, Sheet, circle, mark, polygon
+from cfmkit.export.contours import (
+    TOLERANCE,
+    Contour,
+    Curve2D,
+    Drawing,
+    DrawnDimension,
+    Line,
+    Region,
+    Sheet,
+    circle,
+    mark,
+    polygon,
+)
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
-from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
+from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of, travel_direction
 from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import PaddedPart
 
@@ -33,6 +45,9 @@ PAD = (0.012, 0.010)
 STRAIGHT, MITRE = 1e-9, 2.0
 """Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
 
+SWEPT = 25
+"""Poses at which what moves must be clear of the frame."""
+
 LINK_RATIO = 5.0
 """Width of a rigid link in flexure thicknesses."""
 
@@ -44,7 +59,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     if spec.piece == "beam":
         beam = spec.mechanism.beam
         strip = strip_of(spec.mechanism, linkage, unloaded)
-        drawn = _strip(strip, beam.offset if beam else 0, pad_of(spec))
+        drawn = _strip(strip, beam.offset if beam else 0, _ends(spec))
         drawn = replace(drawn, sheet=Sheet(beam.width if beam else None))
         return _cut(
             spec, replace(drawn, dimensions=tuple(_dimensions(strip.corners)), facts=tuple(_facts(spec, drawn)))
@@ -55,8 +70,8 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     bar = 0.5 * LINK_RATIO * max(2.0 * half for half in thick)
     order = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
     own = [thick[0], thick[0], bar, bar, thick[1], thick[1], bar, bar, thick[2], thick[2]]
-    pad = pad_of(spec)
-    half = np.array([0.5 * pad[1], *own, 0.5 * pad[1]])
+    pad = _ends(spec)
+    half = np.array([0.5 * pad[2], *own, 0.5 * pad[2]])
     table = {
         "x": (points[:, 0], "length"),
         "y": (points[:, 1], "length"),
@@ -88,6 +103,8 @@ class SolvedPiece:
         Widths.
     thinnest : float
         Of flexures or strip [m].
+    frame : tuple of (n, 2) arrays
+        What stands around it and does not bend [m].
     """
 
     contour: Contour
@@ -95,28 +112,47 @@ class SolvedPiece:
     pads: tuple[FloatArray, FloatArray]
     sheet: Sheet
     thinnest: float
+    frame: tuple[FloatArray, ...] = ()
 
 
 def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
     """Return one leg as it is solved as a solid."""
-    beam = spec.mechanism.beam
+    beam, part = spec.mechanism.beam, spec.mechanism.part
     drawn = drawing(spec)
+    frame: tuple[FloatArray, ...] = ()
+    if part is not None and part.frame is not None and part.frame.ground is not None:
+        frame = _frame(spec, drawn)
+        spec = _without_frame(spec, part, _pads(spec, drawn), frame)
+        drawn = drawing(spec)
     if spec.piece == "beam" and beam is not None and beam.offset:
         linkage = linkage_of(spec.mechanism)
         strip = strip_of(spec.mechanism, linkage, unloaded_angle(spec.mechanism, linkage))
-        drawn = _cut(spec, replace(_strip(strip, 0.0, pad_of(spec)), sheet=Sheet(beam.width)))
+        drawn = _cut(spec, replace(_strip(strip, 0.0, _ends(spec)), sheet=Sheet(beam.width)))
     outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
     thinnest = float(drawn.tables[0].columns["thickness"][0].min())
-    return SolvedPiece(outline, tuple(others), _pads(spec, drawn), drawn.sheet, thinnest)
+    return SolvedPiece(outline, tuple(others), _pads(spec, drawn), drawn.sheet, thinnest, frame)
+
+
+def _without_frame(
+    spec: SliderCrankSpec, part: PaddedPart, pads: tuple[FloatArray, ...], frame: tuple[FloatArray, ...]
+) -> SliderCrankSpec:
+    """Return what bends: without the frame, which stands, and the holes in it."""
+    from cfmkit.export.ground_frame import outside
+
+    kept = outside([one.at for one in part.holes], frame, pads)
+    holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
+    around = part.frame and part.frame.model_copy(update={"ground": None})
+    alone = part.model_copy(update={"frame": around, "holes": holes})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
 
 
 def _pads(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, FloatArray]:
     """Return the pads at the ground and at the slider, the face where the leg begins first, two (4, 2) arrays [m]."""
     table = drawn.tables[0].columns
     points = np.column_stack([table["x"][0], table["y"][0]])
-    depth, breadth = pad_of(spec)
+    *depths, breadth = _ends(spec)
     ends = []
-    for k, sense in ((0, -1.0), (len(points) - 1, 1.0)):
+    for k, sense, depth in ((0, -1.0, depths[0]), (len(points) - 1, 1.0, depths[1])):
         way = sense * _direction(points, k)
         side = 0.5 * breadth * np.array([-way[1], way[0]])
         out = points[k] + depth * way
@@ -130,14 +166,62 @@ def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
     return PAD if part is None or part.pad is None else part.pad
 
 
+def _ends(spec: SliderCrankSpec) -> tuple[float, float, float]:
+    """Return depth of the pad at the ground, of that at the slider, and breadth of both [m]."""
+    depth, breadth = pad_of(spec)
+    frame = spec.mechanism.part.frame if spec.mechanism.part is not None else None
+    return (depth, depth, breadth) if frame is None else (frame.wall or depth, frame.shuttle or depth, breadth)
+
+
 def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
-    """Return a drawing with its inside corners rounded and its fixing holes."""
+    """Return a drawing with its inside corners rounded, its fixing holes, and the frame around it."""
+    from cfmkit.export.union import merged
+
     part = spec.mechanism.part or PaddedPart()
     outline, *others = drawn.contours
     rounded, sharp = filleted(outline, part.fillet)
+    frame = _frame(spec, drawn)
+    made = merged([rounded.points(0.2 * TOLERANCE), *frame], part.fillet) if frame else (rounded,)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
-    marks = (mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True))
-    return replace(drawn, contours=(rounded, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
+    marks = [mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True)]
+    marks += [mark(one, driven=False) for one in frame]
+    return replace(drawn, contours=(*made, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
+
+
+def _frame(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, ...]:
+    """Return the polygons of the frame around the leg and of the bar to its pad [m]; none where none is asked for."""
+    from cfmkit.export.ground_frame import ground_frame
+
+    part = spec.mechanism.part
+    if part is None or part.frame is None or part.frame.ground is None:
+        return ()
+    about, (ground, slider) = part.frame, _pads(spec, drawn)
+    moving = _swept(spec, drawn, slider)
+    return ground_frame({"the ground": ground}, moving, (), part.frame.ground, about.clearance, about.inside).pieces
+
+
+def _swept(spec: SliderCrankSpec, drawn: Drawing, slider: FloatArray) -> Any:
+    """Return all that the leg and the pad at the slider cover at rest and over the travel."""
+    from cfmkit.export.ground_frame import swept
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.printed.model import analyze
+
+    table = drawn.tables[0].columns
+    lines, shapes = [np.column_stack([table["x"][0], table["y"][0]])], [slider]
+    fidelity = {"analysis.fidelity": None} if spec.analysis.fidelity == "solid" else {}
+    solution: Any = analyze(spec.replace(fidelity), Run()).state
+    links = isinstance(spec.mechanism.beam, type(None))
+    half = 0.5 * float(table["thickness"][0].max()) * (LINK_RATIO if links else 1.0)
+    if solution is None:
+        return swept(lines, half, shapes)
+    path = solution.pressed.path
+    angle = travel_direction(linkage_of(spec.mechanism))
+    way = np.array([np.cos(angle), np.sin(angle)])
+    for k in np.unique(np.linspace(0, len(solution.travel) - 1, SWEPT).astype(int)):
+        point = int(path.at_requested[k])
+        lines.append(np.concatenate([path.shape(name, point) for name in path.layout.network.beams]))
+        shapes.append(slider + float(solution.travel[k]) * way)
+    return swept(lines, half, shapes)
 
 
 def _dimensions(points: FloatArray) -> Iterator[DrawnDimension]:
@@ -164,13 +248,13 @@ def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
     return np.array([start - side, end - side, end + side, start + side])
 
 
-def _strip(strip: Strip, offset: float, pad: tuple[float, float]) -> Drawing:
+def _strip(strip: Strip, offset: float, pad: tuple[float, float, float]) -> Drawing:
     """Return a strip as it is drawn: without what printing adds."""
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(strip.corners, axis=0).T))])
     fractions = np.unique(np.concatenate([marks / marks[-1], strip.places]))
     points = np.column_stack([np.interp(fractions * marks[-1], marks, strip.corners[:, k]) for k in (0, 1)])
     thickness = np.interp(fractions, strip.places, np.asarray(strip.thickness)) - offset
-    half = np.array([0.5 * pad[1], *(0.5 * thickness), 0.5 * pad[1]])
+    half = np.array([0.5 * pad[2], *(0.5 * thickness), 0.5 * pad[2]])
     order = [0, *range(len(points)), len(points) - 1]
     table = {
         "place": (fractions * marks[-1], "length"),
@@ -181,10 +265,10 @@ def _strip(strip: Strip, offset: float, pad: tuple[float, float]) -> Drawing:
     return Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("strip", table),))
 
 
-def _piece(points: FloatArray, half: FloatArray, pad: tuple[float, float]) -> tuple[Contour, ...]:
+def _piece(points: FloatArray, half: FloatArray, pad: tuple[float, float, float]) -> tuple[Contour, ...]:
     """Return the outline around a chain of points with half widths [m], between two pads, and its centre line."""
     begin, end = _direction(points, 0), _direction(points, len(points) - 1)
-    line = np.vstack([points[0] - pad[0] * begin, points, points[-1] + pad[0] * end])
+    line = np.vstack([points[0] - pad[0] * begin, points, points[-1] + pad[1] * end])
     wide = np.concatenate([[half[0]], half, [half[-1]]])
     around = [(float(x), float(y)) for x, y in (*_edge(line, wide), *reversed(_edge(line, -wide)))]
     kept = [point for point, following in zip(around, [*around[1:], around[0]], strict=True) if point != following]

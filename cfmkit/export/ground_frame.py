@@ -1,0 +1,188 @@
+"""A closed frame around a part, to which everything that is held is joined by bars: what stands as one piece.
+
+The frame is a rectangle along the axes of the drawing, outside of all that the part covers at rest and as it moves,
+by a clearance. A bar leads from every held pad to that side of the frame to which it is shortest without coming near
+to what moves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import GeometryError
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cfmkit.arrays import FloatArray
+
+ROOT = 2e-5
+"""Bars that cover less of a beam at its root than a square of this side stand beside it [m]."""
+DEEPER = 0.25
+"""Part of the frame's thickness by which bars reach into it."""
+
+
+@dataclass(frozen=True)
+class GroundFrame:
+    """What joins all that is held.
+
+    Attributes
+    ----------
+    sides : tuple of four (4, 2) arrays
+        Bars of the frame, which overlap at its corners [m].
+    bars : tuple of (4, 2) arrays
+        From pads to the frame [m].
+    """
+
+    sides: tuple[FloatArray, ...]
+    bars: tuple[FloatArray, ...]
+
+    @property
+    def pieces(self) -> tuple[FloatArray, ...]:
+        """All of it."""
+        return (*self.sides, *self.bars)
+
+
+def ground_frame(
+    pads: Mapping[str, FloatArray],
+    moving: Any,
+    covered: Sequence[FloatArray],
+    thickness: float,
+    clearance: float,
+    inside: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> GroundFrame:
+    """Return the frame of a part.
+
+    Parameters
+    ----------
+    pads : mapping of (4, 2) arrays
+        Rectangles that stand, by name [m].
+    moving : shapely geometry
+        All that anything else covers, at rest and over the travel [m].
+    covered : sequence of (n, 2) arrays
+        What else the frame goes around: eyes, pads that slide [m].
+    thickness : float
+        Of the frame, in the plane [m].
+    clearance : float
+        Between the frame, its bars and what moves [m].
+    inside : two points, optional
+        Corners of its opening [m]; default: as small as the clearance allows.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If nothing is held by a pad, if the frame is in the way of what moves, or a pad cannot be reached.
+    """
+    from shapely import Polygon, union_all
+
+    if not pads:
+        raise GeometryError(
+            "a frame joins pads that stand, and nothing is clamped; leave out 'mechanism.part.frame.ground'"
+        )
+    low, high = _opening(pads, moving, covered, clearance) if inside is None else np.sort(np.array(inside), axis=0)
+    sides = _sides(low, high, thickness)
+    ring = union_all([Polygon(side) for side in sides])
+    if (common := ring.intersection(moving)).area > ROOT**2:
+        raise GeometryError(
+            f"the frame is in the way of what moves at {_place(common)}; make 'mechanism.part.frame.inside' larger"
+        )
+    bars = [_bar(name, pad, low, high, thickness, moving, clearance) for name, pad in pads.items()]
+    return GroundFrame(sides, tuple(bars))
+
+
+def _place(shape: Any) -> str:
+    at = shape.representative_point()
+    return f"({format_short(at.x, 'length')}, {format_short(at.y, 'length')})"
+
+
+def _opening(
+    pads: Mapping[str, FloatArray], moving: Any, covered: Sequence[FloatArray], clearance: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lower left and the upper right corner of the opening: pads may touch the frame, nothing else."""
+    x0, y0, x1, y1 = moving.bounds
+    loose = np.concatenate([np.array([[x0, y0], [x1, y1]]), *covered])
+    own = np.concatenate(list(pads.values()))
+    low = np.minimum(loose.min(axis=0) - clearance, own.min(axis=0))
+    return low, np.maximum(loose.max(axis=0) + clearance, own.max(axis=0))
+
+
+def _sides(low: FloatArray, high: FloatArray, thickness: float) -> tuple[FloatArray, ...]:
+    (x0, y0), (x1, y1), t = low.tolist(), high.tolist(), thickness
+    boxes = (
+        (x0 - t, y0 - t, x1 + t, y0),
+        (x0 - t, y1, x1 + t, y1 + t),
+        (x0 - t, y0 - t, x0, y1 + t),
+        (x1, y0 - t, x1 + t, y1 + t),
+    )
+    return tuple(np.array([[a, b], [c, b], [c, d], [a, d]]) for a, b, c, d in boxes)
+
+
+def _bar(
+    name: str, pad: FloatArray, low: FloatArray, high: FloatArray, thickness: float, moving: Any, clearance: float
+) -> FloatArray:
+    """Return the shortest bar from the middle of a pad to the frame that is in nobody's way.
+
+    It is as broad as the pad where the pad is narrowest, or half of that. Within a clearance of the pad it
+    may be beside the beam that ends there, as the pad itself is.
+    """
+    from shapely import Polygon
+
+    middle = pad.mean(axis=0)
+    if (middle < low).any() or (middle > high).any():
+        raise GeometryError(f"the pad of {name} is not within 'mechanism.part.frame.inside'")
+    sizes = np.hypot(*(pad[1] - pad[0])), np.hypot(*(pad[2] - pad[1]))
+    free, near, tried = moving.buffer(clearance * (1 - 1e-6)), Polygon(pad).buffer(clearance), None
+    ways = (
+        (middle[1] - low[1], (0.0, -1.0)),
+        (high[1] - middle[1], (0.0, 1.0)),
+        (middle[0] - low[0], (-1.0, 0.0)),
+        (high[0] - middle[0], (1.0, 0.0)),
+    )
+    for length, way in sorted(ways, key=lambda one: one[0]):
+        for breadth in sorted({min(sizes), 0.5 * min(sizes)}, reverse=True):
+            reach, half = length + DEEPER * thickness, 0.5 * breadth
+            along, across = np.array(way), half * np.array([-way[1], way[0]])
+            end = middle + reach * along
+            bar = np.array([middle - across, end - across, end + across, middle + across])
+            shape = Polygon(bar).difference(Polygon(pad))
+            inside_way = shape.intersection(moving)
+            beside = shape.difference(near).intersection(free)
+            if inside_way.area <= ROOT**2 and beside.area <= ROOT**2:
+                return bar
+            tried = tried or _place(inside_way if inside_way.area > beside.area else beside)
+    raise GeometryError(
+        f"no bar leads from the pad of {name} to the frame: what moves is in its way, at {tried} of the shortest one; "
+        f"leave out 'mechanism.part.frame.ground', or reduce 'mechanism.part.frame.clearance' "
+        f"({format_short(clearance, 'length')})"
+    )
+
+
+def swept(lines: Sequence[FloatArray], half: float, shapes: Sequence[FloatArray]) -> Any:
+    """Return what lines (n, 2) of a half thickness, and polygons, cover together [m]."""
+    from shapely import LineString, Polygon, union_all
+
+    found = [LineString(line).buffer(half, cap_style="flat") for line in lines if len(line) > 1]
+    return union_all([*found, *(Polygon(shape).buffer(0) for shape in shapes if len(shape) > 2)])
+
+
+def outside(
+    places: Sequence[tuple[float, float]], frame: Sequence[FloatArray], pads: Sequence[FloatArray]
+) -> list[bool]:
+    """Tell which places [m] do not lie in a frame; what is also in a pad does not count as in the frame."""
+    from shapely import Point, Polygon, union_all
+
+    own = union_all([Polygon(one) for one in frame]).difference(union_all([Polygon(one) for one in pads]))
+    return [not own.contains(Point(place)) for place in places]
+
+
+def moved(shape: FloatArray, by: FloatArray, turn: float = 0.0, about: FloatArray | None = None) -> FloatArray:
+    """Return a polygon that is turned by an angle [rad] about a place and shifted [m]."""
+    c, s = math.cos(turn), math.sin(turn)
+    center = np.zeros(2) if about is None else about
+    turned: FloatArray = center + (shape - center) @ np.array([[c, s], [-s, c]]) + by
+    return turned
