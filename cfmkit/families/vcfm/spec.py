@@ -8,19 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.families.vcfm.part_spec import VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.spec import (
-    CutPart,
-    MaterialSpec,
-    PartFrame,
-    PositiveStress,
-    SafetyFactor,
-    material_input,
-    sheet_faults,
-)
+from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
@@ -182,25 +175,6 @@ class Frame(Model):
         0.012, description="height of the diamond's rigid corners: it closes at about this and twice its leaves' rise"
     )
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
-
-
-class StandingFrame(PartFrame):
-    """What joins the walls, stops the shuttle and holds the preload of the spring."""
-
-    stop: PositiveLength | None = Field(
-        None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
-    )
-    seat: NonNegativeLength | None = Field(
-        None, description="preload that the spring has when it stands on the ground below the shuttle; default: no seat"
-    )
-
-
-class VcfmPart(CutPart):
-    """How both parts are cut, and what of them stands."""
-
-    frame: StandingFrame | None = Field(
-        None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
-    )
 
 
 class Mechanism(Model):

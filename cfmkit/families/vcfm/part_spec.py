@@ -1,0 +1,32 @@
+"""How leaves and spring are cut, and what stands around them, in a specification."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from cfmkit.specs.units import Length
+from cfmkit.stock.spec import CutPart, PartFrame
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+NonNegativeLength = Annotated[Length, Field(ge=0)]
+
+
+class StandingFrame(PartFrame):
+    """What joins the walls, stops the shuttle and holds the preload of the spring."""
+
+    stop: PositiveLength | None = Field(
+        None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
+    )
+    seat: NonNegativeLength | None = Field(
+        None, description="preload that the spring has when it stands on the ground below the shuttle; default: no seat"
+    )
+
+
+class VcfmPart(CutPart):
+    """How both parts are cut, and what of them stands."""
+
+    frame: StandingFrame | None = Field(
+        None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
+    )
