@@ -1,0 +1,1 @@
+"""How leaves and spring are cut, and what stands around them."""
