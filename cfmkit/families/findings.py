@@ -80,8 +80,9 @@ def too_soft(share: float, where: str) -> str:
     if not share > TOO_SOFT:
         return ""
     return (
-        f"beams that are wide for their thickness cannot curl across their width: bending them takes about "
-        f"{percent(share)} more energy {where}, and at least as much more force; clamped ends add to it"
+        f"beams that are wide for their thickness cannot curl across their width: bending takes about "
+        f"{percent(share)} more energy {where}, and the force rises by at least the same share; clamped ends "
+        "add to it"
     )
 
 

@@ -93,7 +93,7 @@ def test_a_second_curve_that_ends_early_or_fails_makes_the_run_partial(cli, movi
     wanted = ("--compare-fidelity", "--fidelity", "quasi-static", "--set", f"analysis.dynamics.slider_position={start}")
     done = cli("analyze", moving, *wanted, "-o", "out", "-q")
     assert done.code == 6
-    assert done.err.startswith("partial  fidelity dynamic: the slider is to move from ")
+    assert done.err.startswith("partial  fidelity dynamic: the requested motion of the slider is from ")
     told = document(cli)
     assert (told["status"], told["message"].split(":")[0]) == ("partial", "fidelity dynamic")
     assert (told["metrics"]["fidelity_rms[quasi-static]"]["value"] is None) == (start == "700 mm")

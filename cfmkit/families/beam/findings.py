@@ -119,8 +119,8 @@ def ending_of(solution: Solution) -> PathEnding:
         return PathEnding(said)
     where = format_short(float(solution.motion[-1]), solution.motion_dimension)
     return PathEnding(
-        f"the beams are taut at {where} ({', '.join(taut)}), and beams that do not stretch go no further: allow "
-        "stretching (mechanism.axial)",
+        f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams go no further: allow stretching "
+        "('mechanism.axial: true')",
         (STRETCH,),
     )
 
@@ -182,9 +182,7 @@ def _closure(solution: Solution) -> Iterator[Finding]:
         nodes = solution.spec.mechanism.nodes
         guided = [one.split(" ")[0] for one in moved if nodes[one.split(" ")[0]].support in ("guided", "roller")]
         if guided:
-            yield finding(
-                "closure_adjusted", f"the guides of nodes that were carried along went with them: {', '.join(guided)}"
-            )
+            yield finding("closure_adjusted", f"the guides of moved nodes were moved with them: {', '.join(guided)}")
     beams = solution.path.layout.network.beams
     fits = {
         name: one
@@ -269,15 +267,15 @@ def _stability(solution: Solution) -> Iterator[Finding]:
     if solution.frequencies is None:
         yield finding(
             "flutter_not_judged",
-            "forces turn with their node: 'stable' only means that nothing diverges here; flutter depends on masses: "
-            "give every material a density",
+            "forces rotate with their node: 'stable' covers divergence only; to check flutter, give every material "
+            "a density",
         )
     elif solution.frequencies.flutters.any():
         first = int(solution.keep[int(solution.frequencies.flutters.argmax())])
         yield finding(
             "flutter",
             f"two natural frequencies have met at {drive_text(solution.assembly, float(solution.path.drive[first]))}: "
-            "under forces that turn with their node oscillations grow from there on",
+            "under forces that rotate with their node oscillations grow beyond",
         )
 
 

@@ -121,8 +121,8 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
         return ()
     verb = "counts" if len(found) == 1 else "count"
     message = (
-        f"the quasi-static model is symmetric: {' and '.join(found)} {verb} in the dynamic model only; "
-        "give 'analysis.dynamics' a slow motion to see the effect"
+        f"the quasi-static model is symmetric: {' and '.join(found)} {verb} in the dynamic model only; to see the "
+        "effect, state a slow motion in 'analysis.dynamics'"
     )
     return (finding("symmetric_model", message),)
 
@@ -226,7 +226,7 @@ def _springs(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "spring_slack",
             f"the springs are shorter than their rest length for the first {mm(last)} of travel, by up to "
-            f"{mm(-float(solution.elongation.min()))}: they carry nothing there",
+            f"{mm(-float(solution.elongation.min()))}: they carry no force there",
         )
     limit = solution.assembly.spec.mechanism.springs.max_elongation
     longest = float(solution.elongation[-1])
@@ -258,8 +258,9 @@ def _lift_off(solution: Solution) -> Iterator[Finding]:
         released = _travel_at(solution, beside / loads.stiffness)
         yield finding(
             "lift_off",
-            f"at the start a roller weighs {newton(beside)} across the slider's way, more than the springs hold: the "
-            f"lower one hangs off the cam for the first {mm(released)} of travel; use preloaded springs, lighter "
+            f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
+            f"the lower roller lifts off the cam for the first {mm(released)} of travel; use preloaded springs, "
+            "lighter "
             "rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
         )
 
@@ -313,7 +314,7 @@ def _built_mechanics(built: Built) -> Iterator[Finding]:
         )
     if (slack := built.elongation < 0).any():
         last = float(built.travel[slack][-1])
-        yield finding("spring_slack", f"the springs carry nothing up to {mm(last)} of travel: they are too long")
+        yield finding("spring_slack", f"the springs carry no force up to {mm(last)} of travel: they are too long")
     pressed = pressure_of(built, 1.0)
     if (top := worst(pressed)) is not None:
         place = f"at {mm(float(built.travel[top]))} of travel"
@@ -339,7 +340,7 @@ def _weak_registration(built: Built) -> Iterator[Finding]:
             "width_error",
             f"the points are those of a cam with {mm(abs(built.registration.width))} {more} material on both flanks, "
             f"± {mm(built.registration.width_deviation)} (one standard deviation), which the registration allows for; "
-            "'mechanism.profile.registration: motion' takes it for a shift of the cam, 'datum' moves nothing",
+            "'mechanism.profile.registration: motion' treats it as a shift of the cam, 'datum' moves no points",
         )
     if deviation > 0.1 * rmse and rmse > 0:
         names = ("the angle", "the shift in x", "the shift in y")
@@ -360,14 +361,16 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
     outliers = sum(int((~keep).sum()) for keep in built.registration.used)
     if outliers:
         count = sum(len(keep) for keep in built.registration.used)
-        yield finding("profile_outliers", f"{outliers} of {count} points lie far off or beyond the flank: left out")
+        yield finding(
+            "profile_outliers", f"{outliers} of {count} points are far off or beyond the flank and are omitted"
+        )
     stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
     seen = max(neighbour_noise(one, use) for one, use in _along(built))
     if seen > TOO_NOISY * stated:
         yield finding(
             "noise_understated",
             f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}; "
-            "the difference is taken for waviness of the flank, and the force follows its slope",
+            "the difference is treated as waviness of the flank, and the force depends on its slope",
         )
     elif root_mean_square(errors_used(built)) < 0.8 * stated:
         yield finding(

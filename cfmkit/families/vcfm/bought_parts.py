@@ -50,6 +50,6 @@ def spring_faults(solution: Solution) -> Iterator[tuple[str, str]]:
     if least < 0:
         yield (
             "spring_slack",
-            f"with a preload of {mm(least)} the springs carry nothing up to {mm(-least)} of travel: bought springs do "
+            f"with a preload of {mm(least)} the springs carry no force up to {mm(-least)} of travel: bought springs do "
             "not pull back",
         )

@@ -128,14 +128,14 @@ def _leaf_shape(solution: Solution) -> Iterator[Finding]:
     if not negative:
         yield finding(
             "no_negative_stiffness",
-            f"{told}{limits[0]}: the force of the leaves only rises, nothing cancels the spring; "
+            f"{told}{limits[0]}: the force of the leaves only rises and cannot cancel that of the spring; "
             "use thinner or steeper leaves",
         )
     elif not straight:
         yield finding(
             "no_linear_region",
-            f"{told}{limits[1]}: the leaves do not buckle and their force curve is round; the constant-force window is "
-            "only its top. Use thinner or steeper leaves",
+            f"{told}{limits[1]}: the leaves do not buckle and their force curve is rounded; the constant-force "
+            "window is only its maximum. Use thinner or steeper leaves",
         )
 
 
@@ -182,7 +182,7 @@ def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]
         if flat is not None and _ripple(solution.inside(solution.nominal, flat)) <= (1.0 - ROUNDING) * allowed:
             start, end = at_least(flat[0]), at_most(flat[1])
             cure = f"analysis.window=[{start}, {end}]"
-            return f"{why}; the force is flat from {start} to {end}: state that as the window", (cure,)
+            return f"{why}; the force is flat from {start} to {end}: use that as the window", (cure,)
     return f"{why}; no width of leaves or spring makes it flat", ()
 
 
@@ -255,8 +255,8 @@ def _returns(solution: Solution) -> Iterator[Finding]:
         told = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
         yield finding(
             "force_reversal",
-            f"within {mm(low)} ... {mm(high)} the force falls to {told}: no outward force is "
-            f"left; a preload above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
+            f"within {mm(low)} ... {mm(high)} the force falls to {told}: no outward force remains; a preload "
+            f"above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
         )
     yield from _overload(solution, push)
 
@@ -281,7 +281,8 @@ def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
         yield finding(
             "overload",
             f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
-            f"{newton(last)} at {mm(float(push.travel[-1]))}; a stop at {mm(end)} keeps to the linear range",
+            f"{newton(last)} at {mm(float(push.travel[-1]))}; a stop at {mm(end)} limits the travel to the linear "
+            "range",
         )
 
 
@@ -294,8 +295,9 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
             low, high = solution.window
             yield finding(
                 "preload_out_of_range",
-                f"with a preload of {mm(push.preload)} no outward force is left somewhere in {mm(low)} ... {mm(high)}: "
-                f"where the leaves are flat it is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
+                f"with a preload of {mm(push.preload)} no outward force remains somewhere in {mm(low)} ... "
+                f"{mm(high)}: where the leaves are flat the force is K_p (h + dr), which vanishes at "
+                f"{mm(-solution.parts.balance)}",
             )
             return
 
@@ -341,8 +343,8 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
     if about.width < 2.0 * about.thickness:
         yield finding(
             "out_of_plane_buckling",
-            f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: below twice the thickness they "
-            "buckle out of the plane; use wider (and longer) leaves",
+            f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: leaves narrower than twice "
+            "their thickness buckle out of the plane; use wider (and longer) leaves",
         )
 
 
@@ -380,8 +382,8 @@ def _range(solution: Solution) -> Iterator[Finding]:
     if share > STOCKY and solution.spec.analysis.fidelity != "truss":
         yield finding(
             "theory_range",
-            f"leaves {percent(share)} as thick as long are not beams: no model here predicts their force or stress; "
-            "use longer or thinner leaves",
+            f"leaves whose thickness is {percent(share)} of their length are not beams: no model here predicts "
+            "their force or stress; use longer or thinner leaves",
         )
         return
     if solution.spec.analysis.fidelity != "analytic":
@@ -393,7 +395,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
             f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
             "pseudo-rigid bodies do not: the force is overestimated, by up to several times"
             if solution.parts.leaf.flexures_buckle
-            else "modelled as pseudo-rigid bodies hybrid leaves have the right force to about 10 % up to the peak only"
+            else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
         )
         yield finding(
             "theory_range",
@@ -403,8 +405,8 @@ def _range(solution: Solution) -> Iterator[Finding]:
     elif share > THICK:
         yield finding(
             "theory_range",
-            f"leaves {percent(share)} as thick as long: the closed forms are for thin ones, and here off by 5 to 10 % "
-            "or more; verify with 'analysis.fidelity: exact'",
+            f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "
+            "and are off by 5 to 10 % or more here; verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     elif angle > STEEP:
@@ -461,7 +463,7 @@ def spring_closed(solution: Solution) -> Iterator[Finding]:
         key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
     yield finding(
         "spring_closed",
-        f"the spring closes: its blocks meet when it is compressed by {mm(room)}, with a preload of {mm(most)} "
+        f"the spring closes: its blocks touch when it is compressed by {mm(room)}, with a preload of {mm(most)} "
         f"{place}, and curves end there; use less preload ('analysis.preloads') or travel ('analysis.travel'), or "
         f"'{key}' of {size}",
         f"{key}={size}",
@@ -477,7 +479,7 @@ def _truss(solution: Solution) -> Iterator[Finding]:
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
     yield finding(
         "truss_law",
-        f"the paper's laws include neither buckling nor clamping: compared with the corrected ones the peak of the "
+        f"the paper's laws include neither buckling nor clamping: compared with the corrected laws the peak of the "
         f"leaves is {percent(high)} higher, at {where:.2g} times the travel, their steepest slope is {steep:.2g} times "
         "as steep, and with a spring the force is never flat",
         "analysis.fidelity=analytic",
@@ -496,6 +498,6 @@ def _measured(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "measured_contradiction",
             f"the reported {newton(told.force)} and K_p = {rate(told.positive_stiffness)} contradict each other: at "
-            f"{mm(balance)} the leaves carry nothing, whatever their number, width or modulus, and the force is "
+            f"{mm(balance)} the leaves carry no force, for any number, width or modulus, and the force is "
             f"K_p h = {newton(there)}; {newton(told.force)} needs {rate(needed)}",
         )

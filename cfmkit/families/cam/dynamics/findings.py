@@ -54,8 +54,8 @@ def outside(parts: Build, span: tuple[float, float]) -> Finding:
     ends = sorted((parts.motion.start, parts.motion.start + parts.motion.stroke))
     return finding(
         "outside_profile",
-        f"the slider is to move from {mm(ends[0])} to {mm(ends[1])}, but profile and braces hold it between "
-        f"{mm(span[0])} and {mm(span[1])} only (heights above 'analysis.dynamics.origin'; change "
+        f"the requested motion of the slider is from {mm(ends[0])} to {mm(ends[1])}, but profile and braces allow only"
+        f" {mm(span[0])} to {mm(span[1])} (heights above 'analysis.dynamics.origin'; change "
         "'slider_position' or 'stroke' there)",
     )
 
@@ -84,8 +84,8 @@ def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:
     if lost.any():
         yield finding(
             "slack_cable",
-            f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: "
-            "a cable would go slack, and the slider would have to be pushed",
+            f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: a "
+            "cable would go slack",
         )
 
 
@@ -114,7 +114,7 @@ def _springs(moved: MotionSolution) -> Iterator[Finding]:
         yield finding(
             "spring_slack",
             f"the springs are up to {mm(-float(elongation.min()))} shorter than their rest length "
-            f"{_when(moved, slack)}: they carry nothing there",
+            f"{_when(moved, slack)}: they carry no force there",
         )
     if limit and elongation.max() > limit * (1 + 1e-9):
         over = elongation > limit

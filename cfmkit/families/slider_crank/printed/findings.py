@@ -87,8 +87,8 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     if solution.chain.side == 0:
         yield finding(
             "straight_start",
-            f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it moves "
-            "sideways, and a deviation of 0.1 um decides to which side; give it a kink of 0.25 to 0.5 mm with "
+            f"the chain is exactly straight: it carries {newton(float(solution.force[1]))} before it buckles, and a "
+            "deviation of 0.1 um determines the side; state a kink of 0.25 to 0.5 mm with "
             "'mechanism.unloaded_offset'",
         )
         return
@@ -96,7 +96,7 @@ def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     if resolved is not None and off < resolved:
         yield finding(
             "kink_too_small",
-            f"the kink of {mm(off)} that sends the chain to one side is smaller than what the process resolves "
+            f"the kink of {mm(off)} that determines the buckling side is smaller than the process can make "
             f"({mm(resolved)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
         )
     run_in = solution.first_at(0.98 * solution.level)

@@ -48,8 +48,8 @@ def _of_friction(solution: Solution) -> Iterator[Finding]:
             yield finding(
                 "self_locks",
                 f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
-                "the friction circles of the pins; use thinner or smoother pins ('mechanism.pins'), or keep off the "
-                "stretched position",
+                "the friction circles of the pins; use pins of smaller diameter or friction ('mechanism.pins'), or "
+                "a motion that ends before the stretched position",
             )
 
 
@@ -58,8 +58,8 @@ def _of_class(solution: Solution) -> Iterator[Finding]:
     if found.kind == SNAPS and unstable is not None:
         yield finding(
             "second_stable_outside",
-            f"at {place(solution, unstable.motion)} the mechanism snaps through, and the motion ends before the next "
-            "stable position; run it farther to see where it comes to rest",
+            f"at {place(solution, unstable.motion)} the mechanism snaps through, and the motion ends before the "
+            "next stable position; extend the motion to find it",
         )
     if abs(found.drop - 1.0) < BOUNDARY:
         side = "has" if found.kind in (SNAPS, BISTABLE, TRISTABLE) else "just misses"
@@ -115,13 +115,13 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         found = solution.character.effort(0.0)
         yield finding(
             "stretched_start",
-            f"the linkage starts stretched, where the force is 0/0: its limit is {newton(found)}, "
-            "the buckling load of a column; a kink smaller than the part's tolerance decides which way it goes",
+            f"the linkage starts in the stretched position, where the force is 0/0: its limit is {newton(found)}, "
+            "the buckling load of a column; a kink smaller than the part's tolerance determines the side",
         )
         if spec.analysis.side is None:
             yield finding(
                 "two_positions",
-                "from the stretched position the crank can go either way, and 'analysis.side' does not say which: "
+                "from the stretched position the crank can move to either side, and 'analysis.side' is not stated: "
                 "'beyond' is assumed; with an offset the force on the other side differs",
                 "analysis.side=before",
             )
@@ -140,7 +140,7 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         yield finding(
             "force_unbounded",
             f"at {mm(low)} of travel crank and coupler are in one line and the springs are not relaxed: no finite "
-            "force moves the slider there; keep away from it",
+            "force moves the slider there; choose a motion that does not reach it",
         )
 
 
