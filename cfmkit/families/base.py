@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -86,6 +86,9 @@ class Run:
         Does independent jobs, in this process or in others.
     notes : Notes
         Keeps what is finished.
+    wanted : frozenset of str, optional
+        Plain names of the metrics that are looked at, and nothing else is: a model may leave its other values and
+        its findings out, and must keep status, curve and those metrics as they are. None: everything is looked at.
     """
 
     seed: int = 0
@@ -93,6 +96,11 @@ class Run:
     time_budget: float | None = None
     executor: Executor = _one_by_one
     notes: Notes = field(default_factory=_Forgotten)
+    wanted: frozenset[str] | None = None
+
+    def wants(self, names: Iterable[str]) -> bool:
+        """Tell whether any of these metrics is looked at."""
+        return self.wanted is None or not self.wanted.isdisjoint(names)
 
 
 @dataclass(frozen=True)

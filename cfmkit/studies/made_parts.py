@@ -145,7 +145,7 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         What progress calls them.
     """
     metrics, spec = _noted(made.spec, nominal), made.spec
-    work = Work(Study(spec, made.paths, metrics, seed=run.seed), plan_of(made.parameters, values))
+    work = Work(Study(spec, made.paths, metrics, seed=run.seed, lean=True), plan_of(made.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
     records = computed(work, run.executor, journal, _Told(run, what, len(values)))
     count = len(spec.part_requirements)

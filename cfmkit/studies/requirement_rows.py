@@ -309,9 +309,15 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None
         return None
     numbers = [numbers_in(found)]
     if rows.metrics:
-        result = family(spec.family).analyze(spec, run)
+        study = Study(spec, (), rows.metrics, lean=True)
+        result = family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
         if not result.curves:
             return None
-        values = Study(spec, (), rows.metrics).quantities(result)
-        numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
+        numbers.append(metrics_in(result, rows))
     return np.concatenate(numbers)
+
+
+def metrics_in(result: Result, rows: RequirementRows) -> FloatArray:
+    """Return those metrics of a result that are numbers of their own in rows; nan where one has no value."""
+    values = Study(result.spec, (), rows.metrics).quantities(result)
+    return np.array([np.nan if one.value is None else one.value for one in values])

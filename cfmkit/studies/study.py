@@ -20,7 +20,7 @@ from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families import origin as family_origin
 from cfmkit.families.base import Run
-from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, windows_judged
+from cfmkit.metrics import check, evaluate, gaps, other_name, split_name, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
 from cfmkit.specs.data_files import named_in
 from cfmkit.specs.units import to_border
@@ -125,6 +125,8 @@ class Study:
         Whether curves are kept.
     seed : int
         Of everything random inside an analysis.
+    lean : bool
+        Whether metrics and requirements alone are looked at: models then leave out what those do not need.
     """
 
     spec: Spec
@@ -133,11 +135,20 @@ class Study:
     design: bool = False
     curves: bool = False
     seed: int = 0
+    lean: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the metrics."""
         return tuple(item.name for item in self.metrics)
+
+    @cached_property
+    def wanted(self) -> frozenset[str] | None:
+        """Plain names of all that is looked at, by the name of either kind of curve; None: everything is."""
+        if not self.lean:
+            return None
+        names = {split_name(one)[0] for one in (*self.names, *(one.metric for one in self.spec.part_requirements))}
+        return frozenset({*names, *map(other_name, names)})
 
     def told(self, column: int, value: float) -> float | str | None:
         """Return a metric's value as files say it: in the border unit, or a word; None where there is none."""
@@ -156,7 +167,7 @@ class Study:
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, computing, data]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.lean, computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:
@@ -187,7 +198,7 @@ class Study:
 
     def solve(self, spec: Spec) -> Result:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
-        record, run = family(spec.family), Run(self.seed)
+        record, run = family(spec.family), Run(self.seed, wanted=self.wanted)
         if not self.design or record.design is None:
             return windows_judged(record.analyze(spec, run))
         design = record.design(spec, run)

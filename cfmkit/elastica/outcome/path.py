@@ -244,7 +244,16 @@ class Path:
 
     def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
         """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
-        return extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
+        known = self._beam_stresses.get((beam, axial))
+        if known is None:
+            value, place = extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
+            known = self._beam_stresses[beam, axial] = read_only(value), read_only(place)
+        return known
+
+    @cached_property
+    def _beam_stresses(self) -> dict[tuple[str, bool], tuple[FloatArray, FloatArray]]:
+        """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
+        return {}
 
     def stress_extremes(self, beam: str, axial: bool = True) -> StressExtremes:
         """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""

@@ -115,17 +115,28 @@ def _force(spec: BeamSpec) -> float | None:
 def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
     """Return the specification whose free value gives the force wanted, and that force."""
     target = math.copysign(wanted.force or 0.0, force)
+    exponent = EXPONENTS[wanted.free]
     for _ in range(ROUNDS):
         if abs(force / target - 1) <= CLOSE:
             return spec, force
         if not force / target > 0:
             break
-        spec = _scaled(spec, wanted.free, (target / force) ** (1 / EXPONENTS[wanted.free]))
+        factor = (target / force) ** (1 / exponent)
+        spec = _scaled(spec, wanted.free, factor)
         again = _force(spec)
         if again is None:
             break
+        exponent = _exponent(force, again, factor, exponent)
         force = again
     return spec, None
+
+
+def _exponent(before: float, after: float, factor: float, expected: float) -> float:
+    """Return how the force went with what was scaled, so that of wide beams, stretch and shear less is left each time."""
+    if not after / before > 0 or factor == 1.0:
+        return expected
+    found = math.log(after / before) / math.log(factor)
+    return found if 0.5 < found / expected < 2.0 else expected
 
 
 def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:

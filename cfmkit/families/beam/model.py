@@ -24,7 +24,7 @@ from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
-from cfmkit.families.beam.scalar_results import natural, travel_of, values_of
+from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.surface_following import curve_of, findings_along, ride, values_along
 from cfmkit.results import Result, Status
@@ -46,7 +46,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     spec : BeamSpec
         The mechanism and how far its drive goes.
     run : Run
-        Not needed here: one path is solved at once.
+        Which metrics are looked at: values, findings and columns that none of them needs are left out.
 
     Returns
     -------
@@ -58,8 +58,10 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         message = f"no curve: {ending_of(solution).message}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
-    curves: tuple[Curve, ...] = (_curve(solution),)
-    values, warnings = values_of(solution), findings_of(solution)
+    all_of_it = run.wanted is None
+    curves: tuple[Curve, ...] = (_curve(solution) if all_of_it else _effort_and_stress(solution),)
+    values = values_of(solution) if run.wants(DEFINITIONS) else {}
+    warnings = findings_of(solution) if all_of_it else ()
     if (along := ride(solution)) is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
         values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
@@ -151,8 +153,19 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_moment": Column(moment, "torque"),
         }
     extra |= _outputs(solution) | _frequencies(solution)
-    kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
-    return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)
+    return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, _kind(solution))
+
+
+def _effort_and_stress(solution: Solution) -> Curve:
+    """Return the curve with what metrics look at."""
+    extra = {"max_stress": Column(solution.stress, "stress")}
+    return Curve(
+        solution.motion, solution.effort, np.repeat(["load"], len(solution.keep)), solution.stable, extra, _kind(solution)
+    )
+
+
+def _kind(solution: Solution) -> Kind:
+    return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
 
 
 def _ends(solution: Solution) -> Curve | None:

@@ -134,10 +134,15 @@ def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: 
     def build(points: FloatArray) -> Network:
         return Strip(points, strip.width, strip.thickness, strip.places).network(made_of)
 
+    looked_up: list[tuple[Path, int, FloatArray]] = []  # of the path asked last: it is asked once for every point
+
     def knee(path: Path, index: int) -> FloatArray:
-        before = _unloaded_samples(path)
-        row = int(np.hypot(*(before - pins[1]).T).argmin())
-        place: FloatArray = pins[1] + path.shape(STRIP, index)[row] - before[row]
+        if not looked_up or looked_up[0][0] is not path:
+            before = _unloaded_samples(path)
+            nearest = int(np.hypot(*(before - pins[1]).T).argmin())
+            looked_up[:] = [(path, nearest, pins[1] - before[nearest])]
+        _, row, offset = looked_up[0]
+        place: FloatArray = offset + path.shape(STRIP, index)[row]
         return place
 
     return Chain(strip.corners, pins, build, direction, knee)

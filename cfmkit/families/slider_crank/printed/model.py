@@ -65,7 +65,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     spec : SliderCrankSpec
         With `mechanism.flexures` or `mechanism.beam`.
     run : Run
-        Not needed here: nothing is random.
+        Which metrics are looked at: values and findings that none of them needs are left out.
 
     Returns
     -------
@@ -113,8 +113,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         status=Status.PARTIAL if told else Status.COMPLETE,
         message=told[0].message if told else "",
         curves=(_curve(solution),),
-        values=_values(solution),
-        warnings=(*told, *findings_of(spec, solution)),
+        values=_values(solution) if run.wants(OF_SPRINGS | DEFINITIONS) else {},
+        warnings=(*told, *findings_of(spec, solution)) if run.wanted is None else told,
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
