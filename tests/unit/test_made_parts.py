@@ -14,6 +14,8 @@ from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.made_parts import common, judge
+from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.study import Study
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 
@@ -96,3 +98,20 @@ def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):
     (tmp_path / "cam.yaml").write_text(text)
     assert main(["design", str(tmp_path / "cam.yaml"), "-o", str(tmp_path / "out"), "--no-plots", "--json"]) == 3
     assert "design.tolerances" in json.loads(capsys.readouterr().out)["errors"][0]["path"]
+
+
+@pytest.mark.parametrize("name", ["beam_cantilever", "slider_crank_strip"])
+def test_a_look_at_metrics_alone_leaves_out_the_rest_and_changes_none_of_them(name):
+    spec = cfmkit.load(f"configs/{name}.yaml").replace({"analysis.points": 15, "requirements": ()})
+    own = {"beam": "strain_energy_max", "slider-crank": "energy_max"}[spec.family]
+    known = cfmkit.analyze(spec)
+    metrics = metrics_of(spec, ["force_mean", "stress_max", "range_95_fraction"], known.curve)
+    full, lean = (Study(spec, (), metrics, lean=lean) for lean in (False, True))
+    assert lean.evaluate(()).values == full.evaluate(()).values
+    seen = lean.solve(spec)
+    assert (len(seen.values), seen.status) == (0, known.status)
+    assert own in known.values
+    (metric,) = metrics_of(spec, [own], known.curve)
+    looked = Study(spec, (), (metric,), lean=True)
+    assert looked.evaluate(()).values == (pytest.approx(known.values[own].value, rel=1e-12),)
+    assert full.key(()) != lean.key(())

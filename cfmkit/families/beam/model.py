@@ -153,14 +153,21 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_moment": Column(moment, "torque"),
         }
     extra |= _outputs(solution) | _frequencies(solution)
-    return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, _kind(solution))
+    return Curve(
+        solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, _kind(solution)
+    )
 
 
 def _effort_and_stress(solution: Solution) -> Curve:
     """Return the curve with what metrics look at."""
     extra = {"max_stress": Column(solution.stress, "stress")}
     return Curve(
-        solution.motion, solution.effort, np.repeat(["load"], len(solution.keep)), solution.stable, extra, _kind(solution)
+        solution.motion,
+        solution.effort,
+        np.repeat(["load"], len(solution.keep)),
+        solution.stable,
+        extra,
+        _kind(solution),
     )
 
 
