@@ -132,7 +132,7 @@ def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec,
 
 
 def _exponent(before: float, after: float, factor: float, expected: float) -> float:
-    """Return how the force went with what was scaled, so that of wide beams, stretch and shear less is left each time."""
+    """Return how the force went with what was scaled: wide beams, stretch and shear bend the law a little."""
     if not after / before > 0 or factor == 1.0:
         return expected
     found = math.log(after / before) / math.log(factor)
