@@ -222,13 +222,15 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     from cfmkit.specs.spec import DesignKeys
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
+    said = False
     if isinstance(design, DesignKeys):
-        from cfmkit.studies.design_tolerances import faults
+        from cfmkit.studies.design_tolerances import faults, is_made
 
+        said = is_made(spec, design)
         for path, message in faults(spec, design):
             yield document.problem(path, message)
     asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
-    for index, one in asked if not (getattr(design, "tolerances", None) or getattr(design, "process", None)) else ():
+    for index, one in asked if not said else ():
         message = f"{one.metric!r} is a share of made parts: say with 'design.tolerances' how they are made"
         yield document.problem(("requirements", index, "metric"), message)
 

@@ -91,19 +91,21 @@ def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> DesignTolerance
 def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
     """Return the tolerances that a `design` block gives, else those of the process that it or the part names."""
     stated = design.tolerances_of(spec)[0]
-    if stated or not _made(spec, design):
+    if stated or not is_made(spec, design):
         return dict(stated)
     from cfmkit.studies.process_tolerances import tolerances
 
     return tolerances(spec)
 
 
-def _made(spec: Spec, design: DesignBlock) -> bool:
+def is_made(spec: Spec, design: DesignBlock) -> bool:
     """Tell whether it is said how parts are made: by a block `design`, or of a part whose yield is requested."""
     if design.tolerances_of(spec)[0] or design.process is not None:
         return True
-    part = getattr(getattr(spec, "mechanism", None), "part", None)
-    return getattr(design, "yield") is not None and getattr(part, "process", None) is not None
+    from cfmkit.studies.process_tolerances import process_of_part
+
+    asked = getattr(design, "yield") is not None or len(spec.part_requirements) < len(spec.requirements)
+    return asked and process_of_part(spec) is not None
 
 
 def _renamed(path: str) -> str:
@@ -131,7 +133,7 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
             yield ("design", "free", path), str(problem)
     if design.robust is not None and getattr(design, "yield") is None:
         yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
-    if getattr(design, "yield") is not None and not _made(spec, design):
+    if getattr(design, "yield") is not None and not is_made(spec, design):
         yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
     if design.tolerances and not spec.part_requirements:
         told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"

@@ -13,13 +13,13 @@ from cfmkit.families.base import function_named
 from cfmkit.specs.spec import Tolerance
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES, usual
+from cfmkit.stock.spec import PartProcess
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.specs.spec import Spec
     from cfmkit.stock.processes import ProcessAccuracy
-    from cfmkit.stock.spec import PartProcess
 
 OF_PLATES = "laser"
 """How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
@@ -65,7 +65,7 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     material = getattr(getattr(spec, "mechanism", None), "material", None)
     named = process or getattr(getattr(spec, "design", None), "process", None)
     accuracy = PROCESSES[OF_PLATES] if material is None else usual(material.name, material.modulus)
-    own = _of_part(spec)
+    own = process_of_part(spec)
     if named:
         accuracy = PROCESSES[named]
     elif own is not None:
@@ -76,8 +76,14 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     return Assumed(accuracy, kinds, band)
 
 
-def _of_part(spec: Spec) -> PartProcess | None:
-    return getattr(getattr(getattr(spec, "mechanism", None), "part", None), "process", None)
+def process_of_part(spec: Spec) -> PartProcess | None:
+    """Return how a part is made, as `mechanism.part.process` or its old name `mechanism.process` says; None: unsaid."""
+    mechanism = getattr(spec, "mechanism", None)
+    said: PartProcess | None = getattr(getattr(mechanism, "part", None), "process", None)
+    old = getattr(mechanism, "process", None)
+    if said is None and old is not None:
+        return PartProcess(position=old.layer, least_feature=old.thinnest)
+    return said
 
 
 def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:

@@ -71,3 +71,21 @@ def test_the_process_of_a_part_is_what_it_is_assumed_to_be_made_by_and_its_own_v
 def test_a_process_that_is_none_is_refused():
     with pytest.raises(SpecError, match="process"):
         cfmkit.load("configs/slider_crank_strip.yaml").replace({"mechanism.part": {"process": "origami"}})
+
+
+OLD_TOLERANCES = {
+    "beam_design_arch": ["design.optimise.tolerances={nodes: 0.05 mm, samples: 20}"],
+    "slider_crank_strip": ["mechanism.part=null", "mechanism.process={layer: 0.1 mm, thinnest: 0.4 mm}"],
+}
+
+
+@pytest.mark.parametrize("name", sorted(OLD_TOLERANCES))
+def test_a_requirement_on_the_yield_is_content_with_tolerances_under_an_old_name(name):
+    asked = "requirements=[{metric: stress_max, max: 42.5 MPa}, {metric: yield, min: 40 %}]"
+    file = f"configs/{name}.yaml"
+    spec = cfmkit.load(file, [*OLD_TOLERANCES[name], asked])
+    made = tolerances_of(spec, spec.design, 0)
+    assert made.paths
+    unsaid = OLD_TOLERANCES[name][:-1]
+    with pytest.raises(SpecError, match="say with 'design.tolerances' how they are made"):
+        cfmkit.load(file, [*unsaid, asked])
