@@ -7,6 +7,9 @@ import numpy as np
 from cfmkit.elastica.kernels.compiler import kernel
 
 _ALPHA = (1.0 + np.sqrt(17.0)) / 8.0
+"""Share of a column's largest entry from which on its diagonal is a pivot: the bound on the growth of entries is least
+where two single pivots and one of two rows allow the same, (1 + 1/a)^2 = 1 + 2/(1 - a) [Bunch, Kaufman, Math. Comp. 31
+(1977) 163]."""
 
 
 @kernel

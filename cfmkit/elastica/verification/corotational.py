@@ -26,7 +26,14 @@ if TYPE_CHECKING:
     from cfmkit.elastica.outcome.path import Path
 
 _STEP = 1e-30
-_ITERATIONS, _CONVERGED = 40, 1e-9
+_ITERATIONS = 40
+"""Of Newton's method: up to 5 on a V-beam and Lan's network, 8 on a cantilever bent by six tenths of its length. Early
+steps are cut to 0.3 rad, so that forty reach 12 rad: nearly two revolutions."""
+
+_CONVERGED = 1e-9
+"""Largest last step, in lengths and radians: a step of 1e-5 is followed by one of 1e-9 there, so the next one, which is
+not taken, would be at rounding."""
+
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
 
