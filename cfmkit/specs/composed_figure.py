@@ -16,9 +16,9 @@ class Panel(Model):
     run: str = Field(min_length=1, description="a specification, or the output folder of a run; relative to this file")
     plot: str = Field(min_length=1, description="name of the picture, as below figures/ without its ending")
     verb: Literal["analyze", "design", "sweep"] | None = Field(
-        None, description="what is run; default: sweep where the specification has such a block, else analyze"
+        None, description="verb to run; default: sweep if the specification has such a block, else analyze"
     )
-    label: str = Field("", description="what stands beside the panel's letter")
+    label: str = Field("", description="text beside the panel's letter")
 
 
 class ComposedFigure(Model):

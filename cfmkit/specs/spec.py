@@ -197,7 +197,9 @@ class DesignKeys(Model):
         description="how far values of made parts are off, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
     )
     process: Literal["laser", "wire-edm", "fdm", "sls", "mill"] | None = Field(
-        None, description="how parts are made: its assumed tolerances, where none are given; default: by the material"
+        None,
+        description="manufacturing process, whose assumed tolerances are used if none are stated; "
+        "default: by the material",
     )
     correlated: tuple[Correlated, ...] = Field((), description="tolerances that deviate together, as in `sensitivity`")
     free: dict[str, tuple[MetricValue, MetricValue]] = Field(
@@ -207,16 +209,16 @@ class DesignKeys(Model):
     )
     robust: Literal["cvar", "worst"] | None = Field(
         None,
-        description="after margins to first order: 48 drawn parts are solved at each step, and the mean of the worst "
-        "share of them counts (cvar), or the worst",
+        description="after margins to first order: 48 random parts are solved at each step, to improve the mean of "
+        "the worst share of them (cvar), or the worst one",
     )
     verify: Literal["solid"] | None = Field(
         None,
-        description="solid: the design ends with the part as drawn, as a planar solid; its widths (from a sheet: the "
-        "force that is designed for) are corrected once, so that the solid's mean force is the wanted one",
+        description="solid: at the end the part is solved as drawn, as a planar solid; its widths (from a sheet: "
+        "the force of the design) are corrected once, so that the solid's mean force is the requested one",
     )
     samples: int = Field(
-        400, ge=20, le=1_000_000, description="parts that are drawn from the tolerances to judge the design"
+        400, ge=20, le=1_000_000, description="random parts within the tolerances with which the design is evaluated"
     )
     seed: int | None = Field(None, ge=0, description="of the parts that are drawn; default: `--seed`")
 
@@ -239,7 +241,12 @@ else:
         **{
             "yield": (
                 Ratio | None,
-                Field(None, gt=0, lt=1, description="share of made parts that is to meet all requirements: 95 %"),
+                Field(
+                    None,
+                    gt=0,
+                    lt=1,
+                    description="required share of manufactured parts that meet all requirements: 95 %",
+                ),
             )
         },
     )

@@ -89,7 +89,7 @@ class Target(Model):
     )
     stiffness: AnyStiffness | None = Field(None, description="or a straight line: its slope, negative if it falls")
     start: Effort | None = Field(
-        None, description="of a line: force or torque at zero; default: that of the design, else 0"
+        None, description="of a line: force or torque at zero; default: that of the design, or 0"
     )
     interpolation: Interpolation = Field(
         "smooth",

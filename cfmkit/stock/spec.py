@@ -28,7 +28,7 @@ PositiveStress = Annotated[Stress, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]
 PositiveRatio = Annotated[Ratio, Field(gt=0, lt=1)]
 PositiveNumber = Annotated[float, Field(gt=0)]
-SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this; 1 unless given")]
+SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this factor")]
 
 _POISSON_RATIO = 0.3
 """Of a material described by its values alone: between that of metals and that of plastics."""
@@ -44,7 +44,9 @@ class Fatigue(Model):
     exponent: Annotated[Ratio, Field(gt=-1, lt=0)] | None = Field(None, description="b of the same, negative")
     ultimate_strength: PositiveStress = Field(description="s_u, at which Goodman's line ends")
     cycles: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="that a part is to last: the allowable stress is then at most what lasts them from 0 and back"
+        None,
+        description="required life in cycles: the allowable stress is then at most the one that lasts "
+        "them, from 0 and back",
     )
     source: str | None = Field(None, max_length=300, description="where the values were read")
 
@@ -130,7 +132,7 @@ class MaterialSpec(Model):
     name: str | None = Field(None, description="a name from `show materials`")
     youngs_modulus: PositiveStress | None = Field(None, description="E; default: the named material's")
     poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] | None = Field(
-        None, description="for the shear stiffness; default: the named material's, else 0.3"
+        None, description="for the shear stiffness; default: that of the named material, or 0.3"
     )
     yield_strength: PositiveStress | None = Field(
         None, description="for the allowable stress; default: the named material's, if known"
@@ -140,11 +142,9 @@ class MaterialSpec(Model):
         description="at large strain, for fidelity 'solid': Hooke's law in Green's strain, or rubber-like; beams bend "
         "with small strains, for which both are Hooke's",
     )
-    fatigue: Fatigue | None = Field(
-        None, description="S-N points or Basquin's line, for `fatigue_life`; none unless given"
-    )
+    fatigue: Fatigue | None = Field(None, description="S-N points or Basquin's line, for `fatigue_life`; default: none")
     relaxation: Relaxation | None = Field(
-        None, description="Prony terms or moduli over time, for `force_after[1000 h]`; none unless given"
+        None, description="Prony terms or moduli over time, for `force_after[1000 h]`; default: none"
     )
 
     @model_validator(mode="after")
@@ -220,7 +220,9 @@ class Pins(Model):
 class Guide(Model):
     """The slider's way: what it takes from the force."""
 
-    friction: Friction = Field(0.0, description="Coulomb friction on what the slider presses across its way")
+    friction: Friction = Field(
+        0.0, description="Coulomb friction, times the transverse load of the slider on its guide"
+    )
     drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")
     length: Annotated[Length, Field(gt=0)] | None = Field(
         None, description="of the guide, between its ends; needed for 'offset'"
@@ -278,7 +280,9 @@ class PartProcess(Model):
     name: ProcessName | None = Field(None, description="the process; default: by the material")
     kerf: FromZero | None = Field(None, description="width of the cut")
     thickness: FromZero | None = Field(None, description="standard deviation of the thickness of a leaf")
-    position: FromZero | None = Field(None, description="standard deviation of where a joint lies; hides smaller kinks")
+    position: FromZero | None = Field(
+        None, description="standard deviation of the position of a joint; a kink must be larger"
+    )
     least_feature: FromZero | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
     least_radius: FromZero | None = Field(None, description="smallest inside radius")
 
@@ -312,12 +316,12 @@ ProcessField = Annotated[PartProcess, BeforeValidator(_process_block, json_schem
 class PartFrame(Model):
     """What stands and what is moved, around the elastic part: thicknesses in the plane."""
 
-    wall: AboveZero | None = Field(None, description="thickness of what is held, behind the roots")
-    shuttle: AboveZero | None = Field(None, description="thickness of what is driven, behind the roots")
+    wall: AboveZero | None = Field(None, description="thickness of the held parts behind the roots")
+    shuttle: AboveZero | None = Field(None, description="thickness of the driven part behind the roots")
     ground: AboveZero | None = Field(
-        None, description="thickness of what joins all that is held to one piece; default: nothing joins it"
+        None, description="thickness of the bar that joins all held parts to one piece; default: they are not joined"
     )
-    clearance: AboveZero = Field(0.002, description="between that and what moves, over the whole travel")
+    clearance: AboveZero = Field(0.002, description="between this bar and the moving parts, over the whole travel")
 
 
 class AroundFrame(PartFrame):
@@ -333,14 +337,14 @@ class CutPart(Model):
 
     process: ProcessField | None = Field(
         None,
-        description="how it is made: laser, wire-edm, fdm, sls or mill, or values of your own: {name: laser, "
-        "thickness: 0.02 mm}; its tolerances count where `design.tolerances` says none",
+        description="manufacturing process: laser, wire-edm, fdm, sls or mill, or your own values: {name: laser, "
+        "thickness: 0.02 mm}; its tolerances are used if there are no `design.tolerances`",
     )
 
     fillet: FromZero = Field(
         0.0005,
-        description="radius of inside corners: that of the cutter; 0: sharp, the stress there has no value; default: "
-        "the smallest radius of `process`, where it has a name or says one, else 0.5 mm",
+        description="radius of inside corners, at least that of the cutter; 0: sharp, the stress there has no "
+        "value; default: the smallest radius of `process` if stated, or 0.5 mm",
     )
     sheet: AboveZero | None = Field(
         None, description="thickness of the sheet that everything is cut from: every width must be equal to it"
@@ -360,7 +364,7 @@ class PaddedPart(CutPart):
     """The same of a part that ends in pads."""
 
     pad: tuple[AboveZero, AboveZero] | None = Field(
-        None, description="depth behind the end and breadth across it, of pads at what is held and driven"
+        None, description="depth and breadth of the pads at held and driven ends"
     )
     frame: AroundFrame | None = Field(
         None, description="{wall, shuttle, ground}: depths of the pads, and a frame around the part that joins them"

@@ -1,4 +1,4 @@
-"""Designs that end with the part as a solid: its mean force is the wanted one, by its widths, or it is told why not."""
+"""Designs that end with the part as a solid: its mean force is the requested one, by its widths, or the reason is reported."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
 
 
 def standing_frame(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[FloatArray, ...]:
-    """Return the polygons of the frame around the part and of the bars to its pads [m], if one is asked for."""
+    """Return the polygons of the frame around the part and of the bars to its pads [m], if one is requested."""
     assembly = assemble(spec)
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits

@@ -48,7 +48,7 @@ class FormulaProfile(Model):
 
     kind: Literal["formula"]
     height: str = Field(description="in mm, of x in mm: 1.75*(1 - cos(pi*x/12.3))")
-    length: PositiveLength = Field(description="how far the tip goes along the surface")
+    length: PositiveLength = Field(description="travel of the tip along the surface")
     points: int = Field(201, ge=3, le=100_000, description="places at which it is taken")
 
     @field_validator("height")
@@ -83,9 +83,9 @@ class Rescale(Model):
     """Another size, section or material for a force curve of the same form, by Eq. 6 of Lan."""
 
     force: Annotated[Force, Field(gt=0)] | None = Field(
-        None, description="target force at the end of the window; default: what the changes give"
+        None, description="target force at the end of the window; default: the one that results from the changes"
     )
-    free: Literal["width", "thickness", "size"] = Field("width", description="what is adapted to reach the force")
+    free: Literal["width", "thickness", "size"] = Field("width", description="value that is adapted to reach the force")
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
     material: MaterialField | None = Field(None, description="another material")
     thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
@@ -157,47 +157,47 @@ class Outputs(Model):
     reactions: tuple[str, ...] = Field(
         (), max_length=100, description="nodes whose reactions are, of support and drive: [root]"
     )
-    cross_stiffness: bool = Field(False, description="the stiffness of the driven node across the drive, along the way")
+    cross_stiffness: bool = Field(False, description="column with the stiffness of the driven node across the drive")
 
 
 class BeamAnalysis(Analysis):
     """How a beam mechanism is run."""
 
     points: int = Field(181, ge=5, le=1_000_000, description="points of the curve, even over the travel or the load")
-    travel: Displacement | None = Field(None, description="displacement or angle to go to, for drives by motion")
-    force: Force | None = Field(None, description="to go to, of all copies together, for a drive by a force")
-    moment: Torque | None = Field(None, description="to go to, for a drive by a moment")
-    factor: Factor | None = Field(None, description="to go to, for a drive by loads: a multiple of what is given")
+    travel: Displacement | None = Field(None, description="final displacement or angle, for a drive by motion")
+    force: Force | None = Field(None, description="final force of all copies together, for a drive by a force")
+    moment: Torque | None = Field(None, description="final moment, for a drive by a moment")
+    factor: Factor | None = Field(None, description="final multiple of the stated loads, for a drive by loads")
     reference: Displacement | None = Field(None, description="pose of the band ranges; default: centre of the window")
     fidelity: Fidelity | None = Field(
         None,
-        description="model: bending only, with stretching, with shear, too, or the part as a planar solid; default: as "
-        "in the mechanism, and 'reissner' for a search of shapes where that says nothing",
+        description="model: bending only, with stretching, with stretching and shear, or the part as a planar "
+        "solid; default: as in the mechanism, or 'reissner' for a search of shapes",
     )
     solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
     stress: Literal["bending", "total"] | None = Field(
-        None, description="what counts as stress; default: bending where beams do not stretch, else with the axial part"
+        None, description="which stress is used; default: bending for inextensible beams, otherwise with the axial part"
     )
     tolerance: Annotated[Ratio, Field(ge=1e-12, le=0.01)] = Field(
         1e-7, description="error of forces and positions, relative to the largest of the path"
     )
     through_folds: bool = Field(False, description="follow the path through limit points, by its arc length")
     branch: Literal["stable", "primary"] = Field(
-        "stable", description="where to go at a bifurcation: a stable branch, or straight on"
+        "stable", description="path beyond a bifurcation: a stable branch, or the primary one"
     )
     other_side: bool = Field(False, description="take the other one of two mirror-image branches")
     loads_first: bool = Field(
         True,
-        description="constant loads come before the drive, which holds its node; false: they grow with the drive and "
-        "are whole at its end",
+        description="constant loads are applied before the drive moves, with its node held; false: they grow with "
+        "the drive and are complete at its end",
     )
     outputs: Outputs = Field(Outputs(), description="motions and reactions of nodes as columns of the curve")
     modes: int = Field(
         0,
         ge=0,
         le=50,
-        description="so many natural frequencies about each pose as columns, with the drive held and free; needs the "
-        "density of every material",
+        description="number of natural frequencies about each pose, as columns, with the drive held and free; needs "
+        "the density of every material",
     )
     surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(

@@ -40,7 +40,7 @@ class Springs(Model):
     max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
     name: str | None = Field(None, min_length=1, description="of the spring as it is bought, for the list of parts")
     wound: SpringWire | None = Field(
-        None, description="its wire, coil and turns: gives the stress in the wire, and the rate where none is stated"
+        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
     )
     life: Life | None = None
 
@@ -121,13 +121,15 @@ class Plate(Model):
 
     top_margin: NonNegativeLength = Field(0.010, description="plate above the end of the flanks")
     base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
-    base_width: PositiveLength | None = Field(None, description="width of the tab; default: what the rollers leave")
+    base_width: PositiveLength | None = Field(
+        None, description="width of the tab; default: the gap that the rollers leave"
+    )
     hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
     tool_radius: NonNegativeLength = Field(
         0.0, description="of the tool that cuts it: inside corners beside the tab are rounded with it; 0: sharp"
     )
     thickness: PositiveLength | None = Field(
-        None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if that is given"
+        None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if stated"
     )
 
 
@@ -149,11 +151,11 @@ class Envelope(Model):
 
     brace_width: NonNegativeLength = Field(0.0, description="of a brace, across its length")
     slider: tuple[PositiveLength, PositiveLength] | None = Field(
-        None, description="of the slider across and along its way, its pin in the middle"
+        None, description="of the slider across and along its guide, with its pin in the middle"
     )
     screw_head: NonNegativeLength = Field(0.0, description="diameter of the screws' heads in the plate's holes")
     spring_diameter: NonNegativeLength = Field(0.0, description="outer diameter of the springs")
-    gap: NonNegativeLength = Field(0.0, description="smallest distance wanted")
+    gap: NonNegativeLength = Field(0.0, description="required clearance")
 
 
 class Contact(Model):
@@ -162,7 +164,7 @@ class Contact(Model):
     width: PositiveLength = Field(description="width of the line contact, usually the plate's thickness")
     material: MaterialField = Field(
         default_factory=lambda: MaterialSpec(name="steel-s235"),
-        description="a name from `show materials`, or {youngs_modulus, ...}; roller and cam alike",
+        description="a name from `show materials`, or {youngs_modulus, ...}; for both roller and cam",
     )
 
 
@@ -174,12 +176,14 @@ class Bearings(Model):
         0.0, description="friction couple over load and half the bore; 0.001 to 0.002 if rolling"
     )
     dynamic_rating: Annotated[Force, Field(gt=0)] | None = Field(
-        None, description="C of one bearing, from its maker: gives the life by ISO 281"
+        None, description="C of one bearing, from its data sheet, for the life by ISO 281"
     )
-    static_rating: Annotated[Force, Field(gt=0)] | None = Field(None, description="C0 of one bearing, from its maker")
+    static_rating: Annotated[Force, Field(gt=0)] | None = Field(
+        None, description="C0 of one bearing, from its data sheet"
+    )
     kind: Literal["ball", "roller"] = Field("ball", description="exponent of the life: 3, or 10/3")
     per_roller: int = Field(1, ge=1, le=16, description="bearings side by side in one roller; they share its load")
-    name: str | None = Field(None, min_length=1, description="its maker's name, for the list of bought parts")
+    name: str | None = Field(None, min_length=1, description="designation, for the list of bought parts")
 
 
 MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
@@ -189,12 +193,14 @@ class Mounting(Model):
     """How the mechanism stands in the field of gravity."""
 
     elevation: Annotated[Angle, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
-        0.5 * pi, description="of the slider's way out above the horizontal: 90 deg is up, 0 horizontal, -90 deg down"
+        0.5 * pi,
+        description="direction of the slider's outward travel above the horizontal: 90 deg is up, 0 horizontal, "
+        "-90 deg down",
     )
     roll: Annotated[Angle, Field(ge=-pi, le=pi)] = Field(
         0.0,
-        description="of the cam's plane about that way: 0 upright, weight across the way pulls to the right; "
-        "90 deg flat, the guide carries it",
+        description="rotation of the cam's plane about that direction: 0 upright, the transverse weight acts to the "
+        "right; 90 deg flat, the guide carries it",
     )
 
 
@@ -211,7 +217,9 @@ class Left(Model):
 
     brace_length: PositiveLength | None = Field(None, description="left brace")
     roller_radius: PositiveLength | None = Field(None, description="left roller")
-    profile: Profile | None = Field(None, description="left flank, whole: what it leaves out follows the left side")
+    profile: Profile | None = Field(
+        None, description="complete left flank: values that are left out follow the left side"
+    )
     masses: LeftMasses | None = Field(None, description="of the left brace and roller")
 
     @property
@@ -224,7 +232,7 @@ class Errors(Model):
     """Angles at which the flanks stand wrongly, turned about the origin that `analysis.dynamics.origin` names."""
 
     slider_deviation: SmallAngle = Field(
-        0.0, description="between the slider's way and the cam's axis: both flanks turned the same way"
+        0.0, description="between the guide and the cam's axis: both flanks turned in the same direction"
     )
     flank_angle: SmallAngle = Field(
         0.0, description="manufacturing error, both flanks turned against each other; positive: wider at the top"
@@ -244,19 +252,19 @@ class Mechanism(Model):
     rolling_friction: Friction = Field(0.0, description="mu = d/r, rolling resistance over roller radius")
     masses: Masses | None = Field(None, description="needed for gravity and for dynamics")
     profile: Profile = Field(description="the cam as cut")
-    left: Left | None = Field(None, description="what differs on the left side; for the dynamic model")
+    left: Left | None = Field(None, description="values that differ on the left side; for the dynamic model")
     errors: Errors | None = Field(None, description="flanks at a wrong angle; for the dynamic model")
-    plate: Plate = Field(default_factory=Plate, description="what closes the contour of the part")
+    plate: Plate = Field(default_factory=Plate, description="plate that closes the contour of the part")
     contact: Contact | None = Field(None, description="for the contact pressure")
     pins: Pins | None = Field(None, description="slider pin and spring hooks: their friction")
     bearings: Bearings | None = Field(None, description="of the rollers: their friction and life")
     guide: Guide | None = Field(None, description="of the slider: its friction")
-    stops: Stops | None = Field(None, description="where the slider's way ends")
+    stops: Stops | None = Field(None, description="end stops of the slider")
     envelope: Envelope | None = Field(None, description="sizes of the moving parts, for their distances")
     mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
         None,
-        description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; weight acts where "
-        "this is given, and upwards where only gravity is requested",
+        description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; if this is "
+        "stated, weight acts; with gravity alone the direction is up",
     )
     safety_factor: SafetyFactor = 1.0
 
@@ -345,7 +353,9 @@ class CamDesign(DesignBlock):
         None, description="cycles that a spring of the catalogue must last; one whose life is not known is not taken"
     )
     friction: DesignFriction = Field(
-        0.0, description="rolling friction to cut for; positive: exact on the way up, negative: on the way down"
+        0.0,
+        description="rolling friction that the profile is cut for; positive: exact on the way up, negative: on "
+        "the way down",
     )
     avoid_undercut: bool = Field(False, description="take the smallest A whose path the roller can follow")
     gravity: bool = Field(False, description="shape the profile so that the weight of the moving parts is carried too")
@@ -379,7 +389,7 @@ class Dynamics(Model):
         "cycloidal", description="from rest to rest without a jump of acceleration: s + h (t/T - sin(2 pi t/T)/(2 pi))"
     )
     slider_position: Length = Field(description="where the slider starts: its height above `origin`, not a travel")
-    stroke: Length = Field(description="how far it goes; negative: downwards")
+    stroke: Length = Field(description="travel of the motion; negative: downwards")
     time: Annotated[Time, Field(gt=0)] = Field(description="duration T")
     points: int = Field(201, ge=5, le=1_000_000, description="points of the time history")
     origin: Literal["path-start", "cam-start"] = Field(
@@ -421,13 +431,13 @@ class CamAnalysis(Analysis):
 
     travel: PositiveLength | None = Field(None, description="slider travel; default: the profile's stroke")
     gravity: bool | None = Field(
-        None, description="whether weight acts; default: where design.gravity or a mounting says so"
+        None, description="whether weight acts; default: true with design.gravity or a mounting"
     )
     fidelity: Literal["quasi-static", "dynamic"] | None = Field(
-        None, description="model; default: dynamic where `dynamics` is given, else quasi-static"
+        None, description="model; default: dynamic if `dynamics` is stated, otherwise quasi-static"
     )
     manufacturing: Manufacturing | None = Field(
-        None, description="errors of cutting: adds the band of forces they give"
+        None, description="errors of manufacture: adds the band of forces that they cause"
     )
     dynamics: Dynamics | None = Field(None, description="motion for the dynamic model")
     path_method: Literal["quadrature", "ode"] = Field("quadrature", description="how the path is integrated")

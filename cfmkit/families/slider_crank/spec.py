@@ -24,18 +24,22 @@ class Mechanism(Printed):
         None, description="r2, crank pin to slider pin; default: from 'stretched_position'"
     )
     stretched_position: PositiveLength | None = Field(
-        None, description="distance of pivot and slider pin along the way when stretched; instead of 'coupler_length'"
+        None,
+        description="distance of pivot and slider pin along the guide in the stretched position; instead "
+        "of 'coupler_length'",
     )
-    offset: Length = Field(0.0, description="e, height of the slider pin's way above the pivot")
+    offset: Length = Field(0.0, description="e, height of the slider pin's path above the pivot")
     branch: Literal["right", "left"] = Field("right", description="side of the crank pin on which the slider is")
-    unloaded_angle: Angle | None = Field(None, description="crank angle from the slider's way with all springs relaxed")
+    unloaded_angle: Angle | None = Field(
+        None, description="crank angle from the guide's direction with all springs relaxed"
+    )
     unloaded_offset: Angle | None = Field(
         None, description="the same from the stretched position, where 0 is exact; instead of 'unloaded_angle'"
     )
-    springs: Springs = Field(default_factory=Springs, description="rates of one leg, each 0 unless given")
+    springs: Springs = Field(default_factory=Springs, description="rates of one leg; default: 0 each")
     legs: int = Field(1, ge=1, le=1000, description="equal legs in parallel on one crank, or on one slider")
     copies: Literal["single", "mirrored"] = Field(
-        "single", description="mirrored: a second set of legs, mirrored at the slider's way; the guide carries nothing"
+        "single", description="mirrored: a second set of legs, mirrored at the guide, which then carries no load"
     )
     pins: Pins | None = Field(None, description="at pivot, crank pin and slider pin: their friction")
     guide: Guide | None = Field(None, description="of the slider: its friction")
@@ -85,7 +89,7 @@ class CrankAnalysis(PrintedAnalysis):
     )
     reference_angle: Angle | None = Field(None, description="where the constant band is taken; default: stretched")
     reference_travel: Length | None = Field(
-        None, description="where the constant band is taken when a force drives; default: half way"
+        None, description="travel around which the constant band is evaluated for a force drive; default: half of it"
     )
     fidelity: Literal["prb", "lumped", "beam", "solid"] | None = Field(
         None,

@@ -95,7 +95,7 @@ class BoughtSprings(Model):
     outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
     name: str | None = Field(None, min_length=1, description="by which it is bought, for the list of parts")
     wound: SpringWire | None = Field(
-        None, description="its wire, coil and turns: gives the stress in the wire, and the rate where none is stated"
+        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
     )
     life: Life | None = None
 
@@ -245,7 +245,7 @@ class VcfmDesign(DesignBlock):
         None, description="instead of a constant force a curve over the displacement, best a line ('stiffness')"
     )
     adjustment: Annotated[Force, Field(gt=0)] | None = Field(
-        None, description="by how much the preload raises it; default: no preload, then give 'rise'"
+        None, description="increase of the force by the preload; default: no preload, then state 'rise'"
     )
     stroke: PositiveLength = Field(description="travel over which it is constant")
     preload: PositiveLength | None = Field(None, description="preload that raises it by that much")
@@ -336,7 +336,7 @@ class VcfmAnalysis(Analysis):
         max_length=50,
         description="of the spring's far end, the nominal one first; pull: negative",
     )
-    travel: PositiveLength | None = Field(None, description="how far the shuttle goes; default: 1.4 times the rise")
+    travel: PositiveLength | None = Field(None, description="travel of the shuttle; default: 1.4 times the rise")
     fidelity: Literal["truss", "analytic", "exact", "solid"] = Field(
         "analytic",
         description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
@@ -348,7 +348,7 @@ class VcfmAnalysis(Analysis):
         description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",
     )
     flatness: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
-        0.05, description="(max - min)/max of the force in what counts as the constant-force window"
+        0.05, description="largest (max - min)/max of the force in the constant-force window"
     )
     measured: Measured | None = Field(None, description="reported values to compare with")
 

@@ -38,7 +38,9 @@ class WireLimits(Model):
     )
 
 
-Life = Annotated[float, Field(gt=0, description="cycles that the maker states up to the largest deflection")]
+Life = Annotated[
+    float, Field(gt=0, description="life in cycles up to the largest deflection, as stated by the manufacturer")
+]
 
 
 def _is_a_coil(wire: float | None, coil: float | None) -> None:

@@ -42,7 +42,7 @@ class WishBlock(Model):
     """What somebody wants of a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
 
     force: PositiveForce | tuple[PositiveForce, PositiveForce] | None = Field(
-        None, description="what is to be constant; or a band, in which every force has to lie: [19 N, 21 N]"
+        None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]"
     )
     torque: PositiveTorque | tuple[PositiveTorque, PositiveTorque] | None = Field(
         None, description="the same at a crank"
@@ -57,24 +57,26 @@ class WishBlock(Model):
         "which may be left out",
     )
     material: MaterialField | Annotated[tuple[MaterialField, ...], Field(min_length=1)] | None = Field(
-        None, description="what it may be made of: names from `show materials`, or values"
+        None, description="allowed materials: names from `show materials`, or values"
     )
     process: ProcessName | None = Field(
-        None, description="how it is made: the thinnest leaf, and the materials unless they are given"
+        None, description="manufacturing process: determines the thinnest leaf, and the materials if none are stated"
     )
     adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
-        None, description="between which forces it is to be adjusted"
+        None, description="lowest and highest force of the adjustment"
     )
     hysteresis: Share | None = Field(None, description="largest loss of a cycle, over its work")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="presses that it has to survive; judged of a material with `fatigue` data"
+        None, description="required life in cycles; checked for materials with `fatigue` data"
     )
     made_well: Share | None = Field(
         None,
         alias="yield",
         description="share of made parts that meet all of it, under the tolerances assumed of the process",
     )
-    prefer: tuple[Prefer, ...] = Field(("size", "ripple", "parts", "stress"), description="what decides the order")
+    prefer: tuple[Prefer, ...] = Field(
+        ("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals"
+    )
 
     @field_validator("force", "torque", "adjustable")
     @classmethod

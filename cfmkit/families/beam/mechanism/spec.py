@@ -238,8 +238,8 @@ class Mechanism(Model):
     links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
     springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
     loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
-    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force, moment or loads")
-    copies: Copies | None = Field(None, description="how many copies there are of what is described here")
+    drive: DriveSpec = Field(description="the drive; of `kind` displacement, rotation, force, moment or loads")
+    copies: Copies | None = Field(None, description="copies of the part described here")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
     @field_validator("thickness")

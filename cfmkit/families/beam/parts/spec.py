@@ -48,7 +48,7 @@ class BeamMaterial(MaterialSpec):
     """A material of beams, which may also say what it weighs."""
 
     density: Annotated[Density, Field(gt=0)] | None = Field(
-        None, description="for natural frequencies; default: the named material's, else none"
+        None, description="for natural frequencies; default: that of the named material, or none"
     )
 
     @model_validator(mode="after")
@@ -83,7 +83,7 @@ class NodeSpec(Model):
     direction: Angle | None = Field(None, description="along which a guided node or a roller slides; from the x axis")
     moved: Moved | None = Field(None, description="a prescribed displacement of what the support holds")
     mass: Annotated[Mass, Field(ge=0)] | None = Field(
-        None, description="mass of what is fixed to the node, for natural frequencies; no weight acts on it"
+        None, description="mass of a part fixed to the node, for natural frequencies; it has no weight"
     )
     inertia: Annotated[Inertia, Field(ge=0)] | None = Field(None, description="its moment of inertia about the node")
 
@@ -211,7 +211,7 @@ class LinkSpec(Model):
     """A rigid link: `node` moves and turns with `master` as one body."""
 
     master: str = Field(description="node that leads")
-    node: str = Field(description="node that follows; free of a support of its own")
+    node: str = Field(description="node that follows; without a support")
 
 
 class LineSpringSpec(Model):
@@ -219,7 +219,7 @@ class LineSpringSpec(Model):
 
     kind: Literal["line"]
     start: str = Field(description="node")
-    end: str | None = Field(None, description="node at the other end; or give `ground`")
+    end: str | None = Field(None, description="node at the other end; or state `ground`")
     ground: Point | None = Field(None, description="fixed point at the other end")
     stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="force per elongation")
     free_length: Annotated[Length, Field(ge=0)] | None = Field(None, description="default: the length before any load")
@@ -318,7 +318,7 @@ class LoadsDrive(Model):
     node: str = Field(description="node whose displacement along the direction the curve runs over")
     direction: Angle = Field(description="from the x axis")
     loads: Annotated[tuple[LoadSpec, ...], Field(min_length=1, max_length=1000)] = Field(
-        description="as in `mechanism.loads`, on each copy: what acts where the factor is one"
+        description="as in `mechanism.loads`, on each copy: the loads at a factor of one"
     )
     reference: Annotated[Force, Field(gt=0)] = Field(
         1.0, description="force that the curve shows where the factor is one"
@@ -338,7 +338,7 @@ class Copies(Model):
     )
     legs: int = Field(1, ge=1, le=1000, description="equal parts side by side (mirrored pairs count once)")
     layers: int = Field(
-        1, ge=1, le=20, description="equal stages in series: each stands on the moving part of the last"
+        1, ge=1, le=20, description="equal stages in series: each is mounted on the moving part of the previous one"
     )
     layer_pitch: PositiveLength | None = Field(
         None,

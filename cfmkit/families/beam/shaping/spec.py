@@ -76,7 +76,7 @@ class ShapeLimits(Model):
         description="gap between the surfaces of beams, before and under load; also the least feature between them",
     )
     joint_opening: Annotated[float, Field(gt=0, lt=1)] = Field(
-        0.35, description="near a joint the gap between centre lines, over the way around the joint"
+        0.35, description="near a joint: gap between centre lines over the distance around the joint"
     )
     min_radius: PositiveLength | None = Field(None, description="radius of curvature of centre lines before loading")
 
@@ -98,7 +98,8 @@ class Optimise(Model):
         description="widest window with `half_band`, flattest over the window, or F(a)/F(b) - 1 of Lan, ill-posed",
     )
     half_band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
-        0.025, description="(max - min)/(max + min) to hold, for `range`; 2.5 % keeps within 5 % of the maximum"
+        0.025,
+        description="limit of (max - min)/(max + min), for `range`; 2.5 % keeps the force within 5 % of the maximum",
     )
     compare: tuple[Length, Length] | None = Field(None, description="[a, b] of the objective `paper`")
     free: dict[str, FreeNode] = Field({}, description="nodes that may move: {n3: {}, n2: {y: [0 mm, 40 mm]}}")
@@ -107,7 +108,7 @@ class Optimise(Model):
         (1, 2), min_length=1, description="orders of the shape polynomials, from coarse to fine"
     )
     coefficient_limit: Annotated[Angle, Field(gt=0)] = Field(1.5707963267948966, description="of c1, c2, ...")
-    limits: ShapeLimits = Field(default_factory=ShapeLimits, description="what every shape must keep to")
+    limits: ShapeLimits = Field(default_factory=ShapeLimits, description="limits for every shape")
     force: ForceWanted = Field(default_factory=ForceWanted, description="mean force over the window")
     starts: int = Field(20, ge=1, le=10_000, description="random starts")
     drawn: int = Field(60, ge=1, le=100_000, description="random networks looked at for each start")

@@ -52,11 +52,11 @@ class Profile(Model):
 
     force_constant: PositiveLength = Field(description="A; the force is 4 K A, K the sum of all springs")
     friction: DesignFriction = Field(
-        0.0, description="rolling friction it is cut for; positive: exact on the way up, negative: on the way down"
+        0.0, description="rolling friction that it is cut for; positive: exact on the way up, negative: on the way down"
     )
     slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
         1.0,
-        description="1, or more where the profile carries the weight of the moving parts; less where they hang down",
+        description="1; more if the profile carries the weight of the moving parts, less if they hang down",
     )
     curve: ProfileCurve | None = Field(
         None, description="force over travel, as shares of 4 K A, that it is cut for; default: constant"

@@ -54,14 +54,14 @@ class StripSpec(Model):
 
     width: PositiveLength = Field(description="out of the plane, B")
     thickness: PositiveLength | Annotated[tuple[PositiveLength, ...], Field(min_length=2)] = Field(
-        description="one value, or a list: linear between, evenly spaced unless 'shares' says where"
+        description="one value, or a list: linear in between, evenly spaced unless 'shares' states the positions"
     )
     shares: tuple[tuple[Share, ...], ...] | None = Field(
         None,
         description="where the thicknesses between the first and the last are: for each straight piece, shares of it",
     )
     flexure_length: PositiveLength | None = Field(
-        None, description="of the flexures whose ends the centre line passes; default: 'flexures', else a fifth of r1"
+        None, description="of the flexures whose ends the centre line passes; default: 'flexures', or a fifth of r1"
     )
     centreline: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(
         None, description="corners [x, y] from the ground to the slider instead, the pivot at [0, 0]"
@@ -152,7 +152,7 @@ class Printed(Model):
 class FlexureDesign(Model):
     """Sections of the flexures from the springs' rates and the stress: closed forms, then the exact force."""
 
-    length: PositiveLength | None = Field(None, description="of all three; default: as they are, else a fifth of r1")
+    length: PositiveLength | None = Field(None, description="of all three; default: as stated, or a fifth of r1")
     exact: bool = Field(True, description="correct the closed forms until the beams have the force and the stress")
 
 
@@ -173,7 +173,9 @@ class StripDesign(Model):
         None, description="one value, or a range to choose from; default: as the beam has it"
     )
     start: PositiveLength = Field(1e-3, description="where the band of the force begins: the run-in is before it")
-    longest: PositiveLength | None = Field(None, description="stroke never exceeded; default: half the slider's way")
+    longest: PositiveLength | None = Field(
+        None, description="upper limit of the stroke; default: half the slider's travel"
+    )
     seeds: int = Field(1, ge=1, le=64, description="starts: the uniform strip, then strips with random thickness")
     stressed: bool = Field(True, description="whether the allowable stress limits the design")
 

@@ -31,7 +31,9 @@ class Bought(Model):
     name: str = Field(min_length=1, description="part number")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
     wound: SpringWire | None = Field(
-        None, description="wire, coil and turns of one: gives the stress in its wire, and the rate where none is stated"
+        None,
+        description="wire, coil and turns of one spring, for the stress in its wire, and for the rate if "
+        "none is stated",
     )
     life: Life | None = None
 
@@ -49,7 +51,7 @@ class Bought(Model):
 class Springs(Model):
     """Rates of the springs of one leg; all are relaxed in the unloaded position."""
 
-    pivot: TorsionRate = Field(0.0, description="torsion between ground and crank, K_RA; say per rad or per deg")
+    pivot: TorsionRate = Field(0.0, description="torsion between ground and crank, K_RA; state it per rad or per deg")
     crank_pin: TorsionRate = Field(0.0, description="torsion between crank and coupler, K_RB")
     slider_pin: TorsionRate = Field(0.0, description="torsion between coupler and slider, K_RC")
     slider: ExtensionRate = Field(0.0, description="extension between slider and ground, K_PC")
@@ -120,9 +122,11 @@ class SpringDesign(DesignBlock):
         None,
         description="instead of a constant torque or force a curve: torques over crank angles, or forces over travel",
     )
-    angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be held")
+    angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be constant")
     travel: tuple[Length, Length] | None = Field(
-        None, description="slider travel over which the force is to be held; without window: the widest at `tolerance`"
+        None,
+        description="slider travel over which the force is to be constant; without window: the widest one at "
+        "`tolerance`",
     )
     angle_within: tuple[Angle, Angle] | None = Field(
         None, description="crank angles among which the widest window is looked for; default: all that can be reached"
@@ -153,9 +157,9 @@ class SpringDesign(DesignBlock):
     spring_life: Life | None = Field(
         None, description="cycles that springs of the catalogue must last; one whose life is not known is not taken"
     )
-    max_rates: MaxRates | None = Field(None, description="largest rates; no limit unless given")
+    max_rates: MaxRates | None = Field(None, description="largest rates; default: no limit")
     crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
-        None, description="range in which it may be chosen; as the mechanism has it unless given"
+        None, description="range in which it may be chosen; default: the value of the mechanism"
     )
     offset: tuple[Length, Length] | None = Field(None, description="range of the slider's offset")
     unloaded_offset: tuple[Angle, Angle] | None = Field(
@@ -166,7 +170,8 @@ class SpringDesign(DesignBlock):
     )
     points: int = Field(100, ge=10, le=10_000, description="points of the window, its start left out")
     slack: Annotated[Ratio, Field(ge=0, lt=1)] = Field(
-        0.0, description="deviation beyond the best that counts as equally good: among those designs `prefer` decides"
+        0.0,
+        description="deviation beyond the best that is treated as equally good: among these designs `prefer` decides",
     )
     prefer: Literal["small-rotation", "even-rates", "soft-springs"] = Field(
         "small-rotation", description="which of several equally good designs to take"
@@ -174,17 +179,17 @@ class SpringDesign(DesignBlock):
 
     branch: Literal["load", "unload", "mean"] | None = Field(
         None,
-        description="on which way the target is to hold where pins or guide rub; default: the springs alone, between "
-        "both ways",
+        description="branch on which the target holds if pins or guide have friction; default: without friction, "
+        "between both branches",
     )
     adjustment: PositiveForce | None = Field(
         None,
-        description="how much more force a trim is to give: the anchor of the slider's spring when it is screwed, or "
-        "the unloaded angle when it is turned",
+        description="increase of the force by the trim: by the anchor of the slider's spring, or by the unloaded angle",
     )
     anchor_travel: PositiveLength | None = Field(None, description="how far that anchor can be screwed")
     angle_travel: PositiveAngle | None = Field(
-        None, description="how far the unloaded angle can be turned, either way: the anchors of the torsion springs"
+        None,
+        description="range of the unloaded angle in each direction: rotation of the anchors of the torsion springs",
     )
 
     @model_validator(mode="after")

@@ -20,7 +20,7 @@ class StandingFrame(PartFrame):
         None, description="travel at which a bar across the shuttle's top lands on the walls; default: no stop"
     )
     seat: NonNegativeLength | None = Field(
-        None, description="preload that the spring has when it stands on the ground below the shuttle; default: no seat"
+        None, description="preload of the spring when seated on the ground below the shuttle; default: no seat"
     )
 
 
