@@ -1,4 +1,4 @@
-"""Designs that end with the part as a solid: its mean force is the requested one, by its widths, or the reason is reported."""
+"""Designs that end with the part as a solid: widths give the requested mean force, or the reason is reported."""
 
 from __future__ import annotations
 
