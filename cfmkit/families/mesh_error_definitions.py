@@ -13,6 +13,11 @@ DEFINITIONS = {
         "error of the force by the mesh, in parts of the largest: that difference, 1e-4 at least, times a factor below "
         "which 95 % of the errors of the parts in docs/solid.md are",
     ),
-    "mesh_stress_error": ("ratio", "the same of the largest stress, whose difference counts as 1 % at least"),
+    "mesh_stress_error": ("ratio", "the same of the largest stress, whose difference counts as 2 % at least"),
+    "curve_error": (
+        "ratio",
+        "largest difference of the curve between poses and of poses solved there, where it is expected to be largest, "
+        "in parts of the largest force; poses are added until it is 5e-4 at most, twice as many at most",
+    ),
 }
 """Name -> dimension and definition; `cfmkit.solid.two_meshes` computes them."""

@@ -15,6 +15,7 @@ from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.path_following import follow
+from cfmkit.solid.pose_density import refined
 from cfmkit.solid.rigid_groups import Group, Supports, within
 
 if TYPE_CHECKING:
@@ -177,6 +178,11 @@ class Meshed:
         """Return the poses at some travels, from rest on in one direction [m or rad]."""
         return MeshSolution(self.problem, follow(self.problem, stops, report), self.unjudged)
 
+    def densely(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
+        """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
+        course, off = refined(self.problem, follow(self.problem, stops, report))
+        return MeshSolution(self.problem, course, self.unjudged, off)
+
 
 @dataclass(frozen=True, eq=False)
 class MeshSolution:
@@ -188,11 +194,14 @@ class MeshSolution:
     course : PosePath
     unjudged : (n,) array of bool
         Nodes whose stress is not read.
+    between : float
+        What the curve is off between poses, in parts of the largest effort; NaN where that was not looked at.
     """
 
     problem: SolidProblem
     course: PosePath
     unjudged: NDArray[np.bool_]
+    between: float = float("nan")
 
     @cached_property
     def peaks(self) -> tuple[FloatArray, FloatArray]:

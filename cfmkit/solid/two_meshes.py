@@ -7,20 +7,24 @@ much finer meshes (`benchmarks/solid_mesh_error.py`, table in docs/solid.md).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from cfmkit.solid.meshed_part import MeshSolution, Part
 
-FORCE_FACTOR, STRESS_FACTOR = 1.4, 3.2
-"""Errors in differences of the two meshes: 95 % of those of the 21 parts in docs/solid.md are below."""
-FORCE_LEAST, STRESS_LEAST = 1e-4, 0.01
+FORCE_FACTOR, STRESS_FACTOR = 1.4, 2.8
+"""Errors in differences of the two meshes: 95 % of those of the 28 parts in docs/solid.md are below."""
+FORCE_LEAST, STRESS_LEAST = 1e-4, 0.02
 """Differences count as these at least: two free meshes agree better by chance only. The spring of `vcfm_ding2022` has
-0.1 % between its meshes and 1.4 % of error in its stress, `beam_williams_toggle` 1e-5 and 1.5e-4 in its force."""
-FORCE_ALLOWED, STRESS_ALLOWED = 3e-3, 0.16
+0.1 % between its meshes and 1.4 % of error in its stress, with fillets of 0.2 mm 1 and 4.7 %; `beam_williams_toggle`
+1e-5 and 1.5e-4 in its force."""
+FORCE_ALLOWED, STRESS_ALLOWED = 3e-3, 0.14
 """Errors from which on a mesh is called coarse: those of differences of 2e-3 and 5 %."""
 
 
@@ -58,7 +62,7 @@ class DrivenPart:
         coarse = self.part.meshed(COARSER * self.size).followed(
             second, lambda share: report(FIRST * share, "coarser mesh")
         )
-        fine = self.part.meshed(self.size).followed(
+        fine = self.part.meshed(self.size).densely(
             self.stops, lambda share: report(FIRST + (1 - FIRST) * share, "finer mesh")
         )
         return TwoMeshes(fine, coarse)
@@ -91,7 +95,7 @@ class TwoMeshes:
     @property
     def error(self) -> MeshError:
         """What they differ by, and what it says."""
-        return MeshError(*self.fine.differences(self.coarse))
+        return MeshError(*self.fine.differences(self.coarse), self.fine.between)
 
 
 @dataclass(frozen=True)
@@ -102,10 +106,13 @@ class MeshError:
     ----------
     force_difference, stress_difference : float
         In parts of the largest force and of the largest stress.
+    between : float
+        What the curve is off between poses, in parts of the largest force; NaN where that is not known.
     """
 
     force_difference: float
     stress_difference: float
+    between: float = float("nan")
 
     @property
     def force(self) -> float:
@@ -117,19 +124,22 @@ class MeshError:
         """Error of the largest stress, in parts of it."""
         return STRESS_FACTOR * max(self.stress_difference, STRESS_LEAST)
 
-    def values(self) -> dict[str, float]:
+    def values(self) -> dict[str, float | None]:
         """Return them by the names that every family gives them (`families.mesh_error_definitions`)."""
         return {
             "mesh_force_difference": self.force_difference,
             "mesh_stress_difference": self.stress_difference,
             "mesh_force_error": self.force,
             "mesh_stress_error": self.stress,
+            "curve_error": None if math.isnan(self.between) else self.between,
         }
 
     def worse(self, other: MeshError) -> MeshError:
         """Return the larger difference of both, each."""
         return MeshError(
-            max(self.force_difference, other.force_difference), max(self.stress_difference, other.stress_difference)
+            max(self.force_difference, other.force_difference),
+            max(self.stress_difference, other.stress_difference),
+            float(np.fmax(self.between, other.between)),
         )
 
     def too_large(self) -> Iterator[tuple[str, str]]:

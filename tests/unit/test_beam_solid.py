@@ -121,7 +121,9 @@ def test_a_part_is_pulled_as_well_as_pressed(tmp_path):
     assert pulled.status is turned.status is Status.COMPLETE
     assert pulled.curve.motion == pytest.approx(-turned.curve.motion)
     assert pulled.curve.effort == pytest.approx(-turned.curve.effort, rel=1e-6, abs=1e-9)
-    assert pulled.curve.extra["max_stress"].values == pytest.approx(turned.curve.extra["max_stress"].values, rel=1e-6)
+    assert pulled.curve.extra["max_stress"].values == pytest.approx(
+        turned.curve.extra["max_stress"].values, rel=1e-6, abs=1e-3
+    )
 
 
 def test_a_drive_that_nothing_follows_has_no_curve_and_names_the_keys(monkeypatch, tmp_path):

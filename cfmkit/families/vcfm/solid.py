@@ -207,7 +207,7 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
 
 def _pulled(spec: VcfmSpec, driven: DrivenPart, end: float, report: Callable[[float], None]) -> SolidPath:
     """Return a part that is pulled back to a travel [m], on one mesh and with a quarter of the poses."""
-    return _path(driven.part.meshed(driven.size).followed(_stops(spec, end, 4), report))
+    return _path(driven.part.meshed(driven.size).densely(_stops(spec, end, 4), report))
 
 
 def _path(solved: MeshSolution) -> SolidPath:
