@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +22,7 @@ from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.studies.suggest import figures, good_parts, search
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
-from cfmkit.studies.suggest.search import ordered, suggest
+from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
 
@@ -308,3 +309,20 @@ def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
     assert len(boxes) >= 13
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 and box.y1 <= figure.bbox.y1 for box in boxes)
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+
+
+def test_designs_in_a_wide_band_aim_at_the_middle_of_its_logarithm():
+    narrow, wide = (wish(force=band).target for band in (["19 N", "21 N"], ["1 N", "1000 N"]))
+    assert narrow == pytest.approx(20.0)
+    assert wide == pytest.approx(31.622776601683793)
+
+
+def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
+    began = time.time()
+    times = _Times.of(60.0, RESERVE)
+    assert times.with_proposals - began == pytest.approx(60.0 - RESERVE, abs=1.0)
+    assert times.without - began == pytest.approx(60.0 - RESERVE_OF_FEW, abs=1.0)
+    short = _Times.of(4.0, RESERVE)
+    assert short.without - began == pytest.approx(2.0, abs=1.0)
+    bare = _Times.of(60.0, 0.0)
+    assert bare.without - began == pytest.approx(57.0, abs=1.0)

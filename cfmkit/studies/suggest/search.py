@@ -44,6 +44,9 @@ ASKING, LAST = 0.5, 0.05
 RESERVE = 14.0
 """Seconds that figures of a dozen proposals take on two cores."""
 
+RESERVE_OF_FEW = 6.0
+"""The same of the one or two that turn up after nothing was found for most of the budget, and of the overview."""
+
 
 @dataclass(frozen=True)
 class _Times:
@@ -67,7 +70,9 @@ class _Times:
         if budget is None:
             return cls()
         now = time.time()
-        return cls(now + ASKING * budget, now + max(budget - reserve, 0.5 * budget), now + (1.0 - LAST) * budget)
+        left = max(LAST * budget, min(reserve, RESERVE_OF_FEW))
+        ends = (max(budget - kept, 0.5 * budget) for kept in (reserve, left))
+        return cls(now + ASKING * budget, *(now + end for end in ends))
 
 
 @dataclass(frozen=True)

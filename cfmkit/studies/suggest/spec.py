@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -131,7 +132,7 @@ class WishBlock(Model):
         low, high = self.ends
         return Wish(
             kind="force" if self.force is not None else "torque",
-            target=0.5 * (low + high) if isinstance(value, tuple) else value,
+            target=_middle(low, high) if isinstance(value, tuple) else value,
             low=low,
             high=high,
             banded=isinstance(value, tuple),
@@ -146,6 +147,11 @@ class WishBlock(Model):
             process=self.process,
             **({} if thinnest is None else {"thinnest": thinnest}),
         )
+
+
+def _middle(low: float, high: float) -> float:
+    """Return what designs in a band aim at: the middle, of a band over more than an octave that of its logarithm."""
+    return math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
 
 
 class WishFile(Model):
