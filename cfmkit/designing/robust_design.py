@@ -52,7 +52,7 @@ FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5
 SMALL_GAIN = 0.02
 """A step of drawn parts that lowers the risk by less is the last [standard deviations of the limit].
 
-The risk of one normal limit at 90 % scatters by 0.27 with which 48 parts are drawn: less is not worth solving parts for.
+With other 48 parts the risk of one normal limit at 90 % scatters by 0.27: less is not worth solving parts for.
 """
 
 FLOOR = 1e-2
