@@ -475,8 +475,10 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
+    from cfmkit.export.engraving import engraved
+
     drawn: Drawing = import_module(record.outline).drawing(spec, *given)
-    return drawn
+    return engraved(drawn, spec.name)
 
 
 def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:

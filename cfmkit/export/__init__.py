@@ -59,11 +59,11 @@ def files(
     drawn = outlines(drawing.with_reference_square(), tolerance)
     found: dict[str, bytes] = {}
     if "dxf" in formats:
-        found[f"{stem}.dxf"] = dxf_bytes(drawn)
+        found[f"{stem}.dxf"] = dxf_bytes(drawn, drawing.labels)
         if kerf is not None:
-            found[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf))
+            found[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf), drawing.labels)
     if "svg" in formats:
-        found[f"{stem}.svg"] = svg_bytes(stem, drawn)
+        found[f"{stem}.svg"] = svg_bytes(stem, drawn, drawing.labels)
     if "csv" in formats:
         found |= write_points(drawing)
     return found | _bodies(drawing, drawn, tolerance, formats)

@@ -252,12 +252,23 @@ class DrawnDimension:
 
 
 @dataclass(frozen=True)
+class Label:
+    """A text that is engraved: its middle [m], the height of its letters [m], and its direction [rad]."""
+
+    text: str
+    at: tuple[float, float]
+    height: float
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
 class Drawing:
     """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV, thickness for STL.
 
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands
     and what is moved. `notes` say what the contours do not show: how often a part is to be made. `dimensions` and
     `facts` are what a sheet of paper says beside the outline: main lengths, and what it is made of in (word, text).
+    `labels` are engraved.
     """
 
     name: str
@@ -267,6 +278,7 @@ class Drawing:
     sheet: Sheet = Sheet()
     dimensions: tuple[DrawnDimension, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
+    labels: tuple[Label, ...] = ()
 
     @property
     def extents(self) -> tuple[float, float, float, float]:

@@ -7,6 +7,7 @@ CIRCLEs. The same drawing gives the same bytes: dates and identifiers are fixed.
 from __future__ import annotations
 
 import io
+import math
 import os
 import sys
 import tempfile
@@ -21,17 +22,18 @@ import numpy as np
 from cfmkit.errors import OutputError
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
 from cfmkit.export.contours import TOLERANCE
-from cfmkit.export.layers import LayerLook, looks
+from cfmkit.export.layers import ENGRAVED, LayerLook, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import ModuleType
 
-    from cfmkit.export.contours import Drawing
+    from cfmkit.export.contours import Drawing, Label
 
 _MILLIMETRES, _METRIC = 4, 1
 _DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
+_CENTER, _MIDDLE = 1, 2  # of texts, about their point
 _LOCK = threading.Lock()
 
 
@@ -50,12 +52,12 @@ def write_dxf(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
     cfmkit.errors.GeometryError
         If the drawing cannot be cut as it is.
     """
-    return dxf_bytes(outlines(drawing, tolerance))
+    return dxf_bytes(outlines(drawing, tolerance), drawing.labels)
 
 
-def dxf_bytes(drawn: Sequence[Outline]) -> bytes:
-    """Return outlines as DXF; see `write_dxf`."""
-    layers = looks(outline.layer for outline in drawn)
+def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[Label] = ()) -> bytes:
+    """Return outlines and engraved texts as DXF; see `write_dxf`."""
+    layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED for _ in labels)])
     with _LOCK, _same_bytes(_ezdxf()) as ezdxf:
         document = ezdxf.new("R2010", units=_MILLIMETRES)
         document.header["$MEASUREMENT"] = _METRIC
@@ -64,6 +66,8 @@ def dxf_bytes(drawn: Sequence[Outline]) -> bytes:
         space = document.modelspace()
         for outline in drawn:
             _add_outline(space, outline)
+        for label in labels:
+            _add_label(space, label)
         _show_all(document, to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length"))
         return _encoded(document)
 
@@ -88,6 +92,14 @@ def _add_outline(space: Any, outline: Outline) -> None:
     vertices = zip(nodes.real.tolist(), nodes.imag.tolist(), bulges.tolist(), strict=True)
     kept = list(vertices)[:-1] if outline.closed else list(vertices)
     space.add_lwpolyline(kept, format="xyb", close=outline.closed, dxfattribs=attributes)
+
+
+def _add_label(space: Any, label: Label) -> None:
+    x, y = (round(float(to_border(value, "length")), _DIGITS) for value in label.at)
+    look = {"layer": ENGRAVED, "rotation": round(math.degrees(label.angle), _DIGITS)}
+    text = space.add_text(label.text, height=round(float(to_border(label.height, "length")), _DIGITS), dxfattribs=look)
+    text.dxf.halign, text.dxf.valign = _CENTER, _MIDDLE
+    text.dxf.insert = text.dxf.align_point = (x, y)
 
 
 def _show_all(document: Any, points: Any) -> None:

@@ -29,7 +29,11 @@ _LOOKS = {
 HELD, DRIVEN = "held", "driven"
 """Layers of what stands while the mechanism works, and of what is moved: closed contours that nothing is cut along."""
 
+ENGRAVED = "engraved"
+"""Layer of texts on the parts."""
+
 _MARKS = {HELD: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN: LayerLook(30, "#ff8000", (1.0, 1.0))}
+_MARKS[ENGRAVED] = LayerLook(5, "#0000ff")
 _OTHERS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))
 
 

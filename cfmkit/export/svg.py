@@ -5,19 +5,21 @@ Arcs are arcs (`A` commands), so that nothing is lost against the DXF.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
 from cfmkit.export.contours import TOLERANCE
-from cfmkit.export.layers import LayerLook, check_name, looks
+from cfmkit.export.layers import ENGRAVED, LayerLook, check_name, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.export.contours import Drawing
+    from cfmkit.export.contours import Drawing, Label
 
 _MARGIN = 5.0  # around the drawing [mm]
 _STROKE = 0.25  # width of every line [mm]
@@ -38,11 +40,11 @@ def write_svg(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
     cfmkit.errors.GeometryError
         If the drawing cannot be cut as it is.
     """
-    return svg_bytes(drawing.name, outlines(drawing, tolerance))
+    return svg_bytes(drawing.name, outlines(drawing, tolerance), drawing.labels)
 
 
-def svg_bytes(name: str, drawn: Sequence[Outline]) -> bytes:
-    """Return outlines as SVG; see `write_svg`."""
+def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[Label] = ()) -> bytes:
+    """Return outlines and engraved texts as SVG; see `write_svg`."""
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
     (left, low), (right, high) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
     width, height = _text(right - left), _text(high - low)
@@ -56,6 +58,7 @@ def svg_bytes(name: str, drawn: Sequence[Outline]) -> bytes:
         for layer, look in looks(outline.layer for outline in drawn).items()
         for line in _group(layer, look, [outline for outline in drawn if outline.layer == layer])
     ]
+    layers += _texts(labels)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, f"<title>{title}</title>", *layers, "</svg>", ""]
     return "\n".join(lines).encode()
 
@@ -64,6 +67,22 @@ def _group(layer: str, look: LayerLook, members: Sequence[Outline]) -> list[str]
     dashes = f' stroke-dasharray="{" ".join(map(_text, look.dashes))}"' if look.dashes else ""
     style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE)}" stroke-linejoin="round"{dashes}'
     return [f'<g id="{layer}" {style}>', *map(_shape, members), "</g>"] if members else []
+
+
+def _texts(labels: Sequence[Label]) -> list[str]:
+    """Return engraved texts, centred about their points; y is turned over, and with it the direction."""
+    if not labels:
+        return []
+    found = [
+        f'<g id="{ENGRAVED}" fill="{looks([ENGRAVED])[ENGRAVED].rgb}" font-family="sans-serif" text-anchor="middle">'
+    ]
+    for one in labels:
+        x, y, size = (float(to_border(value, "length")) for value in (*one.at, one.height))
+        turn = f"translate({_text(x)} {_text(-y)}) rotate({_text(-math.degrees(one.angle))})"
+        # capitals are 0.7 of a font's size high
+        look = f'y="{_text(0.5 * size)}" font-size="{_text(size / 0.7)}"'
+        found.append(f'<text transform="{turn}" {look}>{escape(one.text)}</text>')
+    return [*found, "</g>"]
 
 
 def _shape(outline: Outline) -> str:

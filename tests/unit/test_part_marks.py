@@ -61,3 +61,45 @@ def test_files_have_the_layers_and_solids_do_not_see_them(tmp_path):
     layers = {one.dxf.layer for one in ezdxf.readfile(path).modelspace()}
     assert {"cut", "held", "driven"} <= layers
     assert b'id="held"' in write_svg(drawing)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "texts"),
+    [("beam_lan2010", ["mechanism.part.frame.ground=6 mm"], ["lan-2010, sheet 10 mm"]),
+     ("vcfm_ding2022", [], ["ding-2022, sheet 10 mm", "ding-2022, sheet 6 mm"]),
+     ("slider_crank_lumped", ["name=x"], ["x, sheet 2.621 mm"])],
+)  # fmt: skip
+def test_name_and_thickness_of_the_sheet_are_engraved_on_what_is_held(tmp_path, name, changes, texts):
+    import ezdxf
+    from shapely import Point, Polygon
+
+    from cfmkit.export import files
+
+    drawing = drawn(name, *changes)
+    made = files(drawing, kerf=1e-4, formats=("dxf", "svg"))
+    for stem in (f"{drawing.name}.dxf", f"{drawing.name}-kerf.dxf"):
+        path = tmp_path / stem
+        path.write_bytes(made[stem])
+        read = [one for one in ezdxf.readfile(path).modelspace() if one.dxftype() == "TEXT"]
+        assert sorted(one.dxf.text for one in read) == texts
+        assert {one.dxf.layer for one in read} == {"engraved"}
+    held = [Polygon(one.points(1e-6)) for one in drawing.contours if one.layer == "held"]
+    for one in read:
+        assert any(
+            shape.contains(Point(1e-3 * one.dxf.align_point[0], 1e-3 * one.dxf.align_point[1])) for shape in held
+        )
+    for text in texts:
+        assert text.encode() in made[f"{drawing.name}.svg"]
+    assert b'id="engraved"' in made[f"{drawing.name}.svg"]
+
+
+def test_what_is_engraved_is_text_in_a_drawing_whatever_its_signs():
+    from dataclasses import replace
+    from xml.etree import ElementTree
+
+    from cfmkit.export.svg import write_svg
+
+    drawing = drawn("slider_crank_strip")
+    odd = replace(drawing, labels=tuple(replace(one, text="a<b & c") for one in drawing.labels))
+    tree = ElementTree.fromstring(write_svg(odd))
+    assert [one.text for one in tree.iter("{http://www.w3.org/2000/svg}text")] == ["a<b & c"]

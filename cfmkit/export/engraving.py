@@ -1,0 +1,87 @@
+"""What is engraved on parts: the name of the specification and the thickness of the sheet, one text for each part.
+
+It stands on the largest piece that is held, or else on one that is driven, since nothing there bends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.export.contours import Label
+from cfmkit.export.layers import DRIVEN, HELD
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.export.contours import Drawing, Sheet
+
+SHARE, BREADTH = 0.6, 0.8
+"""Largest height of the text in parts of the piece's shorter side; breadth of a letter in its heights, which no usual
+font exceeds."""
+LARGEST = 5e-3
+"""Height of the text at most [m]."""
+SPECK = 1e-8
+"""Holes that cover less of a piece than this beside it touch it only [m2]."""
+NEAR = 5e-6
+"""Outlines of bodies are flattened within this [m]."""
+
+
+def engraved(drawing: Drawing, name: str) -> Drawing:
+    """Return a drawing with a label on each of its parts that has a held or a driven piece.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        With marks of what is held and driven.
+    name : str
+        Of the specification.
+    """
+    return replace(drawing, labels=tuple(_labels(drawing, name)))
+
+
+def _labels(drawing: Drawing, name: str) -> Iterator[Label]:
+    from shapely import Polygon
+
+    cut = [(one, Polygon(one.points(NEAR))) for one in drawing.contours if one.layer == "cut" and one.closed]
+    holes = [shape for one, shape in cut if one.hole]
+    marks = [one for one in drawing.contours if one.layer in (HELD, DRIVEN) and one.closed]
+    for body in (shape for one, shape in cut if not one.hole):
+        found: list[Any] = []
+        for layer in (HELD, DRIVEN):
+            own = [Polygon(one.points(NEAR)) for one in marks if one.layer == layer]
+            found = found or [one for one in own if body.contains(one.centroid)]
+        spots = sorted(found, key=lambda one: -one.area)
+        for spot in spots:
+            thick = _thickness(drawing.sheet, spot.centroid)
+            text = name if thick is None else f"{name}, sheet {format_short(thick, 'length')}"
+            if (label := _placed(text, spot)) is not None and not any(
+                spot.intersection(hole).area > SPECK for hole in holes
+            ):
+                yield label
+                break
+
+
+def _thickness(sheet: Sheet, at: Any) -> float | None:
+    from shapely import Polygon
+
+    own = [one.thickness for one in sheet.regions if Polygon(one.polygon).contains(at)]
+    return max(own) if own else sheet.thickness
+
+
+def _placed(text: str, spot: Any) -> Label | None:
+    """Return a text in the middle of a rectangle, along its longer side and never upside down."""
+    corners = np.array(spot.minimum_rotated_rectangle.exterior.coords)
+    if len(corners) < 4:
+        return None
+    sides = np.diff(corners[:3], axis=0)
+    lengths = np.hypot(*sides.T)
+    longer = int(lengths.argmax())
+    angle = float(np.arctan2(*sides[longer][::-1]))
+    angle = (angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    height = min(SHARE * float(lengths.min()), float(lengths.max()) / (BREADTH * len(text)), LARGEST)
+    middle = spot.centroid
+    return Label(text, (float(middle.x), float(middle.y)), height, angle)
