@@ -278,8 +278,43 @@ def _solved_interval(
     before, after = np.maximum(first - 1, 0), np.minimum(last + 1, count - 1)
     inside, outside = (np.stack([motion[rows, k] for k in pair], axis=1) for pair in ((first, last), (before, after)))
     start, end = last_places(lambda at, ends: excess(at, ends // 2), inside, outside).T
+    lost = np.flatnonzero(~good.any(axis=1))  # the whole interval may lie between two samples
+    if lost.size:
+        start[lost], end[lost] = _between_samples(branches[0], target, excess, lost)
+        some[lost] = True
     some &= end > start
     return np.where(some, start, np.nan), np.where(some, end, np.nan)
+
+
+def _between_samples(
+    branch: ManyBranches, target: FloatArray, excess: Callable[..., FloatArray], rows: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the interval around the first place where the effort passes the target between two samples; NaN without.
+
+    ``excess(at, rows)`` is by what share the most exceeded limit is exceeded at places (r, n).
+    """
+    start, end = np.full((2, len(rows)), np.nan)
+    above = branch.effort[rows] > target[rows, None]
+    passes = (above[:, 1:] != above[:, :-1]) & np.isfinite(branch.effort[rows][:, 1:] + branch.effort[rows][:, :-1])
+    some = np.flatnonzero(passes.any(axis=1))
+    exact = branch.exact
+    if exact is None or not some.size:
+        return start, end
+    own, step = rows[some], passes[some].argmax(axis=1)
+    left, right = branch.motion[own, step][:, None], branch.motion[own, step + 1][:, None]
+    sign = np.where(above[some, step], -1.0, 1.0)[:, None]
+
+    def short(at: FloatArray, few: NDArray[np.intp]) -> FloatArray:
+        goal = target[own[few], None]
+        return np.asarray(sign[few] * (exact(at, own[few]) - goal) / np.abs(goal))
+
+    middle = last_places(short, left, right)
+    kept = np.flatnonzero(excess(middle, own)[:, 0] <= 0)
+    if kept.size:
+        inside, outside = np.hstack([middle, middle])[kept], np.hstack([left, right])[kept]
+        found = last_places(lambda at, ends: excess(at, own[kept][ends // 2]), inside, outside)
+        start[some[kept]], end[some[kept]] = found.T
+    return start, end
 
 
 @dataclass(frozen=True, eq=False)

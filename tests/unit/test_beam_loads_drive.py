@@ -132,3 +132,33 @@ def test_what_is_wrong_is_said_at_its_place(old, new, told):
     with pytest.raises(SpecError) as caught:
         loaded(FORCE, factor=1, more=[(old, new)])
     assert told in str(caught.value)
+
+
+PLACES = (
+    "range_95",
+    "band_range_05pct",
+    "band_range_1pct",
+    "band_range_5pct",
+    "usable_stroke",
+    "usable_start",
+    "usable_end",
+)
+
+
+DRIVES = {
+    "force": ("{kind: force, node: tip, direction: -90 deg}", "force: 1.25 N"),
+    "moment": ("{kind: moment, node: tip}", "moment: 60 N*mm"),
+    "loads": (DRIVE.replace("LOADS", f"{FORCE}, {MOMENT}, {LINE}"), "factor: 1"),
+}
+
+
+@pytest.mark.parametrize("kind", DRIVES)
+def test_places_on_a_curve_driven_by_a_load_do_not_depend_on_its_points(kind):
+    drive, goal = DRIVES[kind]
+    found = []
+    for points in (31, 961):
+        text = CANTILEVER.replace("{kind: displacement, node: tip, direction: -90 deg}", drive)
+        text = text.replace("  travel: 100 mm\n  points: 21", f"  {goal}\n  points: {points}")
+        metrics = cfmkit.analyze(cfmkit.loads(text)).metrics
+        found.append([metrics[name].value for name in PLACES])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-8)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cam_support import analyze, cam, design
 from scipy.optimize import root
 
+import cfmkit
 from cfmkit.families.cam.figures import figures
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
@@ -239,3 +242,11 @@ def test_a_roller_that_comes_to_the_end_of_its_flank_touches_nothing_else():
     assert "parts_touch" not in {one.name for one in found.warnings}
     assert found.values["clearance_min"].value == pytest.approx(2 * (float(found.state.states.x.min()) - 0.010))
     assert "clearance" in figures(found)
+
+
+def test_a_share_of_friction_that_is_unbounded_is_left_out():
+    """At an upright flank, on the way back: the cell is empty, like the force on the way up."""
+    result = cfmkit.analyze(cfmkit.load(Path(__file__).parents[2] / "configs" / "cam_friction.yaml"))
+    for name, column in result.curve.extra.items():
+        if name.startswith("lost_to_"):
+            assert not np.isinf(column.values).any(), name

@@ -5,7 +5,10 @@ solved from the polynomial through the nearest four, on the branch that these ar
 stress takes ten times as long, and is solved at its extremes only; elsewhere the polynomial is taken, for each beam by
 itself, since the largest of all has a kink where it passes from one beam to another.
 
-Assumes: a path under a displacement or a rotation that does not turn back.
+Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
+an extreme there.
+
+Assumes: a path on which the drive, or under a load the motion, does not turn back.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from cfmkit.numerics.cubic import inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
     from cfmkit.elastica.outcome.path import Path
 
 FEWEST = 4
@@ -84,7 +88,17 @@ class BetweenPoints:
     @cached_property
     def _order(self) -> Any:
         """The points of the path in the order of an increasing drive."""
-        return slice(None) if self.path.drive[-1] > self.path.drive[0] else slice(None, None, -1)
+        return slice(None) if self._motion[-1] > self._motion[0] else slice(None, None, -1)
+
+    @property
+    def _motion(self) -> FloatArray:
+        """The place of every point of the path [m or rad]."""
+        return self.path.drive
+
+    @property
+    def _scale(self) -> float:
+        """The unit of dimensionless places [m or rad]."""
+        return self.path.layout.scales.drive
 
     @property
     def places(self) -> FloatArray:
@@ -94,11 +108,15 @@ class BetweenPoints:
     @cached_property
     def _points(self) -> FloatArray:
         """Where the path has points, increasing [m or rad]."""
-        return read_only(self.path.drive[self._order])
+        return read_only(self._motion[self._order])
 
     @cached_property
     def _efforts(self) -> FloatArray:
-        return read_only(self.unit * self.path.effort[self._order])
+        return read_only(self.unit * self._effort_on(self.path)[self._order])
+
+    def _effort_on(self, path: Path) -> FloatArray:
+        """Return the effort at every point of a path [N or N m]."""
+        return path.effort
 
     @cached_property
     def peaks(self) -> FloatArray:
@@ -141,7 +159,8 @@ class BetweenPoints:
         solved = self._solved.get(flat.tobytes())
         if solved is None:
             there = self.at(flat)
-            solved = np.where(there.accurate, self.unit * there.effort, np.interp(flat, self._points, self._efforts))
+            effort = self._effort_on(there)
+            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self._efforts))
             self._solved[flat.tobytes()] = solved
         return np.array(solved.reshape(np.shape(places)))
 
@@ -158,25 +177,34 @@ class BetweenPoints:
 
     def at(self, places: FloatArray) -> Path:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
-        solver, drive = self.path.solver, self._drive
-        wanted = np.clip(places / self.path.layout.scales.drive, drive[0], drive[-1])
+        drive = self._drive
+        wanted = np.clip(places / self._scale, drive[0], drive[-1])
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
         y[known] = self._y[near[known]]
         found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
+        loads = self.path.points.drive[self._order][near]
         for number in np.flatnonzero(~known).tolist():
-            spot = solver.solve(y[number], float(wanted[number]))
-            if spot is None or spot.unstable != self._unstable[near[number]]:
+            spot = self._spot(y[number], float(wanted[number]), float(loads[number]))
+            if spot is None or spot.unstable not in self._counts(near[number], left[number]):
                 continue
             moved = float(self._poses((spot.y - y[number])[None])[0])
             if moved <= max(LEAST, STRAY * float(changes[number])):
-                y[number], found[number] = spot.y, True
+                y[number], loads[number], found[number] = spot.y, spot.drive, True
         info = self.path.points.info[self._order][near]
         info[:, REQUESTED] = -1
         branch = self.path.branch[self._order][near]
-        return replace(self.path, points=Points(y, wanted, info), branch=branch, accurate=read_only(found, np.bool_))
+        return replace(self.path, points=Points(y, loads, info), branch=branch, accurate=read_only(found, np.bool_))
+
+    def _spot(self, y: FloatArray, wanted: float, _near: float) -> Spot | None:
+        """Return the equilibrium at a dimensionless place; `_near`: the drive at the nearest point."""
+        return self.path.solver.solve(y, wanted)
+
+    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
+        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
+        return (int(self._unstable[near]),)
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of positions and rotations in each of some changes of the unknowns, (n,)."""
@@ -228,6 +256,103 @@ class BetweenPoints:
             own, here = np.flatnonzero(self._stretch == stretch), self._stretch[near] == stretch
             found[here] = values_at(self._drive[own], self._y[own], wanted[here])
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenLoads(BetweenPoints):
+    """The same of a path under a load, over the motion of a node that the load goes along with.
+
+    Attributes
+    ----------
+    row : (n + 1,) array
+        What the free unknowns and the drive count for in the dimensionless motion.
+    unit_of_motion, rest : float
+        [m or rad], and the motion [m or rad] where all unknowns are zero.
+    """
+
+    row: FloatArray
+    unit_of_motion: float
+    rest: float
+
+    @property
+    def _motion(self) -> FloatArray:
+        solver, points = self.path.solver, self.path.points
+        return np.asarray(self.unit_of_motion * (points.y[:, : solver.n] @ self.row[:-1]) + self.rest)
+
+    @property
+    def _scale(self) -> float:
+        return self.unit_of_motion
+
+    def _effort_on(self, path: Path) -> FloatArray:
+        return path.drive
+
+    def _spot(self, y: FloatArray, wanted: float, near: float) -> Spot | None:
+        solver, goal = self.path.solver, wanted - self.rest / self.unit_of_motion
+        first = solver.solve(y, near, self.row, goal)
+        # the solver watches poses and forces: once more, so that the load is as exact as they are
+        return None if first is None else solver.solve(first.y, first.drive, self.row, goal)
+
+    def _counts(self, near: int, left: int) -> tuple[int, ...]:
+        return int(self._unstable[left]), int(self._unstable[left + 1])  # a largest load is between two of each kind
+
+    @cached_property
+    def _drive(self) -> FloatArray:
+        return self._points / self.unit_of_motion
+
+    @cached_property
+    def _stretch(self) -> Any:
+        """Parted by other branches only: at a largest load a path is smooth."""
+        branch = self.path.branch[self._order]
+        return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
+
+    @cached_property
+    def _events(self) -> FloatArray:
+        return np.empty(0)  # told by their loads, of which there may be several motions
+
+
+def between_loads(
+    path: Path, node: str, along: float | None, unit: float = 1.0, axial: bool = True
+) -> BetweenLoads | None:
+    """Return a path under loads at every place of a node's motion.
+
+    None where the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
+    tolerance.
+
+    Parameters
+    ----------
+    path : Path
+        Under loads.
+    node : str
+        Whose motion it is over.
+    along : float or None
+        Direction of the motion [rad]; None: its rotation.
+    unit : float
+        What the load is multiplied by: parts side by side.
+    axial : bool
+        Whether the stress has its axial part.
+    """
+    layout, solver = path.layout, path.solver
+    if len(path) < FEWEST or not np.all(path.accurate):
+        return None
+    first = layout.first[layout.network.master_of(node)]
+    if along is None:
+        parts, scale = {layout.plan.turn[node]: 1.0}, 1.0
+    elif layout.network.master_of(node) == node:
+        turned = along - layout.direction[node]
+        parts, scale = {first: float(np.cos(turned)), first + 1: float(np.sin(turned))}, layout.scales.length
+    else:
+        return None
+    row = np.zeros(solver.n + 1)
+    for dof, share in parts.items():
+        if (slot := int(layout.plan.slot[dof])) >= 0:
+            row[slot] += share
+    moved = path.motion(node)
+    motion = moved[:, 2] if along is None else moved[:, 0] * np.cos(along) + moved[:, 1] * np.sin(along)
+    rest = motion - scale * (path.points.y[:, : solver.n] @ row[:-1])
+    steps = np.diff(motion)
+    if not row.any() or np.ptp(rest) > KNOWN * np.ptp(motion) or not ((steps > 0).all() or (steps < 0).all()):
+        return None
+    return BetweenLoads(path, unit, axial, read_only(row), scale, float(rest.mean()))
 
 
 def _inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.arrays import distinct, read_only
-from cfmkit.elastica.outcome.between_points import between_points
+from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.build import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips import BeamGap, mirrored, smallest_gap
@@ -78,7 +78,11 @@ class Solution:
 
     @cached_property
     def everywhere(self) -> BetweenPoints | None:
-        """The equilibria between the points of the path; None of drives by loads, and of paths that turn back."""
+        """The equilibria between the points of the path; None of paths whose motion turns back."""
+        kind, axial = self.spec.mechanism.drive.kind, self.spec.stress == "total"
+        if kind not in ("displacement", "rotation"):
+            along = None if kind == "moment" else self.assembly.direction
+            return between_loads(self.path, self.assembly.driven, along, self.assembly.effort_unit, axial)
         return between_points(self.path, self.assembly.effort_unit, self.spec.stress == "total")
 
     @cached_property

@@ -219,7 +219,10 @@ def _curve(solution: Solution) -> Curve:
     if up.least_contact is not None and down.least_contact is not None:
         extra["contact_force_least"] = Column(loop(up.least_contact, down.least_contact), "force")
     if solution.assembly.loads.losses and up.lost and down.lost:
-        extra |= {f"lost_to_{kind}": Column(loop(up.lost[kind], down.lost[kind]), "force") for kind in up.lost}
+        shares = {kind: loop(up.lost[kind], down.lost[kind]) for kind in up.lost}
+        # an upright flank presses without bound: like its force on the way up, such a share is left out
+        shares = {kind: np.where(np.isfinite(share), share, np.nan) for kind, share in shares.items()}
+        extra |= {f"lost_to_{kind}": Column(share, "force") for kind, share in shares.items()}
     if solution.assembly.spec.mechanism.contact:
         pressed = loop(contact_pressure(solution), contact_pressure(solution, down))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
