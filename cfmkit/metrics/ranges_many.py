@@ -274,15 +274,14 @@ def _solved_interval(
     # for that are told apart by their first place, as where places are interpolated.
     length = np.where(ends, motion - np.take_along_axis(motion, since, axis=1), -1.0)
     last = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
-    first, some = since[rows, last], good.any(axis=1)
+    first = since[rows, last]
     before, after = np.maximum(first - 1, 0), np.minimum(last + 1, count - 1)
     inside, outside = (np.stack([motion[rows, k] for k in pair], axis=1) for pair in ((first, last), (before, after)))
     start, end = last_places(lambda at, ends: excess(at, ends // 2), inside, outside).T
     lost = np.flatnonzero(~good.any(axis=1))  # the whole interval may lie between two samples
     if lost.size:
         start[lost], end[lost] = _between_samples(branches[0], target, excess, lost)
-        some[lost] = True
-    some &= end > start
+    some = end > start
     return np.where(some, start, np.nan), np.where(some, end, np.nan)
 
 
