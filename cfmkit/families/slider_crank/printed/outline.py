@@ -189,7 +189,7 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
 
 
 def _frame(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, ...]:
-    """Return the polygons of the frame around the leg and of the bar to its pad [m]; none where none is asked for."""
+    """Return the polygons of the frame around the leg and of the bar to its pad [m]; none if none is requested."""
     from cfmkit.export.ground_frame import ground_frame
 
     part = spec.mechanism.part
