@@ -36,7 +36,7 @@ class Status(Enum):
     COMPLETE = "solved over everything that was requested"
     PARTIAL = "solved in part: the curve ends early, or some points failed"
     INFEASIBLE = "no design meets the targets within the stated limits"
-    NO_EQUILIBRIUM = "no equilibrium: the mechanism cannot exist as described, or nothing holds it"
+    NO_EQUILIBRIUM = "no equilibrium: the mechanism cannot exist as described, or it is not supported"
     INVALID = "a value is invalid"
     TIMEOUT = "the time allowed for this point ran out"
     CRASHED = "the process that worked on this point died"

@@ -53,7 +53,7 @@ TIED = 0.999
 
 FINDINGS = {
     "weakly_identified": "the data determine a fitted value badly",
-    "at_bound": "a fitted value lies on its bound: the data ask for more",
+    "at_bound": "a fitted value is at its bound: the data require a value beyond",
     "lack_of_fit": "the residuals are not random: the model does not describe the measurement",
     "not_converged": "the fit stopped before it converged",
 }
@@ -213,7 +213,7 @@ def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitPa
 
 def _undetermined(paths: Sequence[str]) -> str:
     if len(paths) == 1:
-        return f"the measured curve says nothing about {paths[0]}: changing it changes no force; leave it out of --fit"
+        return f"the measured curve does not determine {paths[0]}: changing it changes no force; leave it out of --fit"
     told = f"{', '.join(paths[:-1])} and {paths[-1]}"
     return f"the measured curve cannot tell {told} apart: one makes up for the other; fit only one of them"
 
@@ -223,7 +223,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
     found, half = [], fit.half_widths()
     for k, item in enumerate(parameters):
         if fit.at_bound[k]:
-            found.append(Finding("at_bound", f"{item.path} lies on its bound: the data ask for more"))
+            found.append(Finding("at_bound", f"{item.path} is at its bound: the data require a value beyond"))
         elif half[k] > POOR * item.size:
             found.append(
                 Finding(

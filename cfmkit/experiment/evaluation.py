@@ -231,7 +231,7 @@ def _spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Fi
     count = int(spiky.sum())
     if not count:
         return ()
-    return (Finding("spikes", f"{count} of {len(recording)} points stand far off their neighbours: left out"),)
+    return (Finding("spikes", f"{count} of {len(recording)} points are far from their neighbours and are omitted"),)
 
 
 def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:

@@ -159,7 +159,7 @@ def low_passed(values: FloatArray, over: FloatArray, filtered_by: LowPass) -> Fl
     steps = np.diff(over)
     step = float(over[-1] - over[0]) / max(len(over) - 1, 1)
     if step == 0 or not len(steps):
-        raise DataError("there is nothing to filter over: all points are at one place")
+        raise DataError("there is no travel to filter over: all points are at one position")
     if np.abs(steps - step).max() <= _EVEN * abs(step):
         return _both_ways(values, abs(step), filtered_by)
     way = 1 if step > 0 else -1

@@ -81,15 +81,14 @@ def ground_frame(
     from shapely import Polygon, union_all
 
     if not pads:
-        raise GeometryError(
-            "a frame joins pads that stand, and nothing is clamped; leave out 'mechanism.part.frame.ground'"
-        )
+        raise GeometryError("a frame joins held pads, but no node is clamped; leave out 'mechanism.part.frame.ground'")
     low, high = _opening(pads, moving, covered, clearance) if inside is None else np.sort(np.array(inside), axis=0)
     sides = _sides(low, high, thickness)
     ring = union_all([Polygon(side) for side in sides])
     if (common := ring.intersection(moving)).area > ROOT**2:
         raise GeometryError(
-            f"the frame is in the way of what moves at {_place(common)}; make 'mechanism.part.frame.inside' larger"
+            f"the frame is in the way of the moving parts at {_place(common)}; make "
+            f"'mechanism.part.frame.inside' larger"
         )
     bars = [_bar(name, pad, low, high, thickness, moving, clearance) for name, pad in pads.items()]
     return GroundFrame(sides, tuple(bars))

@@ -396,7 +396,7 @@ def _levelled(cycle: Cycle) -> Cycle:
     low, high = max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches)
     low, high = max(low, curve.extent[0]), min(high, curve.extent[1])
     if not (low < high and (size := curve.largest(low, high))):
-        raise Undefined("the target curve says nothing of this travel")
+        raise Undefined("the target curve is not defined for this travel")
     valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
     model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
     frame = replace(

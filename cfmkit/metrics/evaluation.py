@@ -339,6 +339,6 @@ def _told(gap: UncoveredWindow, result: Result) -> str:
     if (left := left_of(window, result)) != window and left is not None:
         return f"{text}: metrics are those over {span_text(left.lo, left.hi, kind)}, a requirement over it is missed"
     return (
-        f"{text}; what is measured over it has no value. Choose a window inside, or shares of the travel, which "
-        "follow it: [1 %, 100 %]"
+        f"{text}; metrics over it have no value. Choose a window inside the curve, or shares of the travel: [1 %, "
+        "100 %]"
     )

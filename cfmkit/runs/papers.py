@@ -34,7 +34,7 @@ VERDICTS: Mapping[str, str] = {
     "given": "an input: the example holds it as printed",
     "misprint": "wrong as printed: the row says why, and what is right",
     "disagrees": "computed here with another result; the row says what is known of the reason",
-    "measured there": "an experiment of the authors; where the model has the same quantity, its value stands beside it",
+    "measured there": "an experiment of the authors; if the model has the same quantity, its value is shown beside it",
     "not modelled": "cfmkit has no such model or part",
 }
 """Every verdict with its meaning, in the order in which they are counted."""

@@ -114,7 +114,7 @@ def message(found: Suggestions) -> str:
         late = "; the time budget ended the search before everything was tried" if found.late else ""
         return f"{len(found.proposals)} mechanisms do all that is wished{late}"
     if found.late:
-        return "the time budget ended the search before anything did what is wished; give it more (--time-budget)"
+        return "the time budget ended the search before a mechanism met the wish; increase it (--time-budget)"
     return "no mechanism does what is wished"
 
 
@@ -135,7 +135,7 @@ def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
     if block.cycles is not None and not judged:
         yield {
             "name": "cycles_not_judged",
-            "message": "the life of proposals without a number was not judged: give the material's 'fatigue' data",
+            "message": "the life of proposals without a number was not checked: state the material's 'fatigue' data",
         }
 
 

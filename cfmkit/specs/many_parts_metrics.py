@@ -9,7 +9,7 @@ OF_MANY_PARTS = {
     "yield_before": "yield of the specification that the design began with",
     "yield_with_common_frozen": "yield without the errors that scale the force of a whole part, such as that of the "
     "modulus: those that a coupon and a trim take away",
-    "yield_after_trim": "yield where the mean force of each part is brought to that of the design, by a trim or by its "
-    "width; stresses stay as they are",
+    "yield_after_trim": "yield where the mean force of each part is adjusted to that of the design, by a trim or by "
+    "its width; stresses do not change",
 }
 """Name -> definition; all are shares of parts."""

@@ -53,7 +53,7 @@ class Requirement(Model):
     def _well_formed(cls, text: str) -> str:
         if not re.fullmatch(r"[a-z_0-9]+(\[([a-z_0-9-]+|[0-9.eE+-]+ ?[A-Za-z]+)\])?", text):
             raise ValueError(
-                "must be a metric's name, with a branch in brackets where wanted: 'force_mean[load]', or a time: "
+                "must be a metric's name, optionally with a branch in brackets: 'force_mean[load]', or a time: "
                 "'force_after[1000 h]'"
             )
         return text
@@ -174,7 +174,7 @@ class Sensitivity(Model):
     samples: int | None = Field(
         None, ge=2, description="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts"
     )
-    seed: int | None = Field(None, ge=0, description="of everything random; `--seed` takes precedence")
+    seed: int | None = Field(None, ge=0, description="seed of all random numbers; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
     on_failure: Literal["fail", "resample", "bound"] = Field(
         "fail",

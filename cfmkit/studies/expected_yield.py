@@ -53,7 +53,7 @@ def expected(result: Result, run: Run) -> str:
         return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
-        return f"{_told(found, shares)}; nothing of it may move for margins unless 'design.free' names it"
+        return f"{_told(found, shares)}; margins need 'design.free' to name values that may change"
     return f"{_told(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
 
 

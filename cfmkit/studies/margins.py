@@ -238,7 +238,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
         return design
     free = free_of(given, design.spec)
     if not free:
-        told = "design.yield: nothing of this design may move to reach it; name values and ranges in 'design.free'"
+        told = "design.yield: this design has no free values to reach it; name values and ranges in 'design.free'"
         return replace(design, notes=(*design.notes, ("margins", told)))
     nominal = family(given.family).analyze(design.spec, run)
     made = tolerances_of(design.spec, block, run.seed)

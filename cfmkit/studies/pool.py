@@ -242,7 +242,7 @@ def _cause(code: int) -> str:
 def _started(what: BinaryIO) -> _Worker:
     """Return a new worker that will do `what` is in a file."""
     if not sys.executable:
-        raise UsageError("this Python cannot start processes of its own; use one job (-j 1)")
+        raise UsageError("this Python cannot start other processes; use one job (-j 1)")
     jobs_out, jobs_in = os.pipe()
     outcomes_out, outcomes_in = os.pipe()
     life_out, life_in = os.pipe()

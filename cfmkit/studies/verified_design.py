@@ -89,7 +89,7 @@ def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begu
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
     path = next((path for path in family(given.family).levels if _level(given, path)), None)
     if path is None:
-        told = f"{begun}; the sheet fixes the widths and the design names no force: nothing is corrected"
+        told = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", told)))
     wanted = _level(given, path)
     record = family(given.family)
@@ -136,7 +136,7 @@ def _outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Des
     for path, (low, high) in ranges.items():
         if path in corrected and not low * (1 - 1e-9) <= corrected[path] <= high * (1 + 1e-9):
             told = (
-                f"design.verify: for the wanted force of the solid {path} would be "
+                f"design.verify: for the requested force of the solid {path} would be "
                 f"{format_short(corrected[path], 'length')}, outside its range of {format_short(low, 'length')} to "
                 f"{format_short(high, 'length')}"
             )

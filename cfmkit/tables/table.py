@@ -58,7 +58,7 @@ class TableColumn:
         """Freeze the values and check them and the name."""
         match = HEADER.fullmatch(self.header)
         if not match or match["name"] != self.name or match["unit"] != self.unit:
-            raise CfmError(f"{self.header!r} cannot head a column: it takes a name, and a unit in brackets")
+            raise CfmError(f"{self.header!r} cannot head a column: it must be a name with a unit in brackets")
         object.__setattr__(self, "values", _frozen(self.values, numeric=self.unit is not None))
         if self.unit is not None and isinstance(self.values, tuple):
             for cell in self.values:

@@ -166,7 +166,7 @@ def test_more_samples_reuse_those_that_are_there(cli, study):
         (("--vary", "mechanism.springs.stiffness=normal:1 %"), 3, "is a list here"),
         (("--vary", "mechanism.masses.brace=normal:1 %"), 3, "has no value"),
         (("--vary", "analysis.points=1:2"), 3, "does not vary continuously"),
-        (("--vary", "mechanism.roller_radius=20 mm:21 mm"), 3, "nominal value lies outside"),
+        (("--vary", "mechanism.roller_radius=20 mm:21 mm"), 3, "nominal value is outside"),
         (("--metrics", "force_men"), 2, "force_men"),
         (("--samples", "1"), 2, "--samples"),
         (("--method", "oat", "--on-failure", "resample"), 3, "draws no samples"),

@@ -132,7 +132,7 @@ def test_spikes_are_left_out_and_counted(seed, noise):
     clean = numbers_of(measured(case))
     finding = measured(replace(case, effort=effort), leave_out=LEFT_OUT).warnings[0]
     assert finding.name == "spikes"
-    assert finding.message.startswith(f"15 of {len(effort)} points stand far off their neighbours")
+    assert finding.message.startswith(f"15 of {len(effort)} points are far from their neighbours")
     assert ripples(numbers) == pytest.approx(ripples(clean), rel=0.02 if noise == 0 else 0.15)
 
 

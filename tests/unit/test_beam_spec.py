@@ -72,7 +72,7 @@ MORE = "beams:\n    beam: {start: root, end: tip}"
             MORE,
             f"{MORE}\n  links: [{{master: tip, node: root}}]",
             "mechanism.links.0.node",
-            "'root' has a support of its own",
+            "'root' has a support and cannot follow",
         ),
         (MORE, SLIDE, "mechanism.springs.s.node", "there is no node 'to'"),
         (MORE, LOOSE, "mechanism.springs.s", "give either 'end'"),

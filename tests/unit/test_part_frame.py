@@ -83,7 +83,7 @@ def test_a_frame_changes_nothing_of_what_is_solved(name):
 def test_a_frame_in_the_way_is_told_with_its_place():
     tight = "mechanism.part.frame={ground: 6 mm, inside: [[-34 mm, -6 mm], [34 mm, 55 mm]]}"
     with pytest.raises(
-        GeometryError, match=r"in the way of what moves at \(.* mm, .* mm\); make 'mechanism.part.frame.inside'"
+        GeometryError, match=r"in the way of the moving parts at \(.* mm, .* mm\); make 'mechanism.part.frame.inside'"
     ):
         cfmkit.drawing(loaded("beam_lan2010", tight))
 

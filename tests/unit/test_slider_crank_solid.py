@@ -73,7 +73,7 @@ def test_printing_allowance_is_solved_but_not_drawn():
     ("name", "change", "told"),
     [
         ("bilancia2019", "analysis.drive=force", "needs a part: 'mechanism.flexures' or 'mechanism.beam'"),
-        ("strip", "analysis.side=before", "goes where its kink leads it: drop 'analysis.side'"),
+        ("strip", "analysis.side=before", "follows the side of its kink: remove 'analysis.side'"),
     ],
 )
 def test_what_is_no_part_is_refused(name, change, told):

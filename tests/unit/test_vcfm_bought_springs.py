@@ -116,7 +116,7 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
     assert "1 x s2: too soft, they need a rise of 5.575 mm ('design.rise' 4.5 mm)" in found.message
     assert "2 others miss more" in found.message
     torsion = ({"name": "t", "kind": "torsion", "rate": "1 N*mm/rad"},)
-    assert "it lists no spring of the kind that is wanted" in designed(spec, catalogue=torsion).message
+    assert "it lists no spring of the required kind" in designed(spec, catalogue=torsion).message
 
 
 @pytest.mark.parametrize(

@@ -200,7 +200,7 @@ def test_the_two_parsers_see_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
         ("cfmkit: 1\n", "x:1:1: the key 'family' is missing: one of cam, beam"),
         ("family: [cam]\n", "x:1:9: family: a list is not one of cam, beam"),
         ("family: cam: 1\n", "x:1:12: a second ': ' on one line, or a line indented under a value; "
-         "quote text that holds ': ', or put the key on a line of its own"),
+         "quote text that holds ': ', or put the key on a separate line"),
     ],
 )  # fmt: skip
 def test_the_family_is_one_of_the_known(text: str, words: str) -> None:

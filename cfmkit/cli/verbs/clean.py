@@ -78,7 +78,7 @@ def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:
     answer = sys.stdin.readline() if sys.stdin is not None else ""
     if not answer:
         terminal.complain([""])
-        raise UsageError("nothing was removed: nobody answers on standard input; say --yes")
+        raise UsageError("nothing was removed: no answer on standard input; use --yes")
     return answer.strip().lower() in ("y", "yes")
 
 

@@ -30,7 +30,7 @@ class ExamplesOptions(Common):
     )
     run: Annotated[
         str | None,
-        option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; nothing is kept."),
+        option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; no files are kept."),
     ] = None
     schema: Annotated[
         bool | None,

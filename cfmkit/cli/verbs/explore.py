@@ -42,7 +42,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.specfile import STDIN
 
     if options.spec == STDIN:
-        raise UsageError("explore needs a file: what it saves stands beside it")
+        raise UsageError("explore needs a file: it saves new files beside it")
     if options.port > 65535:
         raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")
     explorer = Explorer.of(options.spec, options.changes)

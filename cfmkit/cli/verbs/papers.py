@@ -74,7 +74,7 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbo
     from cfmkit.cli.topics import references
 
     titles = {one["name"]: one["reference"] for one in references()}
-    yield TextLine((Span("cfmkit papers", LABEL), Span("  what the papers print, and what comes out here")))
+    yield TextLine((Span("cfmkit papers", LABEL), Span("  numbers of the papers, and the results here")))
     for paper in dict.fromkeys(one["paper"] for one in records):
         mine = [one for one in records if one["paper"] == paper]
         yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)

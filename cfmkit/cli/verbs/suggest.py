@@ -60,7 +60,7 @@ class SuggestOptions(Common):
     adjustable: Annotated[str | None, _key("adjustable", "A,B", "Between which forces it is adjusted: 15N,25N.")] = None
     hysteresis: Annotated[str | None, _key("hysteresis", "SHARE", "Largest loss of a cycle, over its work.")] = None
     cycles: Annotated[
-        str | None, _key("cycles", "N", "Presses that it has to survive; judged of a material with fatigue data.")
+        str | None, _key("cycles", "N", "Required life in cycles; checked for materials with fatigue data.")
     ] = None
     made_well: Annotated[str | None, _key("yield", "SHARE", "Share of made parts that meet the wish.")] = None
     prefer: Annotated[

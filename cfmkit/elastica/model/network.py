@@ -238,7 +238,7 @@ class Network:
                 raise InputError(f"the links through {link.node!r} form a loop")
             support = self.nodes[link.node].support
             if support.along or support.across or support.rotation:
-                raise InputError(f"node {link.node!r} is moved by a link and cannot have a support of its own")
+                raise InputError(f"node {link.node!r} is moved by a link and cannot have a support")
         if len(set(moved)) != len(moved):
             raise InputError("a node can be moved by one link only")
 

@@ -98,7 +98,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
     if wish.kind == "torque":
         return FamilyOffer(reason="the kept shapes are pushed: they give a force, no torque")
     if wish.adjustable is not None:
-        return FamilyOffer(reason="the force of a network of beams is fixed: nothing adjusts it")
+        return FamilyOffer(reason="the force of a network of beams cannot be adjusted")
     found: list[Candidate] = []
     missed: list[tuple[float, str, dict[str, str]]] = []
     for kept in kept_shapes():

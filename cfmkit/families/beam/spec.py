@@ -391,7 +391,7 @@ def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
         return
     mechanism = spec.mechanism
     if mechanism.drive.kind != "displacement":
-        yield "needs a drive of kind 'displacement': the force at the end of its window is what is scaled"
+        yield "needs a drive of kind 'displacement': the force at the end of its window is scaled"
     moved = any(node.moved is not None for node in mechanism.nodes.values())
     if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:
         yield "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"

@@ -307,7 +307,8 @@ def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfil
             finding(
                 "undercut_total",
                 f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
-                f"curvature ({mm(smallest)} at the start), and the stroke ends before it would leave the cam's corner; "
+                f"curvature ({mm(smallest)} at the start), and it would pivot on the cam's corner over the "
+                f"whole stroke; "
                 "use a smaller roller ('mechanism.roller_radius'), a larger force constant or a longer stroke "
                 "('force_constant' and 'stroke' of 'mechanism.profile')",
             )

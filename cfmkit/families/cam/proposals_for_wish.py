@@ -64,7 +64,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
     if wish.kind == "torque":
         return FamilyOffer(reason="a cam with rollers gives a force at its slider, no torque")
     if wish.adjustable is not None:
-        return FamilyOffer(reason="the force of a cam is fixed by its springs: nothing adjusts it")
+        return FamilyOffer(reason="the force of a cam is fixed by its springs and cannot be adjusted")
     draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
     found = _sized(wish, draw)
     fitting = found["fits"] & found["flat"] & found["lossless"]

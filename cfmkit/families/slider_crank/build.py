@@ -38,7 +38,7 @@ def coupler_length(mechanism: Mechanism) -> float:
             finding(
                 "not_assemblable",
                 f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
-                f"{mm(mechanism.crank_length)}: nothing is left for the coupler; make "
+                f"{mm(mechanism.crank_length)}: no length is left for the coupler; make "
                 "'mechanism.crank_length' shorter, or 'mechanism.stretched_position' longer",
             )
         )

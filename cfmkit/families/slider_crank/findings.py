@@ -10,7 +10,7 @@ from cfmkit.families.findings import finder
 
 FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the guide of the slider, or not in the unloaded position",
-    "coupler_dead_point": "the motion ends where the coupler stands perpendicular to the slider's path",
+    "coupler_dead_point": "the motion ends where the coupler is perpendicular to the slider's path",
     "no_full_turn": "a full turn is requested, but the crank cannot make one",
     "out_of_reach": "the slider cannot travel as far as requested",
     "no_spring": "no spring acts on the mechanism",

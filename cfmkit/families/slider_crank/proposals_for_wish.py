@@ -154,7 +154,7 @@ def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
 
 def _of_force(wish: Wish) -> FamilyOffer:
     if wish.adjustable is not None:
-        return FamilyOffer(reason="the force of a slider-crank is fixed by its springs: nothing adjusts it")
+        return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
     found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
     if found:
         return FamilyOffer(tuple(_varied(found)[:OFFERED]))

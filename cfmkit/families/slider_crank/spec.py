@@ -194,7 +194,7 @@ class SliderCrankSpec(Spec):
         if asked == "solid" and part.finest == "prb":
             raise ValueError("fidelity 'solid' needs a part: 'mechanism.flexures' or 'mechanism.beam'")
         if asked == "solid" and self.analysis.side is not None:
-            raise ValueError("fidelity 'solid' goes where its kink leads it: drop 'analysis.side'")
+            raise ValueError("fidelity 'solid' follows the side of its kink: remove 'analysis.side'")
         if asked == "solid" and self.analysis.travel is not None and self.analysis.travel[0] < 0:
             raise ValueError("fidelity 'solid' is pressed, not pulled: 'analysis.travel' must not begin below 0")
         if self.fidelity != "prb" and self.analysis.drive != "force":

@@ -38,7 +38,7 @@ TRACED = ("exact", "solid")
 
 FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
-    "no_linear_region": "the leaves do not buckle: their negative stiffness is nowhere constant",
+    "no_linear_region": "the leaves do not buckle: their negative stiffness is not constant",
     "not_flat": "the positive and the negative stiffness do not cancel: the force is not constant",
     "force_reversal": "the force reaches zero within the window: the mechanism would not return",
     "bistable": "beyond the peak of the leaves the force is not positive: the mechanism stays in a second "

@@ -18,7 +18,7 @@ DIMENSIONS = (
     ),
     DrawingSymbol("theta2", "mechanism.bistable.angle", "of a leaf from the direction across the motion"),
     DrawingSymbol("t2, b2", "mechanism.bistable.thickness, .width", "of a leaf in the plane, out of it"),
-    DrawingSymbol("h", "L2 sin(theta2): metric rise", "how far the shuttle goes until the leaves lie across"),
+    DrawingSymbol("h", "L2 sin(theta2): metric rise", "travel of the shuttle until the leaves are flat"),
     DrawingSymbol("L1", "mechanism.positive.length", "of a leaf of the spring, here a diamond of two chains"),
     DrawingSymbol(
         "theta1", "mechanism.positive.angle", "of a leaf of the diamond from the direction across the motion"

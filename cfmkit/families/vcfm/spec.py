@@ -91,7 +91,9 @@ class BoughtSprings(Model):
     max_elongation: PositiveLength | None = Field(
         None, description="largest elongation (compression) that a spring may see"
     )
-    free_length: PositiveLength | None = Field(None, description="relaxed length, for drawings and the room it takes")
+    free_length: PositiveLength | None = Field(
+        None, description="relaxed length, for drawings and for the space required"
+    )
     outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
     name: str | None = Field(None, min_length=1, description="by which it is bought, for the list of parts")
     wound: SpringWire | None = Field(

@@ -117,7 +117,7 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
             missed.append(found)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
-    none = "it lists no spring of the kind that is wanted ('mechanism.springs.kind')"
+    none = "it lists no spring of the required kind ('mechanism.springs.kind')"
     told = f"no spring fits: {nearest(missed) if missed else none}"
     return no_design(
         finding("no_spring_fits", f"{told} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")

@@ -72,10 +72,14 @@ class UnitField:
         number, dimension = self._read(value)
         if number and not SMALLEST <= abs(number) <= LARGEST:
             told = value.strip() if isinstance(value, str) else decimal_text(number)
-            raise QuantityError(f"{told} is beyond what is computed with: {SMALLEST:g} to {LARGEST:g} in SI units")
+            raise QuantityError(
+                f"{told} is outside the range of the computation: {SMALLEST:g} to {LARGEST:g} in SI units"
+            )
         if dimension == "angle" and abs(number) > MOST_TURNS * math.tau:
             told = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
-            raise QuantityError(f"{told} is beyond what is computed with: at most {MOST_TURNS} turns of 360 deg")
+            raise QuantityError(
+                f"{told} is outside the range of the computation: at most {MOST_TURNS} turns of 360 deg"
+            )
         return number, dimension
 
     def _read(self, value: Any) -> tuple[float, str]:

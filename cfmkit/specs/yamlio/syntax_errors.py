@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 _PLAIN_WORDS = (
     ("mapping values are not allowed", "a second ': ' on one line, or a line indented under a value; "
-     "quote text that holds ': ', or put the key on a line of its own"),
-    ("sequence entries are not allowed", "a '- ' item cannot start here; put it on a line of its own"),
+     "quote text that holds ': ', or put the key on a separate line"),
+    ("sequence entries are not allowed", "a '- ' item cannot start here; put it on a separate line"),
     ("'([@`])' that cannot start any token", "text cannot start with this character; quote it"),
     ("'%' that cannot start any token", "text cannot start with '%'; quote it, or write the number before it: 5 %"),
     ("unexpected end of stream", "a quotation is never closed"),

@@ -123,7 +123,7 @@ class _Builder:
     def _count(self, event: Event, path: Path) -> None:
         self.nodes += 1
         if self.nodes > MOST_NODES:
-            raise Unreadable(_fault(event, (), f"more than {MOST_NODES} values; put long data into a file of its own"))
+            raise Unreadable(_fault(event, (), f"more than {MOST_NODES} values; put long data into a separate file"))
         if len(path) > DEEPEST:
             raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {DEEPEST} deep"))
 

@@ -92,7 +92,7 @@ def _group_faults(block: Sensitivity, paths: Sequence[str]) -> Iterator[tuple[Pl
                 place = ("sensitivity", "correlated", index, "parameters", number)
                 yield place, f"{name!r} is not among the parameters: {known}"
         if len({k for name in group.parameters for k in _members(name, paths)}) == 1:
-            yield ("sensitivity", "correlated", index), "one parameter alone is correlated with nothing"
+            yield ("sensitivity", "correlated", index), "a correlation needs at least two parameters"
     try:
         correlations(block, paths)
     except Incompatible as problem:

@@ -190,7 +190,7 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         raise SpecError([Problem("", 0, 0, f"sensitivity.costs.{path}", missing) for path in unknown])
     outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
     if block.method in MADE and outside:
-        told = "the nominal value lies outside the range; it is what a tolerance is tightened to"
+        told = "the nominal value is outside the range; tolerances are tightened towards it"
         raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", told) for one in outside])
 
 
@@ -232,7 +232,7 @@ def _solved(study: Study) -> Result:
     """Return the result without any deviation."""
     result = study.solve(study.spec)
     if not result.status.usable:
-        told = "the specification itself has no solution, so that nothing can be said about deviations from it"
+        told = "the specification itself has no solution, so deviations from it cannot be studied"
         raise SolutionError(f"{told}: {result.message}")
     return result
 

@@ -35,7 +35,7 @@ PARTS = 100
 AT_ONCE = 10
 """Parts between two looks at whether too many are bad already, or the time is up."""
 
-OUT_OF_TIME = "the time budget ended before its made parts were judged"
+OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluated"
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
     wanted = float(wish.good_parts or 0.0)
     found = assumed(result.spec, wish.process)
     if found is None or result.spec.sensitivity is None:
-        return GoodParts(None, "its yield is not known: nothing says which of its sizes a process errs in")
+        return GoodParts(None, "its yield is not known: the errors of its dimensions by the process are not known")
     first = _first_order(result, found)
     if first is not None and first[0] < wanted:
         return GoodParts(first[0], _told(first[0], f"made by {found.process.name}, to first order", wanted, first[1]))

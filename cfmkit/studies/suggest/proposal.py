@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 LONGEST = 15.0
 """Seconds that one design may search."""
 
-OUT_OF_TIME = "the time budget ended before it was made and judged"
+OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
 SLACK = 1e-9

@@ -138,7 +138,7 @@ def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if link.node in leads:
             yield ("links", index, "node"), f"{link.node!r} follows {leads[link.node]!r} already"
         elif mechanism.nodes[link.node].support != "free":
-            yield ("links", index, "node"), f"{link.node!r} has a support of its own and cannot follow another node"
+            yield ("links", index, "node"), f"{link.node!r} has a support and cannot follow another node"
         elif link.node in _chain(leads, link.master):
             yield ("links", index), f"the links through {link.node!r} form a loop"
         else:

@@ -93,7 +93,7 @@ class NodeSpec(Model):
         if slides and self.direction is None:
             raise ValueError(f"a node that is {self.support!r} needs 'direction', along which it slides")
         if self.direction is not None and self.support in ("free", "parallel"):
-            raise ValueError(f"'direction' means nothing for a support that is {self.support!r}")
+            raise ValueError(f"'direction' has no meaning for a support that is {self.support!r}")
         return self
 
     @model_validator(mode="after")
@@ -203,7 +203,7 @@ def checked_thickness(value: Thickness) -> Thickness:
         if places[0] != 0 or places[-1] != 1 or places != sorted(places):
             raise ValueError("the fractions of a thickness must run from 0 to 1 and never back")
         if any(places.count(place) > (1 if place in (0, 1) else 2) for place in places):
-            raise ValueError("a fraction given twice is a step: more often means nothing, nor does a step at an end")
+            raise ValueError("a fraction stated twice is a step; three times, or a step at an end, is not possible")
     return value
 
 

@@ -156,7 +156,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
             return _nothing(result, plan)
         if plan.late():
             said = (
-                f"none of {len(some)} starts met all limits in the time allowed: give it more "
+                f"none of {len(some)} starts met all limits in the time allowed: increase it "
                 "(design.optimise.time_budget), or run again to go on"
             )
             return Design(None, Status.INFEASIBLE, said)
@@ -246,6 +246,6 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
     if result.lost:
         out.append(finding("starts_lost", f"some starts were lost: {'; '.join(result.lost)}"))
     elif result.missing:
-        said = f"{result.missing} of the starts were not done in the time budget; run again to go on"
+        said = f"{result.missing} of the starts were not finished in the time budget; run again to continue"
         out.append(finding("search_cut_short", said))
     return tuple(out)

@@ -114,7 +114,7 @@ def _check(name: str, side: Side) -> None:
         raise CannotBuild(
             finding(
                 "dead_point",
-                f"on the {name} side the slider rises nowhere as the roller moves out: the flank is turned too far "
+                f"on the {name} side the slider does not rise as the roller moves out: the flank is turned too far "
                 "('mechanism.errors'), or the brace is too short for the profile ('mechanism.brace_length')",
             )
         ) from None

@@ -224,7 +224,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
     if wanted.curve is not None and not wanted.curve.extremes(*(travel or (0.0, 1.0)))[0] >= 0:
         raise InputError("'design.target' must not be negative over 'design.travel': a strip is pressed, not pulled")
     if beam.goal != "stroke" and travel is None:
-        raise InputError(f"the goal {beam.goal!r} needs 'design.travel', over which the force is wanted")
+        raise InputError(f"the goal {beam.goal!r} needs 'design.travel', the travel over which the force is required")
     reach = slider_reach(linkage, unloaded)
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:

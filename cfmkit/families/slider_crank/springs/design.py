@@ -214,7 +214,7 @@ def solve(task: Task, tolerance: float | None = None) -> Solved:
         check_reach(task, window)
     goal = task.goal(window, None if wanted.objective == "least-squares" else DENSE)
     if goal is None:
-        text = "in the window the effort is unbounded: a dead point, or the stretched position, lies in it"
+        text = "in the window the force or torque is unbounded: it contains a dead point or the stretched position"
         text += f"; change 'design.{task.assembly.motion_name}'"
         raise Infeasible(finding("infeasible_targets", text))
     if wanted.catalogue:

@@ -185,9 +185,9 @@ def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
     whole = asked[1] - asked[0] >= TURN * (1 - 1e-9)
     return finding(
         "no_full_turn" if whole else "coupler_dead_point",
-        f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
-        "for: at the ends the coupler stands across the slider's way; ask for less in 'analysis.angle', or "
-        f"make 'mechanism.coupler_length' more than {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} "
+        f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are "
+        f"requested: at the ends the coupler is perpendicular to the guide; reduce 'analysis.angle', or make "
+        f"'mechanism.coupler_length' more than {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} "
         "for full turns",
     )
 
@@ -199,7 +199,7 @@ def unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
     return finding(
         "force_unbounded",
         f"at {places} of travel crank and coupler are in one line and the springs are not relaxed: no finite force "
-        f"takes the slider there; the curve ends before, at {ends}",
+        f"moves the slider there; the curve ends before, at {ends}",
     )
 
 

@@ -219,7 +219,7 @@ class SpringDesign(DesignBlock):
             self._check_curve(self.target)
             return self
         if (self.torque is None) == (self.force is None):
-            raise ValueError("give either 'torque' or 'force': what is wanted constant; or 'target', a curve of one")
+            raise ValueError("state either 'torque' or 'force', to keep constant, or 'target', a curve of one")
         if self.torque == 0.0:
             raise ValueError("'torque' must not be 0: springs that are absent do that")
         if self.torque is None and (self.angle or self.stiffness is not None or self.hold_stiffness):
