@@ -773,3 +773,16 @@ def test_a_short_run_loads_neither_the_compiler_nor_masked_arrays():
     command = [sys.executable, "-c", code, str(Path(__file__).parents[2] / "configs" / "beam_lan2010.yaml")]
     codes = (subprocess.run(command, check=False).returncode for _ in range(2))
     assert 0 in codes  # the first one may compile
+
+
+def test_a_straight_strip_pressed_along_itself_names_the_strip_and_a_cure_that_buckles_it():
+    pressed = TAUT.replace(", shape: {kind: arc, sweep: 60 deg}", "").replace("support: pinned", "support: clamped")
+    pressed = pressed.replace("direction: 0 deg}\nanalysis", "direction: 180 deg}\nanalysis")
+    result = cfmkit.analyze(cfmkit.loads(pressed))
+    assert result.status.exit_code == 4
+    assert "s, straight along the drive, cannot change its length and holds until it buckles" in result.message
+    assert "\n" not in result.message
+    (early,) = (item for item in result.warnings if item.name == "ends_early")
+    assert early.cures == ("analysis.fidelity=extensible",)
+    buckled = cfmkit.analyze(result.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
+    assert "bifurcation" in {item.name for item in buckled.warnings}

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding
 
 
@@ -96,6 +97,7 @@ def in_units(assembly: Assembly, text: str) -> str:
 STRETCH = "analysis.fidelity=extensible"
 
 _STRAIGHT = 0.995  # of the length of a taut beam lies between its ends
+_PARALLEL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
 _TIGHT = 50.0  # N L^2 / EI: it is pulled so hard that only its ends are bent
 
 
@@ -150,7 +152,24 @@ def _in_the_way(solution: Solution) -> str:
     said = f"look at {', '.join(keys)}"
     if spec.fidelity != "inextensible":
         return said
+    along = list(_along_the_drive(spec))
+    if along:
+        held = f"{', '.join(along)}, straight along the drive, cannot change its length and holds until it buckles"
+        return f"{said}; {held}: computed with mechanism.axial"
     return f"{said}; beams do not stretch: mechanism.axial allows it"
+
+
+def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
+    """Yield the straight beams whose ends lie one behind the other as seen along a force or a displacement."""
+    mechanism = spec.mechanism
+    direction = getattr(mechanism.drive, "direction", None)
+    if direction is None:
+        return
+    for name, beam in mechanism.beams.items():
+        way = np.subtract(mechanism.nodes[beam.end].at, mechanism.nodes[beam.start].at)
+        across = abs(way @ (-np.sin(direction), np.cos(direction)))
+        if beam.shape.kind == "straight" and across <= _PARALLEL * np.hypot(*way):
+            yield name
 
 
 NEGLIGIBLE = 1e-9
