@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 TEXT = (
     "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut.\n\n"
-    "No spec yet? `cfmkit suggest --force '20 N' --travel '5 mm' --room 120x80x15mm --material pom` finds mechanisms "
-    "that do it.\n\n"
+    "No spec yet? `cfmkit suggest --force '20 N' --travel '5 mm' --room 120x80x15mm --material pom` finds "
+    "mechanisms that meet these requirements.\n\n"
     "A spec is a YAML file that describes one mechanism. `cfmkit new cam` writes one to start from, `cfmkit examples` "
     "lists ready ones, `cfmkit show` explains families, keys, metrics and units."
 )

@@ -1,4 +1,4 @@
-"""A search never judges itself: what is reported of a design is what the analysis of its specification measures."""
+"""Audit of a search: the reported values of a design are those of the analysis of its specification."""
 
 from __future__ import annotations
 

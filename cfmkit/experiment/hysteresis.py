@@ -1,4 +1,4 @@
-"""The loop between the branches, what it says about friction, and how well cycles repeat."""
+"""The hysteresis loop between the branches, the friction that follows from it, and the repeatability of cycles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""3MF: bodies in millimetres, each an object of its own; a ZIP of three short XML files [3MF core 1.3].
+"""3MF: bodies in millimetres, each a separate object; a ZIP of three short XML files [3MF core 1.3].
 
 Reference
 ---------

@@ -1,4 +1,4 @@
-"""Functions of one variable as a row of Chebyshev polynomials, each on a panel of its own.
+"""Functions of one variable as a row of Chebyshev polynomials, one per panel.
 
 A panel's polynomial goes through the values at its nodes, none of which is an end: a jump or a kink between two panels
 does no harm. How fast the coefficients fall says whether a panel is short enough.

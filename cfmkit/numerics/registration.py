@@ -1,4 +1,4 @@
-"""Measured points laid onto smooth curves by one rigid motion, robustly, with what is uncertain about it.
+"""Robust registration of measured points to smooth curves by one rigid motion, with its uncertainty.
 
 Iterative closest point: each point finds its foot on its curve by Newton's method, then a
 weighted point-to-line Gauss-Newton step moves all points at once by an angle and a shift.

@@ -1,4 +1,4 @@
-"""Names written beside what they name, where nothing else is drawn.
+"""Labels placed beside the objects that they name, where no other line is drawn.
 
 The axes are divided into cells of about half a millimetre. Every line, patch and
 text marks the cells it covers; a name goes to the place near its line where it

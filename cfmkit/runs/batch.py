@@ -1,4 +1,4 @@
-"""Many specifications, one after the other or several at once, each like a run of its own, and what became of them."""
+"""Batches: many specifications, one after the other or in parallel, each as a single run, and their outcomes."""
 
 from __future__ import annotations
 

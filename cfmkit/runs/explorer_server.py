@@ -1,4 +1,4 @@
-"""The explorer on a port of this computer: nobody else reaches it, and nobody without its token is answered.
+"""The explorer on a port of this computer: reachable from this computer only, and only with its token.
 
 The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
 name by which it was reached (a page elsewhere that lets its own name point here is refused), the token, the size.

@@ -1,4 +1,4 @@
-"""The functions of ``import cfmkit`` that take recordings of a test rig: what they say, and models fitted to them."""
+"""The functions of ``import cfmkit`` for recordings of a test rig: metrics, and models fitted to them."""
 
 from __future__ import annotations
 

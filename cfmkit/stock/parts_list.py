@@ -1,4 +1,4 @@
-"""The list of what is bought for a mechanism: `parts.csv`."""
+"""The list of parts to buy for a mechanism: `parts.csv`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of a design as they are made: drawn from `design.tolerances` and judged by the requirements of the design.
+"""Manufactured parts of a design: drawn at random from `design.tolerances` and checked against its requirements.
 
 Parts are drawn as `cfmkit sensitivity --method tolerance` draws them, with the same grammar, and each is analysed in
 full. A part without a result is a bad part: whoever made it has nothing to sell.

@@ -1,4 +1,4 @@
-"""Requirements on a part as rows of what is seen of it: effort and stress at a few poses, which are smooth.
+"""Requirements on a part as rows of smooth values: effort and stress at a few poses.
 
 Metrics are largest and smallest values, which have corners; a requirement on one of them holds where rows of the force,
 or of the stress, at the poses of its window do. Any other metric is a number of its own.

@@ -1,4 +1,4 @@
-"""What a study does at each of its points, and what it notes about it.
+"""The computation of a study at each of its points, and the record of it.
 
 A `Study` holds everything that decides the result of a point but the varied values.
 Whatever goes wrong at a point becomes a row with a status and without values: an

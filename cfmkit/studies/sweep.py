@@ -1,4 +1,4 @@
-"""The study that varies a specification: what is asked, and the files that come of it."""
+"""The study that varies a specification: its request, and the files that it writes."""
 
 from __future__ import annotations
 

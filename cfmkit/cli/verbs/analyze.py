@@ -1,4 +1,4 @@
-"""``cfmkit analyze``: what a mechanism does as it is."""
+"""``cfmkit analyze``: curve, metrics and requirements of a mechanism as specified."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``cfmkit design``: from targets to a mechanism, and what it then does."""
+"""``cfmkit design``: from targets to a mechanism, and the analysis of that mechanism."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where stability changes along a path: limit points and bifurcations, found, told apart, and left for a stable branch.
+"""Changes of stability along a path: limit points and bifurcations located, classified, and left for a stable branch.
 
 At a singular point the tangent has a null vector. Where the drive has an extreme on the path it is a limit point, else
 a bifurcation: there the null vector points along the path that crosses.

@@ -1,4 +1,4 @@
-"""From what is wanted to a specification: one way for each key of the block `design`.
+"""From targets to a specification: one method for each key of the block `design`.
 
 `optimise` searches positions and shapes (`shaping`). `rescale` keeps the form of the force curve for another force,
 size, section or material [Lan, eq. 6 and sec. 2.3]: F L^2 / EI is the same for all mechanisms of one shape whose beams

@@ -1,4 +1,4 @@
-"""Which values of a designed cam may move for a yield: its force constant, its springs, what it is cut for."""
+"""Values of a designed cam that may change for a yield: its force constant, its springs, its profile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A specification as it was written: the tree, the place of everything in it, and what is wrong."""
+"""A specification as written: the tree, the position of every node, and the problems."""
 
 from __future__ import annotations
 

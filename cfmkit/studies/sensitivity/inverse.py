@@ -1,4 +1,4 @@
-"""The inverse of a tolerance study: which tolerance on each parameter keeps the yield at what is asked.
+"""The inverse of a tolerance study: which tolerance on each parameter keeps the requested yield.
 
 Requirements become rows of force and stress at a few poses (`studies.margins`). How they move with each error alone is
 known exactly at some of its sizes and linear between; errors of several parameters add. With that the yield of any set

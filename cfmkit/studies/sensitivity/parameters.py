@@ -1,4 +1,4 @@
-"""The block `sensitivity:` read against a specification: what is uncertain, by how much, and what goes together."""
+"""The block `sensitivity:` read against a specification: uncertain parameters, their distributions and correlations."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""From a wish to mechanisms: every family is asked, what comes of it is analysed, and only what does it is shown."""
+"""From a wish to mechanisms: every family proposes candidates, all are analysed, those that meet the wish are shown."""

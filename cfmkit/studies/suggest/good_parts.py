@@ -1,4 +1,4 @@
-"""What share of a proposal's made parts would do what is wished: to first order, then by parts that are drawn.
+"""The share of a proposal's manufactured parts that would meet the wish: to first order, then by random parts.
 
 Parts have the tolerances that are assumed of the process (`studies.process_tolerances`). They are drawn as `cfmkit
 sensitivity` draws them of the block `sensitivity` that the proposal's file says, so that its answer is the same.

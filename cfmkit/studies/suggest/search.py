@@ -1,4 +1,4 @@
-"""Ask every family, make what they name in rounds, and sort what does what is wished.
+"""Collect candidates from every family, design them in rounds, and sort those that meet the wish.
 
 A round takes the next candidates of every family that has not enough proposals yet; what the next round takes depends
 on what came of the ones before, never on what finished first. So the same seed gives the same proposals however many

@@ -1,4 +1,4 @@
-"""What is minimised: a form of the objective with variables of its own beside the design variables.
+"""Objectives: smooth forms with auxiliary variables beside the design variables.
 
 [Lan, eq. 1] compares the force at two displacements, F(a)/F(b) - 1. Nothing bounds that from below: a mechanism that
 snaps through between b and a reaches -1 and less. The flattest force over a window has no such escape: with s the half

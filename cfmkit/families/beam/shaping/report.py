@@ -1,4 +1,4 @@
-"""A design as its own analysis finds it, and what is reported of it beside that: audit, tolerances, all starts.
+"""Report of a design: the results of its analysis, the audit, the effect of tolerances, and all starts.
 
 A search never judges itself: force, window and stress that are reported of a design are those of the analysis of its
 specification, to the last digit.

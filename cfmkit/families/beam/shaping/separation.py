@@ -1,4 +1,4 @@
-"""How far beams stay apart: a smooth bound of the least gap of a pair over what is required, with derivatives.
+"""Clearance of beams: a smooth bound of the smallest gap of a pair over the required one, with derivatives.
 
 Beams that meet in a joint come close to each other there. So the gap that is required between two places grows with
 the way between them around the joint, up to the full one; that also asks for an angle between beams that meet.

@@ -1,4 +1,4 @@
-"""What is asked of many cams at once: metrics over windows, and the family's own values."""
+"""Requested values of many cams at once: metrics over windows, and the family's own values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The forces of many cams inside a window, and what is measured over it."""
+"""The forces of many cams inside a window, and the metrics over it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a design asks of the springs, for one choice of lengths: places, goal and where it may lie."""
+"""Targets of a design for the springs, for one choice of lengths: positions, goal and allowed range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many slider-cranks at once that differ in their springs: what is asked of them, and the findings that they have.
+"""Many slider-cranks at once that differ in their springs: their requested values and their findings.
 
 Of the findings only the names are known, as `findings` has them of one.
 """
