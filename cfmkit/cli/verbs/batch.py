@@ -62,7 +62,7 @@ class BatchOptions(Changing, FigureChoice):
     ] = None
     annotations: Annotated[
         Literal["github"] | None,
-        option("--annotations", text="Report what is wrong beside the lines of the files, as GitHub reads it."),
+        option("--annotations", text="Report problems with file and line, in the format of GitHub annotations."),
     ] = None
     compare: Annotated[
         str | None,

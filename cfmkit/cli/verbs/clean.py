@@ -32,9 +32,9 @@ class CleanOptions(Common):
 
 
 def run(options: CleanOptions, terminal: Terminal) -> Answer:
-    """List what runs have written below a folder, ask, and remove it.
+    """List the files that runs have written below a folder, ask for confirmation, and remove them.
 
-    Only what a manifest or a journal proves to be theirs goes: files that were edited, and all others, stay.
+    Only files that a manifest or a journal lists are removed. Files that were edited, and all others, stay.
     """
     from cfmkit.runs.cleaning import remains_below
 
