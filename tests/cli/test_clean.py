@@ -28,7 +28,7 @@ def test_where_nobody_answers_nothing_is_removed(cli, cam):
     before = left(cli)
     done = cli("clean", "out", stdin="")
     assert (done.code, left(cli)) == (2, before)
-    assert "say --yes" in done.err
+    assert "use --yes" in done.err
 
 
 def test_clean_says_as_json_what_it_removed(cli, cam):

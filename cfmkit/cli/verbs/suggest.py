@@ -94,8 +94,8 @@ LISTS = ("material", "adjustable", "prefer")
 def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     """Suggest mechanisms for a wish: a force, a travel and a room. Start here if there is no spec yet.
 
-    Candidates from every family are designed and analysed from their written files with the exact model. Only those that
-    meet the whole wish are listed.
+    Candidates from every family are designed and analysed from their written files with the exact model. Only those
+    that meet the whole wish are listed.
     """
     from cfmkit.cli.study_verbs import noting
     from cfmkit.designing.starts import Clock
