@@ -3,6 +3,10 @@
 Run: python benchmarks/beams_vibration.py. Corotational elements with lumped masses at their nodes (mm, N, t), of second
 order in the element: frequencies at 40 and 80 elements a beam, and what follows from both for infinitely many
 (Richardson). The path is traced by both; the peer's is driven to the same displacement. How it is installed: README.
+
+Extrapolated, they agree within 8e-7 for the straight cantilever (its free frequencies are the closed form's to all
+digits printed), 1.4e-6 for bent ones and Lan's network over its travel. For the V-beam that has snapped through and is
+pulled tight it is 1.7e-5; with 80 and 160 elements that falls to 1.1e-6, sixteen times less, so it is the elements'.
 """
 
 from __future__ import annotations
@@ -54,9 +58,11 @@ def lan() -> Network:
 
 
 CASES = (
+    ("cantilever, hardly moved (1 um)", cantilever, "tip", 1e-3 * MM, {}),
     ("cantilever, 60 mm of 100 mm down, 5 g at its tip", cantilever, "tip", 60 * MM, {"tip": (5e-3, 0.0)}),
     ("V-beam, 0.1 mm down", v_beam, "top", 0.1 * MM, {"top": (2e-3, 0.0)}),
-    ("Lan's network, 7 mm down", lan, "n5", 7 * MM, {}),
+    ("V-beam, snapped through, 13 mm down", v_beam, "top", 13 * MM, {"top": (2e-3, 0.0)}),
+    *((f"Lan's network, {down} mm down", lan, "n5", down * MM, {}) for down in (1, 4, 7, 9)),
 )
 
 
