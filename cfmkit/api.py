@@ -294,7 +294,7 @@ def suggest(
     seed : int
         Of everything random.
     jobs : int
-        Processes.
+        Processes; 1: this one alone, from which a job that takes long cannot be taken when the time budget ends.
     time_budget : float, optional
         In seconds; None: no limit.
     **keys
