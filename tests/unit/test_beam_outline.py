@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from beam_support import CANTILEVER, MM, cantilever, config
 from pace import within
 
 import cfmkit
+from cfmkit.cli.main import main
 from cfmkit.export import files
 from cfmkit.export.union import merged
 from cfmkit.families.beam import strips as strip_module
@@ -202,3 +204,20 @@ def test_a_finer_tolerance_gives_another_contour_and_a_coarser_one_the_same_as_e
     count = [sum(len(one.edges) for one in cfmkit.drawing(spec, each).contours) for each in TOLERANCES]
     assert count[0] <= count[1] < count[2] < count[3]
     assert cfmkit.drawing(spec).contours[0].edges == cfmkit.drawing(spec, 5e-6).contours[0].edges
+
+
+@pytest.mark.parametrize("turns", [1.6, 2.6, 10.25])
+def test_windings_on_one_circle_become_a_ring(turns):
+    radius, thickness = 20 * MM, 2 * MM
+    angle = np.linspace(0.0, 2 * np.pi * turns, 8000)
+    points = radius * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+    strip = strip_module.BeamStrip(points, angle, np.full(len(angle), thickness))
+    assert area(merged(strip.polygons)) == pytest.approx(2 * np.pi * radius * thickness, rel=2e-3)
+
+
+def test_a_part_that_cannot_be_drawn_within_its_tolerance_is_refused(tmp_path, capsys):
+    """Before, it was drawn with as many points as there may be, however far off."""
+    source = str(Path(__file__).parents[2] / "configs" / "beam_lan2010_thin.yaml")
+    large = [source, "--set", "mechanism.nodes.n3.at.1=1.877e10 mm", "-q", "-o", str(tmp_path / "out")]
+    assert main(["export", *large]) == 3
+    assert "coarser --tolerance" in capsys.readouterr().err

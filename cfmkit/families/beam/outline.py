@@ -302,7 +302,7 @@ def _pieces(
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the polygons of one half: strips, joints, pads, eyes, bars; and the holes in eyes."""
     network = assembly.network
-    pieces = [strip.polygon for found in beams.values() for strip in found]
+    pieces = [part for found in beams.values() for strip in found for part in strip.polygons]
     holes = []
     for name, found in beams.items():
         beam = network.beams[name]

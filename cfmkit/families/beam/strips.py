@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.errors import GeometryError
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -51,12 +53,31 @@ class BeamStrip:
         left, right = self.sides
         return np.concatenate([left, right[::-1]])
 
+    @property
+    def polygons(self) -> list[FloatArray]:
+        """The outline, or where the strip winds, outlines of parts that do not overlap themselves, (2n, 2) each [m].
+
+        The union of windings takes a second in parts, and twenty as one outline that crosses itself thousands of times.
+        """
+        turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.angle)))])
+        if turned[-1] <= 2 * np.pi:
+            return [self.polygon]
+        left, right = self.sides
+        cuts = [*np.searchsorted(turned, np.arange(0.0, turned[-1], 0.5 * np.pi)).tolist(), len(turned) - 1]
+        parts = [slice(first, last + 1) for first, last in itertools.pairwise(cuts) if last > first]
+        return [np.concatenate([left[part], right[part][::-1]]) for part in parts]
+
 
 def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: float = np.inf) -> list[BeamStrip]:
     """Return a beam in smooth pieces, from its first end to its last.
 
     It is cut where its shape has a corner and where its thickness has a kink or a step. Lines between the points of
     a piece are no farther than `tolerance` [m] from its edges and its centre line.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If more points would be needed for that than a drawing can have.
     """
     beam, fit = network.beams[name], fits[name]
     start = network.nodes[beam.start]
@@ -69,6 +90,12 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
         while piece.sagitta > tolerance and count < MOST_STEPS:
             count = min(MOST_STEPS, int(1.1 * count * np.sqrt(piece.sagitta / tolerance)) + 1)
             piece = _piece(beam, fit, at, np.linspace(low, high, count + 1))
+        if piece.sagitta > tolerance:
+            size = format_short(float(np.hypot(*np.diff(piece.points, axis=0).T).sum()), "length")
+            raise GeometryError(
+                f"{name!r}, {size} long, is too large to be drawn that exactly: {MOST_STEPS} points do not follow its "
+                "edges within the tolerance; draw it with a coarser --tolerance"
+            )
         found.append(piece)
         at = piece.points[-1]
     return found
