@@ -20,7 +20,7 @@ ALLOWED = {0, 3, 4, 5, 6}
 LONGEST = 12.0
 """Seconds more than the spec takes that a changed one was made from.
 
-Some are harder, with an end: half a thousand poses of a V pulled the other way, each with its natural frequencies (8 s);
+Some are harder, with an end: 400 poses of a V pulled the other way, each with its natural frequencies (8 s);
 a load a thousand times as large, followed up to the most points of a path (6 s); leaves of 1 um (7 s).
 """
 HANGS = 60.0
