@@ -18,7 +18,7 @@ from cfmkit.studies.made_parts import judge
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "studies" / "slider_crank_strip_yield.yaml"
-TRAVELS = (34.0, 35.0, 36.0, 37.0, 38.0, 39.0)
+TRAVELS = (34.0, 35.0, 36.0, 37.0, 37.25, 37.5, 37.75, 38.0, 39.0)
 """At which the design is made [mm]."""
 
 PARTS, ASKED = 400, 0.99
