@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from beam_support import CANTILEVER
@@ -9,6 +11,7 @@ from scipy.integrate import solve_bvp
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.results import Status
 
 RIGIDITY, LENGTH = 0.02, 0.4  # [N m2], [m]
 DRIVE = "{kind: loads, node: tip, direction: -90 deg, loads: [LOADS]}"
@@ -162,3 +165,12 @@ def test_places_on_a_curve_driven_by_a_load_do_not_depend_on_its_points(kind):
         metrics = cfmkit.analyze(cfmkit.loads(text)).metrics
         found.append([metrics[name].value for name in PLACES])
     np.testing.assert_allclose(found[0], found[1], rtol=1e-8)
+
+
+@pytest.mark.slow
+def test_a_path_that_folds_is_followed_to_its_end_with_many_points():
+    """It passes most loads three times: the points that are requested do not use up those of the path."""
+    frame = cfmkit.load(Path(__file__).parents[2] / "configs" / "beam_lee_frame.yaml")
+    ends = [cfmkit.analyze(frame.replace({"analysis.points": points})) for points in (121, 1921)]
+    assert [end.status for end in ends] == [Status.COMPLETE, Status.COMPLETE]
+    assert ends[1].metrics["travel_end"].value == pytest.approx(ends[0].metrics["travel_end"].value, rel=1e-9)

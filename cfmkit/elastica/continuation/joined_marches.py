@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import BranchEnd, Move, PathProblem
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 
+PASSES = 5  # how often a path that folds may pass a requested load without using up the points of its own
+
 _HOPS = 60  # decisions on one path
 _LANDINGS = 6  # tries to land on a requested point before a bifurcation is looked for there
 _FIRST = 0.05  # first step as a share of the drive's range, unless requested points are nearer
@@ -109,7 +111,7 @@ def march(problem: PathProblem, move: Resume) -> Leg:
         landings=np.inf if patient else _LANDINGS,
         sense=float(np.sign(next(value for value in stretch.targets if value))) if move.fresh else 0.0,
     )
-    room = max(len(left) + 3, control.most_points + len(stretch.targets) - len(trail.points))
+    room = max(len(left) + 3, control.most_points + PASSES * len(stretch.targets) - len(trail.points))
     code, points = trail.solver.march(spot, left, options, room)
     if numbers is not None:
         points.requested[:] = numbers[points.requested.astype(int)]
