@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.elastica.model.drive import Displacement, Rotation
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.specs.units import to_border
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Fit
-    from cfmkit.elastica.model.drive import Displacement
     from cfmkit.elastica.model.network import Network, Support
     from cfmkit.elastica.model.section import Section
 
@@ -34,6 +34,8 @@ TOGETHER = 1e-9
 """Linked nodes closer than this are one [m]."""
 FIRM = "1.E7"
 """Stiffness of the spring between the drive and what it drives [N/mm]; with a decimal point, CalculiX wants one."""
+LEVER, ARC = 10.0, 360
+"""Length of the lever that turns a node, in thicknesses; lines that its end's way is made of."""
 FIRST = 0.02
 """First increment, in those that follow: chains that are almost straight would jump to a higher mode."""
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -48,12 +50,13 @@ class DrivenNetwork:
     name : str
         For files.
     network : Network
-    drive : Displacement
+    drive : Displacement or Rotation
+        Of rotations the node must not be free to move.
     """
 
     name: str
     network: Network
-    drive: Displacement
+    drive: Displacement | Rotation
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ class _Lines:
         self.spare = len(driven.network.nodes) + 1
         self.spare_element = 1
         self.moves: list[str] = []
+        self.led: list[tuple[str, str]] = []
 
     def lines(self) -> Iterator[str]:
         chains = {name: self._chain(name) for name in self.network.beams}
@@ -119,6 +123,9 @@ class _Lines:
         yield "*BOUNDARY"
         yield "ALL, 3, 3, 0"
         yield from self.moves
+        for amplitude, move in self.led:
+            yield f"*BOUNDARY, AMPLITUDE={amplitude}"
+            yield move
         yield "*NODE PRINT, NSET=DRIVE"
         yield "U, RF"
         yield "*NODE FILE, OUTPUT=2D"
@@ -197,9 +204,12 @@ class _Lines:
         """Yield what holds and drives a node; prescribed motions go to `moves`."""
         number, drive = self.number[name], self.drive
         along, across, turn, direction = support.along, support.across, support.rotation, support.direction
-        driven = drive.node == name
-        end = float(drive.points[-1])
-        if driven:
+        if isinstance(drive, Rotation) and drive.node == name:
+            turn = False
+            yield from self._turned(name, float(drive.points[-1]))
+        driven = isinstance(drive, Displacement) and drive.node == name
+        if isinstance(drive, Displacement) and driven:
+            end = float(drive.points[-1])
             direction = drive.direction
             yield from self._led(name, direction, to_border(end, "length"), driven=True)
         elif along and across:
@@ -210,6 +220,45 @@ class _Lines:
             yield from self._led(name, direction + 0.5 * math.pi, 0.0)
         if turn:
             self.moves.append(f"{number}, 4, 6, 0")
+
+    def _turned(self, name: str, angle: float) -> Iterator[str]:
+        """Yield a lever at a node, and the node DRIVE that leads its end around a circle, by springs along x and y.
+
+        CalculiX prints no moment of a node of beams: it is the reaction of DRIVE times the lever.
+        """
+        node, number = self.network.nodes[name], self.number[name]
+        section = max((beam.section for beam in self.network.beams.values()), key=_rigidity)
+        size = to_border(float(np.max(section.thickness_at(np.linspace(0.0, 1.0, 33), 0.5))), "length")
+        x, y = (to_border(float(one), "length") for one in (node.x, node.y))
+        arm, (middle, end, pulling) = LEVER * size, (self.spare, self.spare + 1, self.spare + 2)
+        self.spare += 3
+        yield f"** the torque is {arm:.10g} mm times the reaction of DRIVE square to the lever, which was along x"
+        yield "*NODE, NSET=ALL"
+        yield f"{middle}, {x + 0.5 * arm:.10g}, {y:.10g}, 0"
+        yield f"{end}, {x + arm:.10g}, {y:.10g}, 0"
+        yield "*NODE, NSET=DRIVE"
+        yield f"{pulling}, {x + arm:.10g}, {y:.10g}, 0"
+        yield "*MATERIAL, NAME=LEVER"
+        yield "*ELASTIC"
+        yield f"{STIFF * to_border(section.youngs_modulus, 'stress'):.10g}, 0"
+        yield "*ELEMENT, TYPE=B32, ELSET=LEVER"
+        yield f"{self.spare_element}, {number}, {middle}, {end}"
+        yield "*BEAM SECTION, ELSET=LEVER, MATERIAL=LEVER, SECTION=RECT"
+        yield f"{to_border(float(section.width), 'length'):.10g}, {size:.10g}"
+        yield "0, 0, 1"
+        for axis, way in ((1, np.cos), (2, np.sin)):
+            yield f"*ELEMENT, TYPE=SPRING2, ELSET=FIRM-{axis}"
+            yield f"{self.spare_element + axis}, {end}, {pulling}"
+            yield f"*SPRING, ELSET=FIRM-{axis}"
+            yield f"{axis}, {axis}"
+            yield FIRM
+            yield f"*AMPLITUDE, NAME=ARC-{axis}"
+            shares = np.linspace(0.0, 1.0, ARC + 1)
+            places = arm * (way(shares * angle) - way(0.0))
+            yield from (f"{share:.10g}, {place:.10g}" for share, place in zip(shares, places, strict=True))
+            self.led.append((f"ARC-{axis}", f"{pulling}, {axis}, {axis}, 1."))
+        self.spare_element += 3
+        self.moves.append(f"{pulling}, 3, 3, 0")
 
     def _led(self, name: str, direction: float, end: float, driven: bool = False) -> Iterator[str]:
         """Yield a node whose first displacement is that of a node along a direction; end of it [mm]."""

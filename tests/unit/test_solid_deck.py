@@ -147,7 +147,51 @@ def test_links_of_a_deck_of_beams_are_stiff_and_every_set_that_is_used_is_there(
     assert known <= nodes
 
 
-def test_parts_that_are_turned_have_no_deck_of_beams(tmp_path):
+TURNED = """
+cfmkit: 1
+family: beam
+name: turned
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 1 mm
+  width: 5 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [30 mm, 4 mm], support: pinned}}
+  beams: {leaf: {start: root, end: tip, shape: {kind: arc, sweep: 40 deg}}}
+  drive: {kind: rotation, node: tip}
+  part: {fillet: 0.5 mm}
+analysis: {travel: 25 deg, points: 11, fidelity: reissner}
+"""
+
+
+def test_a_pinned_node_that_is_turned_is_led_by_a_lever_around_a_circle(tmp_path):
+    path = tmp_path / "turned.yaml"
+    path.write_text(TURNED, encoding="utf-8")
+    data = cfmkit.export(path, format="inp")["beams-as-beams.inp"]
+    text = data.decode()
+    arm = float(re.search(r"torque is (\S+) mm", text)[1])
+    found = [re.search(rf"NAME=ARC-{axis}\n((?:[^*].*\n)+)", text)[1].split("\n")[:-1] for axis in (1, 2)]
+    ways = [np.array([line.split(",") for line in lines], float) for lines in found]
+    shares = ways[0][:, 0]
+    end = arm * np.exp(1j * shares * np.radians(25.0)) - arm
+    assert ways[0][:, 1] == pytest.approx(end.real, abs=1e-8)
+    assert ways[1][:, 1] == pytest.approx(end.imag, abs=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_calculix_finds_the_torque_of_the_beams(tmp_path):
+    path = tmp_path / "turned.yaml"
+    path.write_text(TURNED, encoding="utf-8")
+    data = cfmkit.export(path, format="inp")["beams-as-beams.inp"]
+    force_at_the_end(tmp_path, data)
+    told = (tmp_path / "beams.dat").read_text()
+    x, y = re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", told, re.S)[-1]
+    arm, angle = 1e-3 * float(re.search(rb"torque is (\S+) mm", data)[1]), np.radians(25.0)
+    torque = arm * (float(y) * np.cos(angle) - float(x) * np.sin(angle))
+    assert torque == pytest.approx(cfmkit.analyze(path).curve.effort[-1], rel=0.01)
+
+
+def test_parts_that_are_turned_while_free_to_move_have_no_deck_of_beams(tmp_path):
     path = tmp_path / "turned.yaml"
     path.write_text(
         """

@@ -215,12 +215,15 @@ def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
 
 
 def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
-    """Return the same as beams, for decks of other solvers; none where it is driven by a rotation."""
-    from cfmkit.elastica import Displacement
+    """Return the same as beams, for decks of other solvers; none where a node is turned that is free to move."""
+    from cfmkit.elastica import Displacement, Rotation
     from cfmkit.elastica.input_deck import DrivenNetwork
 
     assembly = assemble(spec)
     drive = assembly.drive()
+    if isinstance(drive, Rotation):
+        support = assembly.network.nodes[drive.node].support
+        return (DrivenNetwork("beams", assembly.network, drive),) if support.along and support.across else ()
     return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
 
 
