@@ -167,7 +167,7 @@ def test_the_parts_of_a_list_and_of_a_batch_are_tightened_together():
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"correlated": ({"parameters": ("mechanism.rest_half_width",)},)}, "correlation needs at least two parameters"),
+        ({"correlated": ({"parameters": ("mechanism.rest_half_width",)},)}, "needs at least two parameters"),
         (
             {"correlated": ({"parameters": ("mechanism.brace", "mechanism.rest_half_width")},)},
             "not among the parameters",
