@@ -419,8 +419,7 @@ def drawn_files(
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
     drawn = drawing(spec, near)
-    made = files(drawn, width, near or TOLERANCE, wanted)
-    return made | (_decks(spec) if DECK in wanted else {}), drawn.notes
+    return files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {}), drawn.notes
 
 
 def _decks(spec: Spec) -> dict[str, bytes]:
@@ -470,15 +469,14 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
     """
+    from cfmkit.export.engraving import engraved
+
     spec = spec_of(spec)
     record = family(spec.family)
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
-    from cfmkit.export.engraving import engraved
-
-    drawn: Drawing = import_module(record.outline).drawing(spec, *given)
-    return engraved(drawn, spec.name)
+    return engraved(import_module(record.outline).drawing(spec, *given), spec.name)
 
 
 def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:
