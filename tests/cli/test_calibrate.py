@@ -111,7 +111,7 @@ def test_a_tare_is_fitted_and_the_page_says_how_to_take_it_off(cli, cam, rig):
         (("--fit", "mechanism.springs.stiffnes"), 2, "did you mean 'mechanism.springs.stiffness'"),
         (("--fit", "mechanism.rolling_friction", "--loss", "least"), 2, "--loss: there is no 'least'"),
         (("--fit", "mechanism.rolling_friction", "--bounds", "x"), 2, "--bounds: 'x' is not 'a.b=low:high'"),
-        (("--fit", "mechanism.plate.top_margin"), 4, "says nothing about mechanism.plate.top_margin"),
+        (("--fit", "mechanism.plate.top_margin"), 4, "does not determine mechanism.plate.top_margin"),
         (
             ("--fit", "mechanism.springs.stiffness,mechanism.profile.force_constant",
              "--set", "mechanism.rolling_friction=0"),

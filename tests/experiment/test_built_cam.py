@@ -229,7 +229,7 @@ def test_points_far_off_are_left_out_and_counted(tmp_path):
         item[7::50, 0] += 0.5e-3
     write(tmp_path, points)
     warnings = {item.name: item.message for item in cfmkit.analyze(spec_of(tmp_path)).warnings}
-    assert warnings["profile_outliers"].startswith("12 of 600 points lie far off")
+    assert warnings["profile_outliers"].startswith("12 of 600 points are far off")
 
 
 def test_what_a_width_error_is_taken_for_is_told_with_the_weak_direction(tmp_path):

@@ -128,7 +128,7 @@ def test_with_friction_they_are_told_apart_only_by_it_and_the_fit_says_so():
 
 def test_a_value_without_effect_is_named():
     start = built()
-    with pytest.raises(SolutionError, match=r"says nothing about mechanism\.plate\.top_margin"):
+    with pytest.raises(SolutionError, match=r"does not determine mechanism\.plate\.top_margin"):
         calibrate(start, recording(start), parameters(start, [FRICTION, "mechanism.plate.top_margin"]))
 
 

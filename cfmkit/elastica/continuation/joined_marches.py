@@ -111,7 +111,8 @@ def march(problem: PathProblem, move: Resume) -> Leg:
         landings=np.inf if patient else _LANDINGS,
         sense=float(np.sign(next(value for value in stretch.targets if value))) if move.fresh else 0.0,
     )
-    room = max(len(left) + 3, control.most_points + PASSES * len(stretch.targets) - len(trail.points))
+    passes = PASSES if control.through_folds else 1
+    room = max(len(left) + 3, control.most_points + passes * len(stretch.targets) - len(trail.points))
     code, points = trail.solver.march(spot, left, options, room)
     if numbers is not None:
         points.requested[:] = numbers[points.requested.astype(int)]

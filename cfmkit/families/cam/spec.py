@@ -121,9 +121,7 @@ class Plate(Model):
 
     top_margin: NonNegativeLength = Field(0.010, description="plate above the end of the flanks")
     base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
-    base_width: PositiveLength | None = Field(
-        None, description="width of the tab; default: the gap that the rollers leave"
-    )
+    base_width: PositiveLength | None = Field(None, description="width of the tab; default: gap between the rollers")
     hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
     tool_radius: NonNegativeLength = Field(
         0.0, description="of the tool that cuts it: inside corners beside the tab are rounded with it; 0: sharp"

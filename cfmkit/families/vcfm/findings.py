@@ -97,22 +97,9 @@ EXACT_FORM = 2e-4
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (
-        _measured,
-        spring_closed,
-        _truss,
-        _leaf_shape,
-        _flatness,
-        _returns,
-        _preloads,
-        _bought_springs,
-        _strength,
-        _buckling,
-        _width,
-        _imperfect,
-        _range,
-    )
-    return tuple(found for check in checks for found in check(solution))
+    nature = (_measured, spring_closed, _truss, _leaf_shape, _flatness, _returns)
+    limits = (_preloads, _bought_springs, _strength, _buckling, _width, _imperfect, _range)
+    return tuple(found for check in (*nature, *limits) for found in check(solution))
 
 
 def _leaf_shape(solution: Solution) -> Iterator[Finding]:
