@@ -1,7 +1,7 @@
-"""Springs of a catalogue for the joints of a slider-crank: which and how many, by a mixed-integer linear programme.
+"""Springs of a catalogue for the joints of a slider-crank: which and how many.
 
-For every joint at most one kind of spring in one number is taken; the largest deviation from the target is linear in
-these yes-or-no choices, and HiGHS minimises it. Springs that the window would overwind are left out beforehand.
+For every joint at most one kind of spring in one number is taken, those with the smallest largest deviation from the
+target (`best_sets`). Springs that the window would overwind, or that do not fit, are left out beforehand.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.best_sets import best_sets
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
@@ -22,20 +23,10 @@ from cfmkit.stock.springs.in_use import SpringInUse
 from cfmkit.stock.springs.spec import offers, wire_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import CrankDesign
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
     from cfmkit.families.slider_crank.springs.targets import Task
-
-PLACES = 41
-"""Places of the window at which the programme looks."""
-
-MOST = 80
-"""Different rates that are tried per joint: of longer lists those that differ least from a neighbour are left out."""
-
-SECONDS = 20.0
-"""Time for the programme of one set; what it has found by then is taken."""
 
 
 @dataclass(frozen=True)
@@ -97,107 +88,95 @@ def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     if not options:
         told = nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
         raise Infeasible(finding("no_spring_fits", f"no spring of the catalogue fits: {told} ('design.catalogue')"))
-    few = goal.at(np.unique(np.linspace(0, len(goal.wanted) - 1, PLACES).round().astype(int)))
-    best = _best(few, goal, options, ())
     tolerance = task.wanted.tolerance
-    if best is not None and (tolerance is None or best.deviation <= tolerance * (1 + 1e-9)):
-        return best
-    misses: list[Miss] = []
-    cuts: list[tuple[SpringOption, ...]] = []
-    while best is not None and len(misses) < 3:
-        label = " + ".join(one.label for one in best.options) or "no spring"
-        misses.append(Miss(label, best.deviation, f"off by {percent(best.deviation)}"))
-        cuts.append(best.options)
-        best = _best(few, goal, options, tuple(cuts))
-    told = nearest(misses) if misses else "none can be put together"
-    allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance else ""
+    best = _sets(goal, options, 1)
+    if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
+        return best[0]
+    misses = [_missed(one) for one in (_sets(goal, options, 3) if best else [])]
+    told = nearest(misses) if misses else _none_together(task, refused)
+    allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {told}{allowed}"))
 
 
+def least_deviation(task: Task, goal: RateGoal, window: tuple[float, float]) -> float:
+    """Return the deviation of the springs of the catalogue that hold the target best; infinite where none do."""
+    found = _sets(goal, _options(task, window)[0], 1)
+    return found[0].deviation if found else np.inf
+
+
+def _sets(goal: RateGoal, options: list[SpringOption], count: int) -> list[Chosen]:
+    """Return the sets of options that hold the target best."""
+    least = np.zeros(len(JOINTS)) if goal.lower is None else goal.lower
+    at = [_by_rate(options, joint, low) for joint, low in enumerate(least.tolist())]
+    found = best_sets(goal, [np.array(sorted(one)) for one in at], count)
+    return [
+        Chosen(tuple(option for one, rate in zip(at, rates.tolist(), strict=True) if (option := one[rate])), rates, off)
+        for off, rates in found
+    ]
+
+
+def _by_rate(options: list[SpringOption], joint: int, least: float) -> dict[float, SpringOption | None]:
+    """Return what gives each rate that a joint may have: of equal ones the fewest springs, and none for zero."""
+    own = sorted((one for one in options if one.joint == joint), key=lambda one: one.count)
+    found: dict[str, SpringOption | None] = {} if least > 0 else {"0": None}
+    for one in own:
+        if one.rate >= least * (1 - 1e-9):
+            found.setdefault(f"{one.rate:.12g}", one)  # three of 0.1 and one of 0.3 are the same
+    return {one.rate if one else 0.0: one for one in found.values()}
+
+
+def _missed(one: Chosen) -> Miss:
+    label = " + ".join(option.label for option in one.options) or "no spring"
+    return Miss(label, one.deviation, f"off by {percent(one.deviation)}")
+
+
+def _none_together(task: Task, refused: list[Miss]) -> str:
+    """Return why no set does what is required beside the target: to let the force be trimmed."""
+    told = f"; {nearest(refused)}" if refused else ""
+    way = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
+    return f"none is stiff enough for 'design.adjustment' within 'design.{way}'{told}"
+
+
 def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
-    """Return what can be used at each joint, and what is refused because the window moves it too far."""
+    """Return what can be used at each joint, and what is refused because it does not fit or is moved too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])
-    moved = np.abs(assembly.units(np.linspace(*ends, 401)).turn).max(axis=1)
+    turns = assembly.units(np.linspace(*ends, 401)).turn
     usable: list[SpringOption] = []
     refused: list[Miss] = []
     for joint, name in enumerate(JOINTS):
         if name not in wanted.springs:
             continue
         kinds = ("torsion",) if joint < 3 else ("extension", "compression")
-        own = []
-        for offer in offers(wanted.catalogue or (), *kinds):
-            reason = _why_not(offer, float(moved[joint]), joint)
-            if reason is None and wanted.spring_life is not None:
-                reason = SpringInUse.of(offer, 0.0, float(moved[joint])).misses_life(wanted.spring_life)
-            if reason is not None:
-                refused.append(Miss(f"{offer.name} at the {name.replace('_', ' ')}", *reason))
-                continue
-            own += [SpringOption(joint, offer, count) for count in offer.counts]
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
-        usable += _thinned([one for one in own if cap is None or one.rate <= cap])
+        for offer in offers(wanted.catalogue or (), *kinds):
+            label = f"{offer.name} at the {name.replace('_', ' ')}"
+            reason = _why_not(offer, turns[joint], wanted)
+            if reason is not None:
+                refused.append(Miss(label, *reason))
+                continue
+            own = [SpringOption(joint, offer, count) for count in offer.counts]
+            soft = [one for one in own if cap is None or one.rate <= cap * (1 + 1e-9)]
+            if not soft and cap is not None:
+                least = min(one.rate for one in own)
+                refused.append(Miss(label, least / cap - 1.0, f"stiffer than 'design.max_rates.{name}'"))
+            usable += soft
     return usable, refused
 
 
-def _why_not(offer: Offer, moved: float, joint: int) -> tuple[float, str] | None:
-    """Return by what share a spring misses, and why; None where it can be used."""
+def _why_not(offer: Offer, turns: FloatArray, wanted: CrankDesign) -> tuple[float, str] | None:
+    """Return by what share a spring misses, and why; None where it can be used.
+
+    `turns`: how far its joint is moved from the unloaded position, over the travel [rad or m].
+    """
+    moved, kind = float(np.abs(turns).max()), "angle" if offer.kind == "torsion" else "length"
     if offer.initial_tension:
         return 1.0, "its initial tension would load it in the unloaded position"
+    room = wanted.spring_room
+    if kind == "length" and room is not None and offer.free_length is not None and offer.free_length > room:
+        told = f"too long, {format_short(offer.free_length, kind)} relaxed"
+        return offer.free_length / room - 1.0, f"{told} ('design.spring_room' {format_short(room, kind)})"
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
-        kind = "angle" if joint < 3 else "length"
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"moved by {needed}, it allows {allowed}"
-    return None
-
-
-def _thinned(options: list[SpringOption]) -> list[SpringOption]:
-    """Return options of different rates, few and single springs first; of too many those evenly spread."""
-    kept: dict[float, SpringOption] = {}
-    for one in sorted(options, key=lambda one: (one.rate, one.count)):
-        kept.setdefault(float(f"{one.rate:.3g}"), one)
-    found = list(kept.values())
-    if len(found) <= MOST:
-        return found
-    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, MOST).round().astype(int))]
-
-
-def _best(
-    few: RateGoal, goal: RateGoal, options: list[SpringOption], cuts: tuple[tuple[SpringOption, ...], ...]
-) -> Chosen | None:
-    """Return the set with the smallest largest deviation that is none of those cut off."""
-    from scipy.optimize import Bounds, LinearConstraint, milp
-
-    columns = np.column_stack([few.matrix[:, one.joint] * one.rate for one in options])
-    count, one = len(options), np.ones((len(few.wanted), 1))
-    rules = [
-        LinearConstraint(np.hstack([columns, -one]), -np.inf, few.wanted),
-        LinearConstraint(np.hstack([-columns, -one]), -np.inf, -few.wanted),
-        LinearConstraint(np.array(list(_rows(options))), 0.0, 1.0),
-    ]
-    if goal.least is not None:
-        row = np.array([goal.least[0][one.joint] * one.rate for one in options])
-        rules.append(LinearConstraint(np.append(row, 0.0)[None], goal.least[1], np.inf))
-    for cut in cuts:
-        inside = np.array([1.0 if option in cut else -1.0 for option in options])
-        rules.append(LinearConstraint(np.append(inside, 0.0)[None], -np.inf, len(cut) - 1.0))
-    cost = np.append(np.zeros(count), 1.0)
-    solved = milp(
-        cost,
-        constraints=rules,
-        integrality=np.append(np.ones(count), 0.0),
-        bounds=Bounds(0.0, np.append(np.ones(count), np.inf)),
-        options={"time_limit": SECONDS, "mip_rel_gap": 1e-4},
-    )
-    if solved.x is None:
-        return None
-    taken = tuple(option for option, share in zip(options, solved.x[:count], strict=True) if share > 0.5)
-    rates = np.zeros(len(JOINTS))
-    for option in taken:
-        rates[option.joint] += option.rate
-    return Chosen(taken, rates, goal.deviation(rates))
-
-
-def _rows(options: list[SpringOption]) -> Iterator[list[float]]:
-    """Yield for each joint which options are its own: it takes one of them at most."""
-    for joint in range(len(JOINTS)):
-        yield [*(float(option.joint == joint) for option in options), 0.0]
+    return SpringInUse.of(offer, 0.0, moved).misses_life(wanted.spring_life) if wanted.spring_life is not None else None

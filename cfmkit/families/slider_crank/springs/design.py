@@ -22,7 +22,7 @@ from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion
-from cfmkit.families.slider_crank.springs.bought_springs import choose
+from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation
 from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,
     about_springs,
@@ -147,13 +147,15 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
     if not axes:
         return solve(task_of(spec)), None
 
-    count = 0
+    count, best = 0, math.inf
 
     def height(place: tuple[float, ...]) -> float:
-        nonlocal count
+        nonlocal count, best
         count += 1
         run.progress(1.0 - 1.0 / (1.0 + count / 200.0), f"{count} choices of lengths")
-        return _height(spec, dict(zip(axes, place, strict=True)))
+        value = _height(spec, dict(zip(axes, place, strict=True)), best)
+        best = min(best, value)
+        return value
 
     grid, fine = EFFORT["widest" if wanted.window is None else wanted.objective]
     found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
@@ -169,8 +171,11 @@ def _axis(name: str, ends: tuple[float, float]) -> BoxAxis:
     return BoxAxis(*ends, log=name != "offset")
 
 
-def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
-    """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus."""
+def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> float:
+    """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus.
+
+    Lengths whose deviation with springs of any rate is above the `best` so far need no look at a catalogue.
+    """
     try:
         task = task_of(with_lengths(spec, lengths))
     except CannotBuild:
@@ -192,7 +197,10 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
     rates = least_squares(goal) if least else minimax(goal)
     if rates is None:
         return math.inf
-    return goal.rms(rates) if least else goal.deviation(rates)
+    deviation = goal.rms(rates) if least else goal.deviation(rates)
+    if wanted.catalogue and deviation < best:
+        return least_deviation(task, goal, wanted.window)
+    return deviation
 
 
 def solve(task: Task, tolerance: float | None = None) -> Solved:

@@ -157,6 +157,9 @@ class SpringDesign(DesignBlock):
     spring_life: Life | None = Field(
         None, description="cycles that springs of the catalogue must last; one whose life is not known is not taken"
     )
+    spring_room: PositiveLength | None = Field(
+        None, description="place for the slider's spring of the catalogue: a longer one, relaxed, is not taken"
+    )
     max_rates: MaxRates | None = Field(None, description="largest rates; default: no limit")
     crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
         None, description="range in which it may be chosen; default: the value of the mechanism"
@@ -208,9 +211,21 @@ class SpringDesign(DesignBlock):
         return self
 
     @model_validator(mode="after")
-    def _life_is_of_what_is_picked(self) -> Self:
-        if self.spring_life is not None and not self.catalogue:
-            raise ValueError("'spring_life' is of springs that are picked: it needs a 'catalogue'")
+    def _springs_are_picked(self) -> Self:
+        if not self.catalogue:
+            for name in ("spring_life", "spring_room"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name!r} is of springs that are picked: it needs a 'catalogue'")
+            return self
+        if self.window is None:
+            raise ValueError("springs of a 'catalogue' are picked for a window: give 'travel' (or 'angle'), too")
+        if self.objective == "least-squares":
+            raise ValueError("springs of a 'catalogue' have the smallest largest deviation: remove 'objective'")
+        if self.hold_stiffness or self.slack:
+            name = "hold_stiffness" if self.hold_stiffness else "slack"
+            raise ValueError(
+                f"{name!r} needs rates of any value, which a 'catalogue' does not have: remove one of both"
+            )
         return self
 
     @model_validator(mode="after")
