@@ -169,7 +169,7 @@ def executor_for(work: Work, options: Studying) -> Executor:
         raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
     jobs = options.jobs or cores()
     if options.cluster is not None:
-        from cfmkit.studies.cluster import Cluster
+        from cfmkit.studies.executors import Cluster
 
         if timeout is not None:
             raise UsageError(

@@ -1,6 +1,6 @@
 """Measured curves from lab CSV files as they come, in SI; what was decided on the way can be read back.
 
-Separator, decimal sign, encoding and header are found out (`cfmkit.tables.labtext`), units and roles
+Separator, decimal sign, encoding and header are found out (`cfmkit.tables.lab_file`), units and roles
 of the columns are read or stated by the user. Only the columns that are used must be
 free of gaps.
 """
@@ -17,8 +17,21 @@ import numpy as np
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import DataError, UsageError
 from cfmkit.specs.units.number_text import shown
-from cfmkit.tables.lab_headers import ROLES, ColumnInfo, column_of, describe, is_unit_row, read_units, split_header
-from cfmkit.tables.labtext import SEPARATORS, TextBlock, block_of, decoded, header_cells, refuse_group
+from cfmkit.tables.lab_file import (
+    ROLES,
+    SEPARATORS,
+    ColumnInfo,
+    TextBlock,
+    block_of,
+    column_of,
+    decoded,
+    describe,
+    header_cells,
+    is_unit_row,
+    read_units,
+    refuse_group,
+    split_header,
+)
 
 if TYPE_CHECKING:
     import os

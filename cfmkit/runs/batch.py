@@ -449,7 +449,7 @@ def batch(
     if report is not None:
         report(junit_of(entries))
     if told is not None:
-        from cfmkit.runs.batch_summary import summary as in_markdown
+        from cfmkit.runs.batch_files import summary as in_markdown
 
         told(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared)

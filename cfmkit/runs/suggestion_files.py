@@ -1,13 +1,15 @@
-"""Files of the suggestions for a wish: a folder for each proposal, a table, figures, metrics.json; the exit code."""
+"""What `suggest` writes for a wish: a folder for each proposal, table, figures, page, metrics.json; the exit code."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from cfmkit.errors import ExitCode
-from cfmkit.specs.units import to_border
+from cfmkit.runs.run_page import NAME, identifier, part, template
+from cfmkit.specs.units import format_short, to_border
 from cfmkit.studies.pool import until
 from cfmkit.tables.jsontext import json_bytes
 
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.suggest.proposal import Proposal
     from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import WishBlock
+
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     "mean": ("", ""),
@@ -173,11 +176,9 @@ def files(
         for name, figure in drawn.items():
             yield f"figures/{name}.png", png(figure)
     if command is not None:
-        from cfmkit.runs import suggestion_page
-
         texts = {folder_name(number, one): one.text for number, one in enumerate(found.proposals, 1)}
         unit = "N" if found.wish.kind == "force" else "N*mm"
-        yield suggestion_page.NAME, suggestion_page.page(as_json(found, block), texts, drawn, unit, command)
+        yield NAME, page(as_json(found, block), texts, drawn, unit, command)
     work = partial(_made, (plots, command is not None), deadlines, found.proposals)
     made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.proposals))), lambda: False))
     for index, one in enumerate(found.proposals):
@@ -236,3 +237,89 @@ def table(found: Suggestions) -> bytes:
     columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
     columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
     return to_csv(Table(tuple(columns)))
+
+
+TONES = {"complete": "good", "partial": "warn"}
+"""Which colour the verdict has, by how the search ended; another end is bad."""
+
+SHARES = ("ripple", "hysteresis", "yield")
+"""Numbers of a proposal that are shares."""
+
+
+def page(
+    record: Mapping[str, Any], texts: Mapping[str, str], drawn: Mapping[str, Figure], unit: str, command: str
+) -> bytes:
+    """Return the page of a search.
+
+    Parameters
+    ----------
+    record : mapping
+        What metrics.json says.
+    texts : mapping of str to str
+        The specification of each proposal, by its folder.
+    drawn : mapping of str to Figure
+        The pictures, by their names.
+    unit : str
+        Of the mean force or torque.
+    command : str
+        How the search was started.
+    """
+    from cfmkit.plots.vector_formats import inline, svg
+
+    columns = (*_COLUMNS, *(("yield",) if "yield" in record["wish"] else ()))
+    rows = [
+        (one, [_cell(one, name, unit) for name in columns], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
+        for one in record["proposals"]
+    ]
+    text: str = template("suggestions.html.j2").render(
+        told=record,
+        tone=TONES.get(record["status"], "bad"),
+        wish=_listed(record["wish"]),
+        heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],
+        rows=rows,
+        silent=[(one, _listed(one["nearest"])) for one in record["families"] if not one["proposals"]],
+        pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
+        command=command,
+        style=part("report.css"),
+    )
+    return text.encode()
+
+
+_COLUMNS = ("mean", "ripple", "across", "along", "depth", "hysteresis", "safety_factor", "parts", "life")
+
+
+def _cell(one: Mapping[str, Any], name: str, unit: str) -> str:
+    value = one.get(name)
+    if value is None:
+        return ""
+    if name in SHARES:
+        return format_short(value, "ratio", 3)
+    return f"{value:.4g}" + (" mm" if name in ("across", "along", "depth") else "")
+
+
+def _listed(pairs: Mapping[str, Any]) -> str:
+    """Return keys and values in words.
+
+    Examples
+    --------
+    >>> _listed({"force": "10 N", "ripple": 0.03, "room": ["80 mm", "60 mm"], "adjustable": ["8 N", "12 N"]})
+    'force 10 N, ripple 3 %, room 80 mm x 60 mm, adjustable 8 N to 12 N'
+    >>> _listed({"material": [{"name": "pla"}, {"name": "pom"}], "prefer": ["size", "ripple"]})
+    'material pla or pom, prefer size, ripple'
+    """
+    return ", ".join(f"{key.replace('_', ' ')} {_words(key, value)}" for key, value in pairs.items())
+
+
+JOINED = {"room": " x ", "material": " or ", "prefer": ", "}
+"""What stands between the values of a key that has several; else they are the two ends of a band."""
+
+
+def _words(key: str, value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return JOINED.get(key, " to ").join(_words(key, one) for one in value)
+    if isinstance(value, dict):
+        return str(value.get("name") or _listed(value))
+    return format_short(value, "ratio", 3) if key in SHARES and isinstance(value, float | int) else str(value)
+
+
+__all__ = ["NAME", "page"]

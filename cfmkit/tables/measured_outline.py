@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import DataError
-from cfmkit.tables.lab_headers import split_header
-from cfmkit.tables.labtext import TextBlock, block_of, decoded, header_cells, refuse_group
+from cfmkit.tables.lab_file import TextBlock, block_of, decoded, header_cells, refuse_group, split_header
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,10 +12,10 @@ import pytest
 import yaml
 
 import cfmkit
-from cfmkit.cli.annotations import github
 from cfmkit.cli.main import main
+from cfmkit.cli.verbs.batch import github
 from cfmkit.errors import ExitCode, UsageError
-from cfmkit.runs.batch_summary import summary
+from cfmkit.runs.batch_files import summary
 from cfmkit.studies.batch_entries import Entry
 from cfmkit.studies.metric_changes import Earlier, changes
 

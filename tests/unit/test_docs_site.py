@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from cfmkit import families
+from cfmkit.cli.verbs import docs
 from cfmkit.errors import UsageError
-from cfmkit.runs import documentation
 from cfmkit.runs.examples import example
 from cfmkit.specs.keys import keys
 
@@ -82,12 +82,12 @@ LINKS = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 
 
 def test_the_documentation_comes_with_the_package_and_its_links_lead_to_files():
-    found = documentation.pages()
+    found = docs.pages()
     assert [one.name for one in found][:4] == ["index", "tutorial", "howto", "reference"]
     assert {one.name for one in found} == {path.stem for path in DOCS.glob("*.md")}
-    assert documentation.page("docs/cam.md#friction").path.read_bytes() == (DOCS / "cam.md").read_bytes()
+    assert docs.page("docs/cam.md#friction").path.read_bytes() == (DOCS / "cam.md").read_bytes()
     with pytest.raises(UsageError, match="did you mean 'vcfm'"):
-        documentation.page("vcmf")
+        docs.page("vcmf")
     for one in found:
         links = [link for link in LINKS.findall(one.text) if not link.startswith("made/")]
         assert [link for link in links if not (DOCS / link).is_file()] == [], one.name

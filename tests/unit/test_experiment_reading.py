@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import CfmError, DataError, UsageError
 from cfmkit.experiment.reading import read_recording
-from cfmkit.tables.lab_headers import split_header
+from cfmkit.tables.lab_file import split_header
 
 TIME, MOTION, FORCE = loop_columns()
 COLUMNS = (TIME, MOTION, FORCE)

@@ -11,8 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.runs.explorer import Explorer
-from cfmkit.runs.explorer_server import ExplorerServer
+from cfmkit.runs.explorer import Explorer, ExplorerServer
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -13,9 +13,8 @@ from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, circle, polygon
-from cfmkit.export.kerf import with_kerf
+from cfmkit.export.kerf import parallel, with_kerf
 from cfmkit.numerics.arc_chain import ArcChain
-from cfmkit.numerics.parallel_curve import parallel
 
 HALF = 1e-4
 

@@ -20,7 +20,7 @@ from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
 from cfmkit.plots.moving_svg import poses
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_page, run_findings, run_page, study_page, suggestion_page
+from cfmkit.runs import batch_files, run_findings, run_page, study_page, suggestion_files
 from cfmkit.studies.batch_entries import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -195,7 +195,7 @@ def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
         ),
         Entry("bad.yaml", "bad", status="invalid", code=ExitCode.INVALID, message=HOSTILE),
     )
-    text = batch_page.page(entries, "two", "cfmkit batch .").decode()
+    text = batch_files.page(entries, "two", "cfmkit batch .").decode()
     outline = Outline(text)
     assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == [
         "b%20c/report.html",
@@ -219,7 +219,7 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip
-    text = suggestion_page.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
+    text = suggestion_files.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
     outline = Outline(text)
     assert outline.unbalanced == []
     assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})

@@ -12,8 +12,8 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import UsageError
-from cfmkit.studies.cluster import Cluster
 from cfmkit.studies.engine import Work, run
+from cfmkit.studies.executors import Cluster
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
@@ -120,7 +120,7 @@ class Killer:
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
-    monkeypatch.setattr("cfmkit.studies.cluster.CONNECT_WITHIN", 1)
+    monkeypatch.setattr("cfmkit.studies.executors.CONNECT_WITHIN", 1)
     with pytest.raises(UsageError, match="no Dask scheduler answers"):
         run(work(2), Cluster("tcp://127.0.0.1:9"))
 

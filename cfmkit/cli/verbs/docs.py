@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_blocks import Paragraph, Verbatim, field, listed
+from cfmkit.errors import UsageError, visible
+from cfmkit.runs.shipped import shipped_folder
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from cfmkit.cli.terminal import Terminal
+
 
 PLACE = 62
 EXAMPLE = "cfmkit docs tutorial"
@@ -25,8 +31,6 @@ class DocsOptions(Common):
 
 def run(options: DocsOptions, terminal: Terminal) -> Answer:
     """List the pages of the documentation, or print one; they come with cfmkit and need no network."""
-    from cfmkit.runs.documentation import page, pages
-
     if options.name is not None:
         found = page(options.name)
         record = {"name": found.name, "title": found.title, "path": str(found.path), "text": found.text}
@@ -36,3 +40,66 @@ def run(options: DocsOptions, terminal: Terminal) -> Answer:
     fields = (field("name"), field("title", wraps=True))
     where = Paragraph("files", f"{known[0].path.parent}; a link to FILE.md in a page is `cfmkit docs FILE`")
     return Answer({"pages": records}, (*listed("pages", records, fields), where))
+
+
+FIRST = ("index", "tutorial", "howto", "reference")
+"""Pages that a newcomer reads first."""
+
+
+@dataclass(frozen=True)
+class GuidePage:
+    """One page.
+
+    Attributes
+    ----------
+    name : str
+        Of its file, without the ending.
+    title : str
+        Its first heading.
+    path : Path
+        The file, in Markdown; what it links to stands beside it.
+    """
+
+    name: str
+    title: str
+    path: Path
+
+    @property
+    def text(self) -> str:
+        """What it says."""
+        return self.path.read_text(encoding="utf-8")
+
+
+def pages() -> tuple[GuidePage, ...]:
+    """Return every page, those for newcomers first.
+
+    Examples
+    --------
+    >>> [page.name for page in pages()][:3]
+    ['index', 'tutorial', 'howto']
+    """
+    found = {path.stem: path for path in sorted(shipped_folder("docs", "tutorial.md").glob("*.md"))}
+    names = [*(name for name in FIRST if name in found), *(name for name in found if name not in FIRST)]
+    return tuple(GuidePage(name, _title(found[name]), found[name]) for name in names)
+
+
+def _title(path: Path) -> str:
+    with path.open(encoding="utf-8") as lines:
+        return next((line[2:].strip().replace("`", "") for line in lines if line.startswith("# ")), path.stem)
+
+
+def page(name: str) -> GuidePage:
+    """Return one page by its name; ``docs/cam.md``, as files link to it, is the page ``cam``.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is none of that name.
+    """
+    known = {one.name: one for one in pages()}
+    wanted = name.removeprefix("docs/").partition("#")[0].removesuffix(".md").replace("-", "_")
+    if wanted in known:
+        return known[wanted]
+    near = difflib.get_close_matches(wanted, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else "; `cfmkit docs` lists them"
+    raise UsageError(f"there is no page {visible(name)!r}{hint}")

@@ -46,9 +46,8 @@ from cfmkit.specs.units.fields import (
     quantity,
 )
 from cfmkit.specs.units.number_text import read_number
-from cfmkit.specs.units.quantities import decimal_text, format_quantity, read_one_of, read_quantity
+from cfmkit.specs.units.quantities import decimal_text, format_quantity, format_short, read_one_of, read_quantity
 from cfmkit.specs.units.registry import unit_table
-from cfmkit.specs.units.rounded import format_short
 from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
 from cfmkit.specs.units.windows import SHARE, Ends, Share, WindowEnd, between, dimension_of_end, ends_increase, place_of
 

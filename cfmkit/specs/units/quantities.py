@@ -7,17 +7,23 @@ exact fractions, so that the result is the correctly rounded float: "68 mm",
 
 from __future__ import annotations
 
+import difflib
+import itertools
 import math
 import re
 import sys
 from decimal import Context, Decimal
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.hints import unit_complaint
 from cfmkit.specs.units.number_text import NUMBER, number_complaint, odd_character, read_number, shown
 from cfmkit.specs.units.registry import Size, border_size, is_unit, unit_size
-from cfmkit.specs.units.table import COMMON, DIMENSIONS, UNITLESS, dimension_of
+from cfmkit.specs.units.table import COMMON, DIMENSIONS, SYMBOLS, UNITLESS, UNITS, border_unit, dimension_of, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
 
 LONGEST = 100
 _UNIT_START = re.compile(r"$| *[^\W\d_]| *[%°\"'(]| *1 */")
@@ -219,3 +225,84 @@ def _plain(decimal: Decimal) -> str:
     if -4 <= short.adjusted() <= 15:
         return format(short, "f")
     return format(short, "e").replace("e+", "e")
+
+
+_TYPOGRAPHY = {"²": "^2", "³": "^3", "⁴": "^4", "⁻": "^-", "¹": "1", "·": "*", "×": "*", "⋅": "*", "∙": "*", "°": "deg"}
+_TYPOGRAPHY |= {"µ": "u", "μ": "u", "″": "in", '"': "in", "′": "ft", "(": "", ")": ""}
+_NAMES = {unit.name.lower(): unit.symbol for unit in UNITS} | {
+    "metre": "m", "millimetre": "mm", "centimetre": "cm", "micron": "um", "feet": "ft", "inches": "in", "sec": "s",
+    "secs": "s", "hr": "h", "mins": "min", "kilo": "kg", "pct": "%", "radians": "rad", "lbs": "lb",
+    "pounds": "lb", "rps": "rev/s", "turn": "rev", "lbin": "lbf*in", "lbft": "lbf*ft", "nm": "N*m",
+}  # fmt: skip
+_MOST_TRIES = 200
+
+
+def unit_complaint(unit: str, dimensions: Sequence[str]) -> str:
+    """Say that `unit` is none, and name the nearest one, of the wanted dimensions if there is one."""
+    if "(" in unit and is_unit(re.sub("[()]", "", unit)):
+        return f"{shown(unit)} has parentheses; write the unit without them, e.g. N/mm/s"
+    if re.search(r"[A-Za-z%)] +[A-Za-z(]", unit) and all(word in SYMBOLS for word in re.findall("[A-Za-z%]+", unit)):
+        return f"{shown(unit)} has two units side by side; put * or / between them"
+    guess = nearest_unit(unit, dimensions)
+    hint = f"did you mean {guess!r}?" if guess else "`cfmkit show units` lists them"
+    return f"{shown(unit)} is not a unit; {hint}"
+
+
+def nearest_unit(unit: str, dimensions: Sequence[str]) -> str | None:
+    """Return an existing unit that looks like `unit`; one of the wanted dimensions comes first."""
+    guesses = [guess for guess in itertools.islice(_guesses(unit), _MOST_TRIES) if is_unit(guess)]
+    wanted = [border_size(name).powers for name in dimensions]
+    fitting = [guess for guess in guesses if unit_size(guess).powers in wanted]
+    return next(iter(fitting or guesses), None)
+
+
+def _guesses(unit: str) -> Iterator[str]:
+    """Yield the unit with every word replaced by what it may mean."""
+    tidy = "".join(_TYPOGRAPHY.get(char, char) for char in unit[:60])
+    tidy = re.sub(r"\bper\b", "/", tidy)
+    tidy = re.sub(r"([A-Za-z])([2-4])\b", r"\1^\2", tidy)
+    tidy = re.sub(r" *([*/^]+) *", r"\1", tidy).strip().replace(" ", "*")
+    pieces = re.split("([A-Za-z%]+)", tidy)
+    for words in itertools.product(*(list(_meanings(word)) for word in pieces[1::2])):
+        yield "".join(itertools.chain(*itertools.zip_longest(pieces[0::2], words, fillvalue="")))
+
+
+def _meanings(word: str) -> Iterator[str]:
+    """Yield the unit symbols that `word` may stand for, the likeliest first."""
+    if word in SYMBOLS:
+        yield word
+        return
+    lower = word.lower()
+    yield from (symbol for symbol in SYMBOLS if symbol.lower() == lower)
+    yield from (_NAMES[name] for name in (lower, lower.removesuffix("s")) if name in _NAMES)
+    yield from _products(word)
+    near = difflib.get_close_matches(lower, list(_NAMES), n=2, cutoff=0.75)
+    yield from (_NAMES[name] for name in near)
+    yield from difflib.get_close_matches(word, list(SYMBOLS), n=2, cutoff=0.75)
+
+
+def _products(word: str) -> Iterator[str]:
+    """Yield the splits of ``Nmm`` into two known symbols."""
+    for cut in range(1, len(word)):
+        first, second = word[:cut], word[cut:]
+        if first in SYMBOLS and second in SYMBOLS:
+            yield f"{first}*{second}"
+
+
+def format_short(value: float, dimension: str, digits: int = 4) -> str:
+    """Return a value as a reader wants it in a sentence, rounded, in the border unit.
+
+    Examples
+    --------
+    >>> format_short(0.010328365, "length")
+    '10.33 mm'
+    >>> format_short(0.05, "ratio")
+    '5 %'
+    """
+    if dimension == "ratio":
+        return f"{100 * value:.{digits}g} %"
+    number = f"{float(to_border(value, dimension)):.{digits}g}"
+    if "e+" in number:
+        number = f"{float(number):.0f}"
+    unit = border_unit(dimension)
+    return number if unit in ("", "1") else f"{number} {unit}"
