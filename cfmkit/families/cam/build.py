@@ -162,6 +162,13 @@ def losses_of(mechanism: Mechanism) -> Losses | None:
     )
 
 
+def loads_of(spec: CamSpec, stiffness: float, rest: float) -> Loads:
+    """Return what acts on rollers and slider with springs of a stiffness that are at rest at a half width."""
+    weights, brace = weights_of(spec.mechanism) if spec.gravity else Weights(), spec.mechanism.brace_length
+    acting = (*weights.along, weights.sideways, weights.off_plane)
+    return Loads(stiffness, rest, brace, *acting, losses=losses_of(spec.mechanism))
+
+
 def assemble(spec: CamSpec) -> Assembly:
     """Return the mechanism put together.
 
@@ -181,16 +188,7 @@ def assemble(spec: CamSpec) -> Assembly:
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
-    weights = weights_of(mechanism) if spec.gravity else Weights()
-    loads = Loads(
-        mechanism.springs.total,
-        mechanism.springs_rest,
-        mechanism.brace_length,
-        *weights.along,
-        sideways=weights.sideways,
-        off_plane=weights.off_plane,
-        losses=losses_of(mechanism),
-    )
+    loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
     return Assembly(spec, profile, track, loads, reached, shortfall)
 
 

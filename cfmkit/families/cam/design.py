@@ -24,14 +24,17 @@ from cfmkit.families.cam.build import (
     assemble_sides,
     check_start,
     cut_profile,
+    loads_of,
     rollers_overlap,
     weights_of,
 )
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
+from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.track_records import TrackStates
 from cfmkit.families.cam.outline import plate_notes
+from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
+    from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Finding
     from cfmkit.stock.springs.catalogue import Offer
 
@@ -310,7 +314,8 @@ def _with_spring(
         most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
         if missed := SpringInUse.of(item, preload - reserve, most - reserve).misses_life(target.spring_life):
             return Miss(label, *missed)
-    gap = two_way_gap(law, target, spec.mechanism.rolling_friction)
+    rest = spec.mechanism.rest_half_width - 0.5 * preload
+    gap = two_way_gap(law, target, loads_of(spec, springs.total, rest), spec.mechanism.rolling_friction)
     if gap == float("inf"):
         return Miss(label, float("inf"), "friction holds the roller")
     note = f"{label} of the catalogue: A = {mm(constant)}"
@@ -355,24 +360,32 @@ def _in_the_way(told: str) -> str:
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
 
 
-def two_way_gap(law: SlopeLaw, target: CamDesign, friction: float) -> float:
+def two_way_gap(law: SlopeLaw, target: CamDesign, loads: Loads, friction: float) -> float:
     """Return the largest |F/F0 - 1| of both directions over the stroke, the first fiftieth left out.
 
-    Infinite if friction holds the roller somewhere on the way up.
+    Infinite if friction holds the roller somewhere.
+
+    Parameters
+    ----------
+    law : SlopeLaw
+        What the cam is cut for.
+    target : CamDesign
+        The stroke.
+    loads : Loads
+        Springs, weights, and what rubs beside the rollers.
+    friction : float
+        Rolling friction.
     """
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
     x = x[path.travel(x) >= 0.02 * target.stroke]
-    stretch, slope = (x - law.rest_half_width + law.preload) / law.force_constant, law.slope(x)
-    turned = np.stack([(slope - mu) / (1 + mu * slope) for mu in (friction, -friction)])
-    # F'/(4KA) = (D/A + (1 - 1/c) p)/(p - tan a): springs, and the weight that the profile carries.
-    carried = (1.0 - 1.0 / law.slope_factor) * turned
-    lever = turned - brace_tangent(x, law.brace_length)
-    if (lever[0] <= 0).any():
+    states = TrackStates(x, np.zeros_like(x), *law.slopes(x), np.zeros(len(x), dtype=bool), x)
+    ways = np.stack([forces(states, loads, way * friction, way).slider for way in (1.0, -1.0)])
+    if not np.isfinite(ways).all():
         return float("inf")
-    force = (stretch + carried) / lever
+    carried = loads.slider_weight if target.gravity else 0.0
     wanted = law.shape.at(path.travel(x)) if isinstance(law, CurveSlopeLaw) else 1.0
-    return float(np.abs(force - wanted).max())
+    return float(np.abs((ways - carried) / (4.0 * loads.stiffness * law.force_constant) - wanted).max())
 
 
 def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
