@@ -1,7 +1,8 @@
 """The bench in one sentence: what to make, what to measure on it, and what force to expect where, for 95 % of parts.
 
 Forces are those of parts to first order, drawn from `design.tolerances` or from what the process is assumed to hold.
-The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at.
+The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at. What
+is no dimension and moves it as much, a modulus or the rate of a spring, is named beside them.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ PARTS, SHARE = 4000, 0.95
 DIMENSIONS = 3
 """How many dimensions are named: more are not measured."""
 
+SIZES = ("length", "angle")
+"""What a dimension is measured in."""
+
 
 def bench(result: Result, run: Run) -> str:
     """Return the sentence; empty of a part of whose errors nothing is known, or that cannot be followed.
@@ -61,24 +65,48 @@ def bench(result: Result, run: Run) -> str:
     forces = nominal + errors @ by_error.T
     low, high = np.quantile(forces, ((1.0 - SHARE) / 2.0, (1.0 + SHARE) / 2.0), axis=0)
     weight = (np.abs(by_error) * errors.std(axis=0)).sum(axis=0)
-    order = [int(k) for k in np.argsort(-weight)[:DIMENSIONS] if weight[k] > 0]
     curve = result.curve
-    named = [_dimension(made, k) for k in order]
     at = [format_short(place, curve.motion_dimension) for place in places]
     ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(nominal, low, high, strict=True)]
     expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
     make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
     verb = "press" if curve.motion_dimension == "length" else "turn"
     return (
-        f"{make}, measure {_listed(named)}, {verb} it to {_listed(at)}, and expect {_listed(expected)}: each range "
+        f"{make}, {_to_measure(made, weight)}, {verb} it to {_listed(at)}, and expect {_listed(expected)}: each range "
         f"holds for {100 * SHARE:.0f} % of parts {whence}, to first order"
     )
 
 
+def _to_measure(made: DesignTolerances, weight: FloatArray) -> str:
+    """Return what to measure, of parameters that move the force by `weight` (d,): the first few dimensions.
+
+    Then what else is among as many of all parameters.
+    """
+    order = [int(k) for k in np.argsort(-weight) if weight[k] > 0]
+    sizes = [k for k in order if made.parameters[k].dimension in SIZES][:DIMENSIONS]
+    others = [k for k in order[:DIMENSIONS] if made.parameters[k].dimension not in SIZES]
+    told = [f"measure {_listed([_dimension(made, k) for k in sizes])}"] if sizes else []
+    if others:
+        told.append(f"determine {_listed([_named(made, k) + ' in the design)' for k in others])}")
+    return ", ".join(told)
+
+
 def _dimension(made: DesignTolerances, k: int) -> str:
-    """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm)``."""
+    """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm as drawn)``."""
+    parent, _, last = made.paths[k].rpartition(".")
+    thickness = getattr(made.spec.at(parent), "thickness", None)
+    if last != "offset" or thickness is None:
+        return f"{_named(made, k)} as drawn)"
+    # an error of all thicknesses is nothing that is drawn
+    ends = (min(thickness), max(thickness)) if isinstance(thickness, tuple) else (thickness,)
+    told = " to ".join(format_short(end, "length") for end in ends)
+    return f"{parent.removeprefix('mechanism.')}.thickness ({told} as drawn)"
+
+
+def _named(made: DesignTolerances, k: int) -> str:
+    """Return the name and the value of a parameter, the bracket still open."""
     value = format_short(float(made.nominal[k]), made.parameters[k].dimension)
-    return f"{made.paths[k].removeprefix('mechanism.')} ({value} as drawn)"
+    return f"{made.paths[k].removeprefix('mechanism.')} ({value}"
 
 
 def _listed(items: list[str]) -> str:

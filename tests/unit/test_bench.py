@@ -22,7 +22,7 @@ def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_
     spec = spec.replace({"design.tolerances": {MODULUS: {"normal": "3 %"}, "mechanism.width": {"normal": "0.1 %"}}})
     result = cfmkit.analyze(spec)
     told = bench(result, Run())
-    assert told.index("youngs_modulus") < told.index("width")
+    assert "measure width (10 mm as drawn), determine material.youngs_modulus (2000 MPa in the design)" in told
     force, low, high = (
         float(text) for text in re.search(r"expect ([\d.]+) N \(([\d.]+) N to ([\d.]+) N\)", told).groups()
     )
@@ -35,3 +35,24 @@ def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_
 def test_of_a_mechanism_whose_errors_nobody_knows_nothing_is_said():
     spec = cfmkit.load("configs/slider_crank_lumped.yaml")  # flexures: which of their sizes err, nobody says
     assert bench(cfmkit.analyze(spec), Run()) == ""
+
+
+def measured(name, **changes):
+    """Return what the sentence says to measure and to determine."""
+    spec = cfmkit.load(f"configs/{name}.yaml").replace(changes)
+    return re.search(r"geometry/, (.*), press", bench(cfmkit.analyze(spec), Run())).group(1)
+
+
+def test_a_modulus_is_no_dimension_and_takes_no_place_of_one():
+    told = {"mechanism.material.youngs_modulus": {"normal": "5 %"}, "mechanism.springs.stiffness": {"normal": "2 %"}}
+    told |= {f"mechanism.bistable.{name}": {"normal": "1 %"} for name in ("width", "length", "thickness")}
+    found = measured("vcfm_bought_springs", **{"design.tolerances": told})
+    assert re.fullmatch(r"measure (\S+ \([^)]*\)(, | and )?){3}, determine .*youngs_modulus.*", found)
+    assert "springs" not in found.split("determine")[0]
+
+
+def test_of_a_strip_its_thickness_is_measured_not_the_error_of_it():
+    assert "measure beam.thickness (0.9605 mm as drawn)" in measured("make_pom_strip")
+    assert "measure beam.thickness (0.7 mm to 1.1 mm as drawn)" in measured(
+        "make_pom_strip", **{"mechanism.beam.thickness": ["1.1 mm", "0.7 mm", "1 mm"]}
+    )

@@ -174,12 +174,29 @@ def test_two_different_springs_of_one_name_are_refused_in_a_list():
         ({}, "needs 'stiffness'"),
         ({"kind": "torsion", "stiffness": "1 N/mm"}, "'stiffness' is not what"),
         ({"wire": "1 mm", "coil": "10 mm"}, "belong together"),
+        (
+            {"kind": "compression", "stiffness": "1 N/mm", "free_length": "9 mm", "body_length": "12 mm"},
+            "must be larger than its 'body_length'",
+        ),
         ({"wire": "1 mm", "coil": "10 mm", "turns": 40, "stiffness": "5 N/mm"}, "times the rate that is stated"),
     ],
 )
 def test_a_spring_that_contradicts_itself_is_refused(block, told):
     with pytest.raises(ValidationError, match=told):
         CatalogueSpring.model_validate({"name": "x"} | block)
+
+
+@pytest.mark.parametrize(
+    ("block", "largest"),
+    [
+        ({"stiffness": "1 N/mm", "body_length": "12 mm"}, 18.0),
+        ({"stiffness": "1 N/mm", "body_length": "12 mm", "max_elongation": "10 mm"}, 10.0),
+        ({"wire": "1 mm", "coil": "10 mm", "turns": 16}, 30.0 - 19.0),  # two idle turns close the ends
+    ],
+)
+def test_a_compression_spring_is_not_pressed_beyond_its_turns(block, largest):
+    spring = CatalogueSpring.model_validate({"name": "C", "kind": "compression", "free_length": "30 mm"} | block)
+    assert spring.offer.largest == pytest.approx(1e-3 * largest)
 
 
 def test_of_what_misses_the_nearest_three_are_told():

@@ -132,6 +132,11 @@ class CatalogueSpring(WireLimits):
         if stated is None and self.wound is None:
             word = "rate" if self.kind == "torsion" else "stiffness"
             raise ValueError(f"needs {word!r}, or 'wire', 'coil' and 'turns', from which it follows")
+        body = self.body_length or (self.wound.body_length if self.wound else None)
+        if self.kind == "compression" and body and self.free_length is not None and self.free_length <= body:
+            raise ValueError(
+                "'free_length' of a compression spring must be larger than its 'body_length', turns closed"
+            )
         if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
             raise ValueError(_disagree(self.wound.rate / stated))
         return self
@@ -152,6 +157,9 @@ class CatalogueSpring(WireLimits):
         ends = [self.max_elongation]
         if self.kind == "torsion":
             ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
+        body = self.body_length or (wound.body_length if wound else None)
+        if self.kind == "compression" and self.free_length is not None and body is not None:
+            ends.append(self.free_length - body)  # there the turns touch
         if wound is not None and self.max_stress is not None:
             ends.append(max(self.max_stress / wound.stress(1.0) - self.initial_tension, 0.0) / rate)
         return Offer(
@@ -160,7 +168,7 @@ class CatalogueSpring(WireLimits):
             rate=rate,
             largest=min((end for end in ends if end is not None), default=None),
             free_length=self.free_length,
-            body_length=self.body_length or (wound.body_length if wound else None),
+            body_length=body,
             initial_tension=self.initial_tension,
             outer_diameter=self.outer_diameter or (wound.outer_diameter if wound else None),
             wound=wound,
