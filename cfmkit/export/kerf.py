@@ -4,6 +4,10 @@ Outer contours grow and holes shrink; corners that point into the waste become a
 about the corner, so that the cut stays half a kerf away from the part everywhere. Arcs
 stay arcs. Only where the moved contour has other pieces than the contour itself (a
 fillet that is sharper than half the kerf) it becomes a fine polyline.
+
+The parallel curve of a closed chain of arcs: again a chain of arcs. An arc of curvature k, moved by d to its right,
+keeps its turn and scales by 1 + k d. Where the chain turns away from the parallel, an arc about the node fills the
+gap; where it turns towards it, or an arc shrinks to nothing, the neighbours are cut where they cross.
 """
 
 from __future__ import annotations

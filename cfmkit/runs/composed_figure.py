@@ -101,7 +101,7 @@ def _of_folder(place: Path, panel: Panel) -> Makers:
     except (OSError, ValueError, KeyError, TypeError):
         raise UsageError(f"{visible(str(place))} is not the folder of a run: it has no manifest.json") from None
     if command == "sweep" and panel.verb in (None, "sweep"):
-        from cfmkit.studies.finished_sweep import makers_of
+        from cfmkit.studies.pictures import makers_of
 
         return makers_of(place, api.load(str(place / "resolved.yaml")))
     if command not in ("analyze", "design", "calibrate") or panel.verb not in (None, "analyze", command):

@@ -128,7 +128,7 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
-    from cfmkit.studies.process_tolerances import assumed
+    from cfmkit.studies.design_tolerances import assumed
 
     found = assumed(spec)
     if found is None:

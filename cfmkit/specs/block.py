@@ -1,8 +1,16 @@
-"""The base of every block of a specification."""
+"""The base of every block of a specification, and values within bounds that many blocks have."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from cfmkit.specs.units import Force, Length
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+NonNegativeLength = Annotated[Length, Field(ge=0)]
+PositiveForce = Annotated[Force, Field(gt=0)]
 
 
 class Model(BaseModel):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
-from cfmkit.specs.block import Model
+from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength
 from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
@@ -465,4 +465,17 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
         yield path, value
 
 
-__all__ = ["Analysis", "Displacement", "Length", "Model", "Requirement", "Sensitivity", "Spec", "Sweep", "frozen"]
+__all__ = [
+    "Analysis",
+    "Displacement",
+    "Length",
+    "Model",
+    "NonNegativeLength",
+    "PositiveForce",
+    "PositiveLength",
+    "Requirement",
+    "Sensitivity",
+    "Spec",
+    "Sweep",
+    "frozen",
+]

@@ -16,9 +16,8 @@ from cfmkit.families import family
 from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
-from cfmkit.studies.design_tolerances import tolerances_of
+from cfmkit.studies.design_tolerances import assumed, tolerances, tolerances_of
 from cfmkit.studies.near_design import most_parts, slopes, step_of
-from cfmkit.studies.process_tolerances import assumed, tolerances
 from cfmkit.studies.requirement_rows import sampled_of
 
 if TYPE_CHECKING:

@@ -4,6 +4,10 @@
 `jobs` only as fast as it works, and once ``stopping()`` is true it pulls no more,
 finishes what runs and ends. `serial` is the simplest, `Cluster` hands jobs to Dask;
 `cfmkit.studies.pool` has processes of this computer.
+
+An executor on a Dask cluster: one that runs somewhere, or one that is started here for the study. A worker that dies
+costs its points a second try elsewhere; a point whose workers die again is given up (``crashed``), as in a pool. What
+a worker needs travels with each job, so that workers may come and go. A single point cannot be ended from outside.
 """
 
 from __future__ import annotations

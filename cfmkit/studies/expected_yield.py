@@ -13,8 +13,8 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
+from cfmkit.studies.design_tolerances import MODULUS, assumed
 from cfmkit.studies.near_design import most_parts, slopes, step_of
-from cfmkit.studies.process_tolerances import MODULUS, assumed
 from cfmkit.studies.requirement_rows import metrics_in, numbers_of, places_of, rows_of, sampled_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.process_tolerances import Assumed
+    from cfmkit.studies.design_tolerances import Assumed
     from cfmkit.studies.requirement_rows import RequirementRows
 
 PARTS = 4000

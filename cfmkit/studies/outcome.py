@@ -81,7 +81,7 @@ class StudyResult:
         """What draws each picture of a sweep, by its name: ``study.figures["force_mean"]()``."""
         if self.spec is None or "drawn" not in self.summary:
             return {}
-        from cfmkit.studies.finished_sweep import makers_of_tables
+        from cfmkit.studies.pictures import makers_of_tables
 
         return makers_of_tables(self.spec, self.summary, self.table, self.curves)
 

@@ -3,6 +3,11 @@
 Nothing is assumed about a file but that it ends in a block of lines with the same
 number of cells, at least two of which are numbers in every line. What stands above
 that block is a header or of no concern; a few lines of text below it may follow.
+
+What the columns of a lab file are: names, units and roles. Units are read or stated by the user, never guessed. A
+unit stands in the header as ``Force [N]``, ``Kraft (N)``, ``s/mm`` or ``travel in mm``, in a line of its own below
+the names, or in ``--units``. A column's role follows from the dimension of its unit; where several columns qualify,
+from its name; where that does not decide either, the file is refused with the choices.
 """
 
 from __future__ import annotations

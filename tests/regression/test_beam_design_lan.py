@@ -10,8 +10,7 @@ import cfmkit.metrics
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, tolerated
-from cfmkit.families.beam.shaping.blocking_limits import missed_by
-from cfmkit.families.beam.shaping.design import task_of
+from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import Found
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Status

@@ -149,7 +149,6 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
             "main",
             "commands",
             "options",
-            "measured_data_options",
             "answer",
             "failures",
             "page_blocks",

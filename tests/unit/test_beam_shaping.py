@@ -16,14 +16,11 @@ from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, half_band, lines_cross, strict_share, tolerated
-from cfmkit.families.beam.shaping.blocking_limits import blocked, missed_by
-from cfmkit.families.beam.shaping.check_between_poses import looked_at
-from cfmkit.families.beam.shaping.design import shaped, task_of
-from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
+from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
-from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, searched
-from cfmkit.families.beam.shaping.sqp_program import Shaping
+from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, looked_at, searched
+from cfmkit.families.beam.shaping.sqp_program import Compared, Flattest, Shaping, Widest
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.results import Status

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from cfmkit.export.contours import polygon
-from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
+from cfmkit.solid.meshed_part import ALLOWED, HeldOrDriven, Part, _checked, refined, rings_of
 from cfmkit.solid.plane_stress_law import LAWS
-from cfmkit.solid.pose_density import ALLOWED, _checked, refined
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.measured_data_options import Measuring, data_record, read_measured, refuse_without_data
-from cfmkit.cli.options import Animate, Computing, WithReport, flag, option
+from cfmkit.cli.options import (
+    Animate,
+    Computing,
+    Measuring,
+    WithReport,
+    data_record,
+    flag,
+    option,
+    read_measured,
+    refuse_without_data,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,8 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.measured_data_options import Measuring, data_record, read_measured
-from cfmkit.cli.options import Computing, WithReport, argument, option
+from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_record, option, read_measured
 
 if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.measured_data_options import Measuring, data_record
-from cfmkit.cli.options import FigureChoice, Quiet, argument, flag, option
+from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
@@ -125,7 +124,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
 
 def _numbers(report: MeasureReport) -> CellGrid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from cfmkit.cli.run_numbers import words
+    from cfmkit.cli.run_answer import words
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []

@@ -11,13 +11,12 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfmkit.families.beam.mechanism.spec import Mechanism
 from cfmkit.families.beam.parts.spec import (
     MaterialField,
-    PositiveLength,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.formula import formula
-from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidAnalysis, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST

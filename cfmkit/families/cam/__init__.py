@@ -27,8 +27,8 @@ FAMILY = Family(
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.proposals_for_wish:propose",
     room="cfmkit.families.cam.bounding_box:room",
-    free="cfmkit.families.cam.free_values:free",
-    errors="cfmkit.families.cam.process_errors:errors",
+    free="cfmkit.families.cam.yield_parameters:free",
+    errors="cfmkit.families.cam.yield_parameters:errors",
     headline=(
         "force_constant",
         "theoretical_force",

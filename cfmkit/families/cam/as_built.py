@@ -1,10 +1,15 @@
-"""Quasi-static analysis of a cam as it was built, from measured points of its flanks.
+"""Quasi-static analysis of a cam as it was built, from measured points of its flanks: where rollers run on them.
 
 The points are registered to the design, both flanks by one motion; what is left is the
 error of the profile. Both sides may differ: with the spring force S = K (x_R + x_L - 2 x0)
 on each roller the slider's force is the sum of what each side needs. The force is split
 into what the design gives, and what rest length, profile and friction add to it, one
 after the other, so that the parts add up.
+
+Where rollers run on flanks as they were built: the outermost place that no point of the flank forbids. A roller is
+larger than the waves of a cut edge: it rides on the crests and bridges hollows narrower than itself. Its centre is on
+the design's roller path, moved along the normal until the circle touches the built flank and cuts it nowhere; the
+direction of its track is perpendicular to the contact's normal.
 
 Reference
 ---------
@@ -13,6 +18,7 @@ Reference
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +28,7 @@ from cfmkit.errors import DataError
 from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
-from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
-from cfmkit.families.cam.geometry.flank import DesignFlank
+from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
     curve_cut_for,
@@ -37,7 +42,8 @@ from cfmkit.families.cam.scalar_results import (
 from cfmkit.families.cam.solution import Assembly, Built, Sides
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
+from cfmkit.numerics.registration import CurveFrame, Registration, feet, gaps_across, register, registered_where_it_is
+from cfmkit.numerics.smoothing import smoothed
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.data_files import DataSource
 from cfmkit.tables.measured_outline import read_sides
@@ -273,3 +279,108 @@ def _curve(built: Built) -> Curve:
         stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
     branch = np.repeat(["load", "unload"], len(built.travel))
     return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
+
+
+STEP = 5e-5
+"""Distance of the places that are computed [m]."""
+
+REACH = 2e-3
+"""How far along the flank, beside the place where the design touches, contact is sought [m]."""
+
+
+@dataclass(frozen=True)
+class BuiltTrack:
+    """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position.
+
+    Attributes
+    ----------
+    slider : (n,) array
+        Increasing: height of the slider above the path's first point [m].
+    x, y : (n,) array
+        Roller centre [m].
+    slope : (n,) array
+        dy/dx of the track.
+    """
+
+    slider: FloatArray
+    x: FloatArray
+    y: FloatArray
+    slope: FloatArray
+
+    def at(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return x [m] and slope of the track at slider positions."""
+        return np.interp(slider, self.slider, self.x), np.interp(slider, self.slider, self.slope)
+
+
+def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:
+    """Return a flank from registered points.
+
+    Parameters
+    ----------
+    design : DesignFlank
+        The right flank.
+    points : (n,) array
+        Path coordinates of the points' feet [m], in any order; those at one place are averaged.
+    errors : (n,) array
+        Their distances from the design along its normal [m].
+    noise : float
+        Standard deviation of the measurement [m].
+    """
+    arc = arc_lengths(design)
+    along = np.interp(points, *arc)
+    places, inverse, counts = np.unique(np.round(along, 9), return_inverse=True, return_counts=True)
+    mean = np.bincount(inverse, errors) / counts
+    return BuiltFlank(design, smoothed(places, mean, noise), arc)
+
+
+def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) -> BuiltTrack:
+    """Return the track of a roller's centre on a built flank.
+
+    Parameters
+    ----------
+    flank : BuiltFlank
+        Mirrored to the right.
+    roller_radius, brace_length : float
+        Of the parts built in [m].
+    """
+    low, high = flank.ends
+    places = np.linspace(low, high, max(int((high - low) / STEP), 50) + 1)
+    base = flank.design.frame(np.interp(places, flank.arc[1], flank.arc[0]))
+    centers = base.points + roller_radius * base.normals
+    lift, contact = _lift(flank, places, (centers, base.normals), roller_radius)
+    for _ in range(3):
+        contact = feet(flank, centers + lift[:, None] * base.normals, contact)
+        at = flank.frame(contact)
+        gap = centers + lift[:, None] * base.normals - at.points
+        lift = lift + (roller_radius - np.hypot(gap[:, 0], gap[:, 1])) / (at.normals * base.normals).sum(axis=1)
+    centers = centers + lift[:, None] * base.normals
+    return _over_slider(centers, flank.frame(contact), brace_length)
+
+
+def _lift(
+    flank: BuiltFlank, places: FloatArray, nominal: tuple[FloatArray, FloatArray], radius: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far the circle must move along the normal to cut the flank nowhere, and where it then touches."""
+    centers, normals = nominal
+    points = flank.frame(places).points
+    count, reach = len(places), max(int(REACH / (places[1] - places[0])), 2)
+    best, where = np.full(count, -np.inf), np.zeros(count, dtype=int)
+    for shift in range(-reach, reach + 1):
+        other = np.clip(np.arange(count) + shift, 0, count - 1)
+        gap = points[other] - centers
+        along = (gap * normals).sum(axis=1)
+        beside = (gap * gap).sum(axis=1) - along**2
+        need = along + np.sqrt(np.maximum(radius**2 - beside, 0.0))
+        better = need > best
+        best, where = np.where(better, need, best), np.where(better, other, where)
+    return best, places[where]
+
+
+def _over_slider(centers: FloatArray, contact: CurveFrame, brace: float) -> BuiltTrack:
+    x, y = centers.T
+    slider = y + np.sqrt((brace - x) * (brace + x))
+    # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.
+    rising = slider >= np.maximum.accumulate(slider)
+    rising[1:] &= np.diff(np.maximum.accumulate(slider)) > 0
+    slope = contact.normals[:, 0] / -contact.normals[:, 1]
+    return BuiltTrack(slider[rising], x[rising], y[rising], slope[rising])

@@ -8,16 +8,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
 Positive = Field(gt=0)
-PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
-NonNegativeLength = Annotated[Length, Field(ge=0)]
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
 

@@ -9,9 +9,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
-from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
+from cfmkit.families.slider_crank.springs.spec import Limits, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
-from cfmkit.specs.spec import SolidAnalysis, Spec, refuse
+from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
 from cfmkit.stock.spec import Guide, Pins, sheet_faults
 

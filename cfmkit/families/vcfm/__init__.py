@@ -14,8 +14,8 @@ FAMILY = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
-    errors="cfmkit.families.vcfm.process_errors:errors",
-    free="cfmkit.families.vcfm.free_values:free",
+    errors="cfmkit.families.vcfm.yield_parameters:errors",
+    free="cfmkit.families.vcfm.yield_parameters:free",
     models={
         "truss": analyze,
         "analytic": analyze,

@@ -10,7 +10,16 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.vcfm.part.spec import VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
+from cfmkit.specs.spec import (
+    Analysis,
+    DesignBlock,
+    Model,
+    NonNegativeLength,
+    PositiveLength,
+    SolidAnalysis,
+    Spec,
+    refuse,
+)
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
@@ -19,8 +28,7 @@ from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 if TYPE_CHECKING:
     from cfmkit.specs.target_function import TargetCurve
 
-PositiveLength = Annotated[Length, Field(gt=0)]
-NonNegativeLength = Annotated[Length, Field(ge=0)]
+
 LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
 SteepAngle = Annotated[Angle, Field(gt=0, le=radians(40))]
 

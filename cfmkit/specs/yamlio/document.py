@@ -1,4 +1,9 @@
-"""A specification as written: the tree, the position of every node, the problems, and single values that are set."""
+"""A specification as written: the tree, the position of every node, the problems, and single values that are set.
+
+``--set mechanism.springs.0=2 N/mm``: one value of a specification from the command line. The value is read exactly as
+in a file; lists and blocks in flow style only. A key that has dots itself stands in quotes: ``--set
+'sensitivity.parameters."mechanism.roller_radius"={normal: 0.1 mm}'``.
+"""
 
 from __future__ import annotations
 

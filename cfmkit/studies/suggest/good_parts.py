@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Run
-from cfmkit.studies.design_tolerances import DesignTolerances
+from cfmkit.studies.design_tolerances import DesignTolerances, assumed, tolerances
 from cfmkit.studies.expected_yield import YieldUnknown, first_order_shares
 from cfmkit.studies.made_parts import judge
-from cfmkit.studies.process_tolerances import assumed, tolerances
 from cfmkit.studies.sensitivity.parameters import parameters_of
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.families.wishes import Wish
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.process_tolerances import Assumed
+    from cfmkit.studies.design_tolerances import Assumed
 
 PARTS = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""

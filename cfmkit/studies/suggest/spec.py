@@ -9,14 +9,12 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.base import article
 from cfmkit.families.wishes import Wish
-from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Angle, Force, Length, Ratio, Torque, format_short
+from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
+from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.processes import PROCESSES, ProcessName
 from cfmkit.stock.spec import MaterialField  # noqa: TC001 - read by pydantic
 
-PositiveForce = Annotated[Force, Field(gt=0)]
 PositiveTorque = Annotated[Torque, Field(gt=0)]
-PositiveLength = Annotated[Length, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 
 MEAN = 0.025

@@ -6,10 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, PositiveLength, Spec
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness
-
-PositiveLength = Annotated[Length, Field(gt=0)]
 
 
 class Coil(Model):

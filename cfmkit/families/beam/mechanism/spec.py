@@ -21,12 +21,11 @@ from cfmkit.families.beam.parts.spec import (
     MemberSpec,
     NodeSpec,
     PartSpec,
-    PositiveLength,
     SpringSpec,
     Thickness,
     checked_thickness,
 )
-from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.stock.spec import SafetyFactor
 
 if TYPE_CHECKING:

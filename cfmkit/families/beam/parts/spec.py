@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.specs.spec import Model
+from cfmkit.specs.spec import Model, PositiveLength
 from cfmkit.specs.units import (
     Angle,
     Density,
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     pass
 
 
-PositiveLength = Annotated[Length, Field(gt=0)]
 Point = tuple[Length, Length]
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]

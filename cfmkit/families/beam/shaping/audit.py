@@ -15,13 +15,13 @@ import numpy as np
 from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.elastica.continuation.batch import trace_many
 from cfmkit.families.beam.build import thickest_of
-from cfmkit.families.beam.shaping.separation import pairs
+from cfmkit.families.beam.shaping.limits import pairs
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
+    from cfmkit.families.beam.shaping.limits import Pair
     from cfmkit.families.beam.shaping.search import Found
-    from cfmkit.families.beam.shaping.separation import Pair
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
 

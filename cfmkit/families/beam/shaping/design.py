@@ -1,25 +1,33 @@
-"""`design: {optimise: ...}`: from a specification to the task, from the best audited start to a specification."""
+"""`design: {optimise: ...}`: from a specification to the task, from the best audited start to a specification.
+
+Where no start meets all limits: which of them block, and the nearest values for which there would be a shape.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing import sqp_program
 from cfmkit.designing.starts import Clock, identity_of
-from cfmkit.families.beam.build import assemble
+from cfmkit.designing.variables import at_bounds
+from cfmkit.families.beam.build import assemble, thickest_of
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
-from cfmkit.families.beam.shaping.blocking_limits import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import StartBudget, finished, widened
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, finished, met, widened
+from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
@@ -85,9 +93,9 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
     mean = 0.0 if curve is None else mean_of(curve, wanted.window)
-    limits = _limits(wanted, assembly.allowable_stress)
+    sqp_program = _limits(wanted, assembly.allowable_stress)
     if curve is not None:
-        limits = replace(limits, force_target=mean)
+        sqp_program = replace(sqp_program, force_target=mean)
     return Task(
         network=assembly.network,
         driven=assembly.driven,
@@ -98,7 +106,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
         orders=wanted.orders,
         coefficient_limit=wanted.coefficient_limit,
-        limits=limits,
+        limits=sqp_program,
         objective=wanted.objective,
         half_band=wanted.half_band,
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
@@ -130,17 +138,17 @@ def _coordinates(wanted: Optimise) -> list[Coordinate]:
 
 
 def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
-    limits, force = wanted.limits, wanted.force
-    box, deformed = limits.envelope, limits.deformed_envelope
+    sqp_program, force = wanted.limits, wanted.force
+    box, deformed = sqp_program.envelope, sqp_program.deformed_envelope
     return TaskLimits(
-        stress=allowable_stress * (1 - MARGIN) if limits.stress and allowable_stress else None,
+        stress=allowable_stress * (1 - MARGIN) if sqp_program.stress and allowable_stress else None,
         envelope=None if box is None else (*box.x, *box.y),
         deformed_envelope=None if deformed is None else (*deformed.x, *deformed.y),
-        length_ratio=limits.max_length_ratio,
-        slenderness=limits.min_slenderness * (1 + MARGIN) if limits.min_slenderness else None,
-        clearance=limits.clearance,
-        opening=limits.joint_opening,
-        radius=limits.min_radius,
+        length_ratio=sqp_program.max_length_ratio,
+        slenderness=sqp_program.min_slenderness * (1 + MARGIN) if sqp_program.min_slenderness else None,
+        clearance=sqp_program.clearance,
+        opening=sqp_program.joint_opening,
+        radius=sqp_program.min_radius,
         force_min=None if force.min is None else force.min * (1 + MARGIN),
         force_target=force.target,
         force_tolerance=force.tolerance,
@@ -249,3 +257,130 @@ def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ..
         said = f"{result.missing} of the starts were not finished in the time budget; run again to continue"
         out.append(finding("search_cut_short", said))
     return tuple(out)
+
+
+MOST = 3
+"""Designs that are looked at, the ones that miss the limits least."""
+
+AT_BOUND = 1e-4
+"""A variable so near to its bound, in units of the size and in rad, is held by it."""
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Why there is no design.
+
+    Attributes
+    ----------
+    missed : mapping
+        Limit -> by how much the best design misses it, and where.
+    nearest : mapping of str to str
+        Path below `design.optimise` or `mechanism` -> value for which the other limits could be met.
+    freed : Found or None
+        A design that meets all limits after all.
+    """
+
+    missed: Mapping[str, str]
+    nearest: Mapping[str, str]
+    freed: Found | None
+
+
+def blocked(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:
+    """Return what blocks, judged from the designs that miss the limits least."""
+    best = sorted(found, key=lambda one: one.violation)[:MOST]
+    missed = missed_by(task, best[0])
+    nearest: dict[str, str] = {}
+    for name in missed:
+        gives = [_given(task, one, plan, (name,)) for one in best]
+        for one in gives:
+            if one.feasible:
+                return Blocked(missed, {}, one)
+        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= {name}), default=None)
+        if slack is not None:
+            nearest |= NEAREST[name](task, 1.02 * slack)
+    if not nearest:  # none gives way alone: all that are missed together, by the same share
+        gives = [_given(task, one, plan, tuple(missed)) for one in best]
+        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= set(missed)), default=None)
+        if slack is not None:
+            nearest = {key: value for name in missed for key, value in NEAREST[name](task, 1.02 * slack).items()}
+    return Blocked(missed, nearest, None)
+
+
+def _given(task: Task, found: Found, plan: StartBudget, give: tuple[str, ...]) -> Found:
+    """Return a design that meets all limits but some, and misses those as little as possible."""
+    rest = [met(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)]
+    return met(task, rest[0], task.orders[-1], plan, give, 0.98)
+
+
+def missed_by(task: Task, found: Found) -> dict[str, str]:
+    """Return the limits that a design misses, each with its worst place and by how much, the worst first."""
+    program = Shaping(Variables(task, found.order), found.start, Flattest())
+    view = program.view(found.x)
+    if view is None:
+        return {}
+    rows = sqp_program.missed(program.limits(view), VIOLATION)
+    return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
+
+
+def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
+    """Return the limits and bounds that hold a design, by name and place."""
+    variables = Variables(task, found.order)
+    program = Shaping(variables, found.start, Flattest())
+    view = program.view(found.x, sloped=True)
+    at_bound = at_bounds(found.x, variables.bounds, AT_BOUND)
+    held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
+    return tuple(held) if view is None else (*held, *sqp_program.held(program.limits(view), close))
+
+
+def _stress(task: Task, slack: float) -> dict[str, str]:
+    factor = task.safety_factor / (1 + slack)
+    if factor >= 1:
+        return {"mechanism.safety_factor": f"at most {factor:.4g}"}
+    strength = (task.allowable_stress or 0.0) * (1 + slack)
+    return {"mechanism.material.yield_strength": f"at least {format_short(strength, 'stress')}, without safety factor"}
+
+
+def _force(task: Task, slack: float) -> dict[str, str]:
+    if task.limits.force_min is not None:
+        return {"design.optimise.force.min": f"at most {format_short(task.limits.force_min * (1 - slack), 'force')}"}
+    return {"design.optimise.force.tolerance": f"at least {task.limits.force_tolerance + slack:.3g}"}
+
+
+def _clearance(task: Task, slack: float) -> dict[str, str]:
+    thick = max(thickest_of(beam.section) for beam in task.network.beams.values())
+    gap = ((task.limits.clearance or 0.0) + thick) * (1 - slack) - thick
+    return {"design.optimise.limits.clearance": f"at most {format_short(max(0.0, gap), 'length')}"}
+
+
+def _box(key: str) -> Callable[[Task, float], dict[str, str]]:
+    def nearest(task: Task, slack: float) -> dict[str, str]:
+        more = format_short(slack * task.size, "length")
+        return {f"design.optimise.limits.{key}": f"wider by {more} on the sides that hold"}
+
+    return nearest
+
+
+def _scaled(
+    key: str, value: Callable[[TaskLimits, float], float], sense: str, dimension: str
+) -> Callable[..., dict[str, str]]:
+    def nearest(task: Task, slack: float) -> dict[str, str]:
+        return {f"design.optimise.limits.{key}": f"{sense} {format_short(value(task.limits, slack), dimension)}"}
+
+    return nearest
+
+
+NEAREST: dict[str, Callable[[Task, float], dict[str, str]]] = {
+    "stress": _stress,
+    "envelope": _box("envelope"),
+    "deformed_envelope": _box("deformed_envelope"),
+    "max_length_ratio": _scaled(
+        "max_length_ratio", lambda one, s: 1 / max(1e-3, 1 / (one.length_ratio or 1.0) - s), "at least", "count"
+    ),
+    "min_slenderness": _scaled(
+        "min_slenderness", lambda one, s: (one.slenderness or 0.0) * (1 - s), "at most", "count"
+    ),
+    "min_radius": _scaled("min_radius", lambda one, s: (one.radius or 0.0) * (1 - s), "at most", "length"),
+    "clearance": _clearance,
+    "force": _force,
+}
+"""For each limit what it would have to be if it gives way by an amount in its own scale."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Model, Tolerance, refuse
+from cfmkit.specs.spec import Model, PositiveLength, Tolerance, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.mechanism.spec import Mechanism
 
 Range = tuple[Length, Length]
-PositiveLength = Annotated[Length, Field(gt=0)]
 
 
 class Box(Model):

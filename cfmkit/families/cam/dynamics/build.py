@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.cam.build import assemble_sides, cam_start_height, directions
-from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine
-from cfmkit.families.cam.dynamics.side_kinematics import NoRise, Side, SideParts, pieces_of
+from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine, NoRise, Side, SideParts, pieces_of
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY

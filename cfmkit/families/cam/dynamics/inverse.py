@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.moving_parts import Constants, Machine
-    from cfmkit.families.cam.dynamics.side_kinematics import Stance
+    from cfmkit.families.cam.dynamics.moving_parts import Constants, Machine, Stance
 
     ComplexArray = NDArray[np.complex128]
 

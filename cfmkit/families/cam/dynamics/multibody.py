@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.dynamics.flankline import FlankLine
-from cfmkit.families.cam.dynamics.side_kinematics import Flank
+from cfmkit.families.cam.dynamics.moving_parts import Flank
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.flankline import FlankPoint
-    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine
-    from cfmkit.families.cam.dynamics.side_kinematics import Side, SideParts
+    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine, Side, SideParts
 
     ComplexArray = NDArray[np.complex128]
 

@@ -9,13 +9,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.numerics.through_points import ThroughPoints
-from cfmkit.specs.block import Model
+from cfmkit.specs.block import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.target_curve import MOST_POINTS, Interpolation
 from cfmkit.specs.units import Length, Ratio
 
-PositiveLength = Annotated[Length, Field(gt=0)]
-NonNegativeLength = Annotated[Length, Field(ge=0)]
 DesignFriction = Annotated[Ratio, Field(gt=-1, lt=1)]
 
 

@@ -7,12 +7,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Analysis, Model
+from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
 from cfmkit.stock.processes import PROCESSES
 from cfmkit.stock.spec import MaterialField, PaddedPart, SafetyFactor
-
-PositiveLength = Annotated[Length, Field(gt=0)]
 
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 

@@ -2,6 +2,11 @@
 
 The coupler is in equilibrium under the forces at its ends and the moments of the springs at crank pin and
 slider pin; the slider passes on its own spring's force and what drives it.
+
+The trim by the unloaded angle: what turning it does to the effort while the slider's places are kept. Whoever turns
+the crank angle at which the springs are relaxed (the anchors of the torsion springs, or the block that a strip is
+clamped in) deflects all springs by the same at every place: an effort q q' becomes (q + dq) q'. Unlike the anchor of
+the slider's spring, that adds most where a joint turns most per travel.
 """
 
 from __future__ import annotations
@@ -315,3 +320,40 @@ def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
     turned = link.branch * (units.position - link.crank * np.cos(units.angle)) < 0.0
     angle: FloatArray = np.where(turned, np.pi - beta, beta)
     return angle
+
+
+STEP = 1e-5
+"""Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
+
+PLACES = 201
+"""Of the window, over which the change of the effort is averaged."""
+
+
+def turned(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
+    """Return an assembly whose unloaded angle is turned by some angle [rad], and by how much its travel is less there.
+
+    Travel is counted from the unloaded position: the same place has a travel smaller by the second value [m]; 0 where
+    a torque drives, whose motion is the crank's angle itself.
+    """
+    other = replace(assembly, unloaded=assembly.unloaded + angle)
+    if assembly.drive == "torque":
+        return other, 0.0
+    link = assembly.linkage
+    before, after = (float(link.slider_position(np.asarray(one.unloaded))) for one in (assembly, other))
+    return other, link.branch * (before - after)
+
+
+def effort_per_angle(assembly: Assembly, motion: FloatArray) -> FloatArray:
+    """Return by how much unit efforts rise per unloaded angle, (4, n), [N m or N, per rate and rad]."""
+    rows = []
+    for step in (STEP, -STEP):
+        other, less = turned(assembly, step)
+        rows.append(other.forces(motion - less))
+    change: FloatArray = (rows[0] - rows[1]) / (2.0 * STEP)
+    return change
+
+
+def mean_effort_per_angle(assembly: Assembly, window: tuple[float, float]) -> FloatArray:
+    """Return the mean of `effort_per_angle` over a window, (4,)."""
+    found: FloatArray = effort_per_angle(assembly, np.linspace(*window, PLACES)).mean(axis=1)
+    return found

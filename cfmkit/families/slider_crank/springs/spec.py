@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import DesignBlock, Model, refuse
+from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
+from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
     from cfmkit.specs.target_function import TargetCurve
     from cfmkit.stock.springs.helical import Kind
 
-PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
 ExtensionRate = Annotated[Stiffness, Field(ge=0)]
@@ -97,9 +96,6 @@ class Limits(Model):
     crank_pin: PositiveAngle | None = Field(None, description="rotation at the crank pin")
     slider_pin: PositiveAngle | None = Field(None, description="rotation at the slider pin")
     slider: PositiveLength | None = Field(None, description="travel of the slider")
-
-
-PositiveForce = Annotated[Force, Field(gt=0)]
 
 
 class MaxRates(Model):

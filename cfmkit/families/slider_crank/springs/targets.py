@@ -11,10 +11,9 @@ import numpy as np
 
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.families.slider_crank.springs.assembly import assemble, mean_effort_per_angle
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
-from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from pydantic import Field
 
-from cfmkit.specs.units import Length
+from cfmkit.specs.spec import NonNegativeLength, PositiveLength
 from cfmkit.stock.spec import CutPart, PartFrame
-
-PositiveLength = Annotated[Length, Field(gt=0)]
-NonNegativeLength = Annotated[Length, Field(ge=0)]
 
 
 class StandingFrame(PartFrame):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.springs.assembly import mean_effort_per_angle
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
@@ -30,7 +31,6 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     scale_factors,
     small_angle_number,
 )
-from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
 from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.continuous_curves import extremes, mean
 from cfmkit.metrics.ranges_many import (

@@ -1,4 +1,4 @@
-"""Values of a designed cam that may change for a yield: its force constant, its springs, its profile."""
+"""What a yield of cams depends on: values of the design that may change for it, and values that a process errs in."""
 
 from __future__ import annotations
 
@@ -29,3 +29,12 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
     if wanted.choose == "stiffness" and isinstance(rate, float):
         found["mechanism.springs.stiffness"] = around(rate)
     return found
+
+
+PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.roller_radius"
+"""Holes of the braces and the slider, and the contour: one that lies farther out by e meets a roller larger by e."""
+
+
+def errors(_spec: CamSpec) -> dict[str, str]:
+    """Return which values a process errs in: where holes and the contour lie; springs are bought."""
+    return dict.fromkeys(PLACES, "position")

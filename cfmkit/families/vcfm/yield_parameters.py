@@ -1,4 +1,4 @@
-"""Which values of a designed mechanism with an adjustable force may move for a yield: those that its design chooses."""
+"""What a yield depends on: values that the design chooses and may change for it, and values that a process errs in."""
 
 from __future__ import annotations
 
@@ -36,3 +36,9 @@ def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
     if wanted.leaf_length is None:
         found["mechanism.bistable.length"] = around(leaf.length, high=longest)
     return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
+
+
+def errors(spec: VcfmSpec) -> dict[str, str]:
+    """Return which values a process errs in: the thicknesses of both kinds of leaves; bought springs have none."""
+    made = ("positive", "bistable") if spec.mechanism.springs is None else ("bistable",)
+    return {f"mechanism.{one}.thickness": "thickness" for one in made}
