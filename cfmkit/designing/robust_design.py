@@ -250,7 +250,8 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
     if middle is None:
         return None
     known = problem.slopes(x, problem.none)
-    by_x = _by_values(problem, x, problem.none, seen, None if known is None else known.by_x)
+    none: FloatArray = np.zeros((len(middle), 0))  # nothing may move
+    by_x = _by_values(problem, x, problem.none, seen, None if known is None else known.by_x) if len(x) else none
     by_error = _by_errors(problem, x, seen, None if known is None else known.by_error)
     if by_x is None or by_error is None:
         return None
@@ -320,7 +321,7 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     best = now
     best_share, risk, trust, steps = share, tail_risk(now.parts(few) / scale, problem.share), FIRST_TRUST, 0
     for _ in range(most):
-        if best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
+        if not len(x) or best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
             break
         parts = now.parts(few) / scale
         slopes = np.broadcast_to(now.by_x / scale[:, None], (len(few), *now.by_x.shape))

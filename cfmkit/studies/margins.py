@@ -62,6 +62,8 @@ DRAWN = 48
 LOOKED_AT = np.array([-2.5, -1.7, -0.85, 0.85, 1.7, 2.5])
 """Errors at which limits are looked at, in standard deviations; 1.7 is just within the ends of a range."""
 
+NOTHING_FREE = "this design has no values that may change ('design.free')"
+
 DIGITS = 6
 """Decimals of a value that is written, as a share of its range."""
 
@@ -237,9 +239,6 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     if design.spec is None or block is None or wanted is None:
         return design
     free = free_of(given, design.spec)
-    if not free:
-        told = "design.yield: this design has no free values to reach it; name values and ranges in 'design.free'"
-        return replace(design, notes=(*design.notes, ("margins", told)))
     nominal = family(given.family).analyze(design.spec, run)
     made = tolerances_of(design.spec, block, run.seed)
     if made is None or nominal.status is not Status.COMPLETE:
@@ -253,7 +252,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     start = np.array([float(design.spec.at(path)) for path in free])
     try:
         found, good = _held(problem, sight, start)
-        if block.robust is not None:
+        if block.robust is not None and free:
             again = drawn(problem, found, DRAWN, block.robust == "worst")
             better = checked(sight, again.x)
             found, good = (again, better) if better >= good else (found, good)
@@ -301,7 +300,7 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
 
     return RobustProblem(
         sight,
-        np.array(list(free.values())),
+        np.array(list(free.values())).reshape(-1, 2),
         errors,
         sigma,
         sight.rows.matrix,
@@ -323,10 +322,12 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
     worst = ", ".join(sight.made.paths[k] for k in groups[costliest(found, problem, groups)])
     if clopper_pearson(good, CHECKED)[1] < problem.share:
         return _impossible(design, sight, good, worst, problem)
+    solved = f"of {CHECKED} parts that were solved {good} are good; the tolerance that costs most is that of {worst}"
     told = (
         f"{len(x)} values moved in {found.steps} steps: to first order about {100 * found.began:.3g} % of parts were "
-        f"good before and {100 * found.share:.3g} % are now; of {CHECKED} parts that were solved {good} are; the "
-        f"tolerance that costs most is that of {worst}"
+        f"good before and {100 * found.share:.3g} % are now; {solved}"
+        if len(x)
+        else f"{NOTHING_FREE}; {solved}"
     )
     numbers: dict[str, tuple[float | None, str, str]] = {
         "margins_steps": (float(found.steps), "count", "steps towards the requested yield"),
@@ -342,10 +343,13 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
 def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
     value = 100.0 * good / CHECKED
-    told = (
-        f"no values in the ranges were found with which {100 * problem.share:.4g} % of parts are good: {value:.3g} % "
-        f"at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: make it tighter, "
-        "widen the ranges (design.free) or ask for less"
+    wanted = f"{100 * problem.share:.4g} % of parts are good"
+    told, cure = f"no values in the ranges were found with which {wanted}", "widen the ranges (design.free)"
+    if not len(problem.bounds):
+        told, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
+    told += (
+        f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
+        f"make it tighter, {cure} or ask for less"
     )
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
     return Design(None, Status.INFEASIBLE, told, nearest_feasible=nearest, search=design.search, tables=design.tables)

@@ -66,6 +66,21 @@ def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
     assert judged.share(judged.trimmed).good == still.share().good > judged.share().good
 
 
+def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_that_of_the_design():
+    tolerances = {f"mechanism.springs.{name}": {"normal": "5 %"} for name in ("pivot", "crank_pin", "slider_pin")}
+    spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.tolerances": tolerances})
+    made = tolerances_of(spec, spec.design, 0)
+    values = made.drawn(40)
+    judged = judge(made, values, cfmkit.analyze(spec), Run())
+    goods = []
+    for row in values:
+        part = cfmkit.analyze(spec.replace(dict(zip(made.paths, row.tolist(), strict=True)))).curve
+        force = part.force[(part.motion >= 0.001) & (part.motion <= 0.035)]
+        trimmed = force * cfmkit.evaluate(spec, ["force_mean"])["force_mean"].value / force.mean()
+        goods.append(np.abs(trimmed / 1.5 - 1.0).max() <= 0.02)
+    assert judged.share().good < sum(goods) == pytest.approx(judged.share(judged.trimmed).good, abs=1)
+
+
 def test_parts_without_a_result_are_bad_and_counted():
     spec = cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
     result = cfmkit.analyze(spec)

@@ -133,12 +133,23 @@ def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
     assert all(one.ok for one in cfmkit.check(cfmkit.analyze(design.spec)))
 
 
-def test_without_a_range_nothing_moves_and_that_is_said():
+def bought(deviation):
+    """Return what becomes of a design of bought springs, of which nothing may move, whose pivot's rate errs."""
     spec = cfmkit.load("configs/slider_crank_bought.yaml").replace(
-        {"design.yield": 0.9, "design.tolerances": {"mechanism.crank_length": {"normal": "0.05 mm"}}}
+        {"design.yield": 0.9, "design.tolerances": {"mechanism.springs.pivot": {"normal": deviation}}}
     )
-    design = with_design_margins(spec, cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE), Run())
-    assert "design.free" in dict(design.notes)["margins"]
+    return with_design_margins(spec, cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE), Run())
+
+
+def test_where_nothing_may_move_the_yield_is_reached_or_not_and_that_is_said(few):
+    design = bought("0.5 %")
+    assert "no values that may change ('design.free'); of 60 parts" in dict(design.notes)["margins"]
+    short = bought("8 %")
+    assert short.spec is None
+    assert short.status.exit_code == 4
+    assert "name such values" in short.message
+    assert "that of mechanism.springs.pivot" in short.message
+    assert float(short.nearest_feasible["design.yield"].split()[0]) < 90
 
 
 @pytest.mark.parametrize(

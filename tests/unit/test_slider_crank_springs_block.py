@@ -51,10 +51,21 @@ def test_a_block_has_the_numbers_of_single_runs(name):
         kinds.add(wanted["stiffness_class"].word)
         for item, measured in zip(NAMES[name], found.values, strict=True):
             value = wanted[item].value
-            got = measured[""][index]
+            got = measured["load"][index]
             loose = 1e-5 if item == "stiffness_drop" else 1e-14
             assert got == pytest.approx(np.nan if value is None else value, rel=1e-8, abs=loose, nan_ok=True), item
     assert len(kinds) >= 3
+
+
+def test_a_sweep_knows_the_metrics_of_the_branch_by_its_name():
+    """A single run has the branch `load`; requirements and trims of parts ask for it."""
+    spec = cfmkit.load("configs/slider_crank_bought.yaml")
+    asked = {"requirements": ({"metric": "force_mean[load]", "min": "1.4 N"}, {"metric": "force_max", "min": "1.4 N"})}
+    varied = {"mechanism.springs.pivot": ["0.045 N*m/rad", "0.05 N*m/rad"]}
+    found = cfmkit.sweep(spec.replace(asked), vary=varied, metrics=["force_mean[load]", "force_mean"])
+    named, plain = (found.table[name] for name in ("force_mean_load", "force_mean"))
+    np.testing.assert_array_equal(named, plain)
+    assert np.isfinite(named).all()
 
 
 @pytest.mark.parametrize(
@@ -142,7 +153,7 @@ def test_a_block_leaves_what_it_cannot_do():
     assert analyze_block(spec, Block(values, (Measure("stress_max"),), 3)) is None
     # What only a driven slider has is an empty cell, as in the row of one mechanism.
     found = analyze_block(spec, Block(values, (Measure("constant_travel"),), 3))
-    assert np.isnan(found.values[0][""]).all()
+    assert np.isnan(found.values[0]["load"]).all()
 
 
 def test_the_map_has_the_thresholds_to_six_digits():
@@ -151,7 +162,7 @@ def test_the_map_has_the_thresholds_to_six_digits():
     fold, per_degree = 0.1489334776, 180 / np.pi * 1e-2
     rates = fold * per_degree * (1 + np.linspace(-1e-6, 1e-6, 5))
     found = analyze_block(spec, Block({PATHS[2]: rates}, (Measure("stiffness_class"),), 5))
-    words = [api.family("slider-crank").words["stiffness_class"][int(kind)] for kind in found.values[0][""]]
+    words = [api.family("slider-crank").words["stiffness_class"][int(kind)] for kind in found.values[0]["load"]]
     assert words[:2] == ["bistable"] * 2
     assert words[3:] == ["local negative"] * 2
 

@@ -70,7 +70,8 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
 
     rates, legs, done = _rates(spec, block)
     warnings = {name: done.copy() for name in of_linkage(base)}
-    values = tuple({"": np.full(block.size, np.nan)} for _ in block.measures)
+    # named as the one branch of a single analysis is: a metric may ask for it
+    values = tuple({"load": np.full(block.size, np.nan)} for _ in block.measures)
     dense = any(measure.name in PLACES or measure.name in EACH for measure in block.measures)
     size = max(1, SLAB // (3 * GRID if dense else base.points))
     chosen = np.flatnonzero(done)
@@ -86,7 +87,7 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
         if not len(rows):
             continue
         for measure, found in zip(block.measures, values, strict=True):
-            found[""][rows] = slab.measured(measure)
+            found["load"][rows] = slab.measured(measure)
         for name, warned in of_springs(slab):
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[rows] = warned
         done[rows[undecided(slab) | slab.balanced]] = False
