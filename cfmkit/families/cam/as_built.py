@@ -18,7 +18,8 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,6 +94,7 @@ def analyze_built(spec: CamSpec) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=short,
         curves=(_curve(built),),
+        closed=MeasuredLoop(built, tracks),
         values=_values(built),
         warnings=(
             *found,
@@ -200,8 +202,7 @@ def _solved(
 ) -> Built:
     slider = assembly.track.start + travel
     states = assembly.track.states(slider)
-    (right_x, right), (left_x, left) = (track.at(slider) for track in tracks)
-    sides = Sides((right_x, left_x), (right, left))
+    sides = sides_at(tracks, slider)
     designed = Sides((states.x, states.x), (states.slope, states.slope))
     return Built(
         assembly,
@@ -212,6 +213,52 @@ def _solved(
         shares_of(assembly, designed, sides),
         displacement_origin(assembly),
     )
+
+
+def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides:
+    """Return where both rollers are at slider positions, (n,)."""
+    (right_x, right), (left_x, left) = (track.at(slider) for track in tracks)
+    return Sides((right_x, left_x), (right, left))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredLoop:
+    """The loop of a measured cam at every place (a `cfmkit.results.ClosedForm`): its tracks are known between nodes."""
+
+    built: Built
+    tracks: tuple[BuiltTrack, BuiltTrack]
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing displacements at which a side of the track bends [m]."""
+        travel, start = self.built.travel, self.built.assembly.track.start
+        nodes = np.concatenate([track.slider for track in self.tracks]) - start
+        inner = nodes[(nodes > travel[0]) & (nodes < travel[-1])]
+        return np.unique(np.concatenate([travel[[0, -1]], inner])) + self.built.origin
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Each of them: an extreme of a cut edge may stand anywhere [m]."""
+        return self.places
+
+    def effort(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the force on the way up or down at displacements of any shape [N]."""
+        return np.asarray(self._at(places).forces(_way(branch))[0].reshape(np.shape(places)))
+
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the stress below the more loaded contact at displacements of any shape [Pa]."""
+        return np.asarray(stress(pressure_of(self._at(places), _way(branch))).reshape(np.shape(places)))
+
+    def _at(self, places: FloatArray) -> Built:
+        """Return the mechanism at other displacements."""
+        built = self.built
+        travel = np.clip(np.ravel(places) - built.origin, built.travel[0], built.travel[-1])
+        sides = sides_at(self.tracks, built.assembly.track.start + travel)
+        return replace(built, travel=travel, sides=sides, shares={})
+
+
+def _way(branch: str) -> float:
+    return 1.0 if branch == "load" else -1.0
 
 
 def across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:

@@ -250,15 +250,20 @@ def loop_shares(solution: Solution) -> dict[str, float | None]:
     """Return the energy that each kind of friction takes over the window [J], and its share of the loop's area."""
     up, down = solution.up.lost or {}, solution.down.lost or {}
     places, window = solution.travel + solution.origin, solution.assembly.spec.analysis.window
-    low, high = between(window, (float(places[0]), float(places[-1]))) if window else (places[0], places[-1])
-    low, high = max(float(low), float(places[0])), min(float(high), float(places[-1]))
-    at = np.unique(np.concatenate([[low, high], places[(places > low) & (places < high)]]))
-    taken = {kind: float(np.trapezoid(np.interp(at, places, up[kind] + down[kind]), at)) for kind in up}
+    ends = between(window, (float(places[0]), float(places[-1]))) if window else None
+    taken = {kind: _integral(places, up[kind] + down[kind], ends) for kind in up}
     area = sum(taken.values())
     finite = np.isfinite(area) and area > 0
     return {f"loop_energy_{kind}": value if finite else None for kind, value in taken.items()} | {
         f"loop_share_{kind}": value / area if finite else None for kind, value in taken.items()
     }
+
+
+def _integral(places: FloatArray, values: FloatArray, window: tuple[float, float] | None) -> float:
+    """Return the integral of values over increasing places, from one end of a window to the other."""
+    low, high = np.clip(window or (places[0], places[-1]), places[0], places[-1])
+    at = np.unique(np.concatenate([[low, high], places[(places > low) & (places < high)]]))
+    return float(np.trapezoid(np.interp(at, places, values), at))
 
 
 def _bearing(solution: Solution) -> dict[str, float | None]:
@@ -426,8 +431,9 @@ def loop_area_per_friction(built: Built) -> float:
     """Return d(loop area)/d(friction) over the window [J], from a small friction either way."""
     loads, small = built.assembly.loads, 1e-6
     up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
-    inside = window_mask(built)
-    return float(np.trapezoid((up - down)[inside], built.travel[inside]) / small)
+    window = built.assembly.spec.analysis.window
+    ends = between(window, requested_travel(built)) if window else None
+    return _integral(built.travel + built.origin, up - down, ends) / small
 
 
 def half_extent(built: Built) -> float:

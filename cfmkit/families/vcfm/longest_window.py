@@ -1,8 +1,9 @@
 """The longest stretch of a curve on which the force stays within a band: for one curve or many at once.
 
 Found among samples first, each start with the place in the next cell where the force leaves the band. Then again with
-more samples around both ends and around the highest and the lowest force in between, until they are 1/4096 of a step
-apart: the ends are those of the curve, not of its samples.
+more samples around both ends and around the highest and the lowest force in between, until they are 1/4000000 of a step
+apart: the ends are those of the curve, not of its samples. Where the leaves buckle the curve has a corner, and a window
+that ends there, or is limited by the force there, is known no better than the last step.
 """
 
 from __future__ import annotations
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
 
     Levels = list[tuple[FloatArray, FloatArray]]
 
-ZOOMS, CLOSER, AROUND = 6, 4.0, np.linspace(-2.0, 2.0, 17)
+ZOOMS, CLOSER, AROUND = 11, 4.0, np.linspace(-2.0, 2.0, 17)
 """How often it is looked more closely, how much more each time, and where around a place, in steps."""
 
-FINE, FINER = np.linspace(-2.0, 2.0, 65), 16.0
+WHOLE = 4
+"""The first looks, which keep the samples elsewhere: of two windows of nearly one length the other may be longer."""
+
+LOOKS, FINE, FINER = 6, np.linspace(-2.0, 2.0, 65), 16.0
 """The same where a call of the model is what takes the time: more places in half as many calls."""
 
 
@@ -44,7 +48,7 @@ def extremes(
         Within which it is looked for.
     """
     (low, high), rows = span, np.arange(len(place))
-    for _ in range(ZOOMS):
+    for _ in range(LOOKS):
         near = np.clip(place[:, None] + FINE * step, low[:, None], high[:, None])
         place, step = near[rows, function(near).argmax(axis=1)], step / FINER
     return place
@@ -105,7 +109,9 @@ def flat_window(
         more = (centres[:, :, None] + AROUND * step[:, None, None]).reshape(len(force), -1)
         more = np.clip(np.where(np.isfinite(more), more, low), low, high)
         known = force_at(more)
-        places, force = np.hstack([places, more]), np.hstack([force, np.where(np.isfinite(known), known, -1.0)])
+        known = np.where(np.isfinite(known), known, -1.0)
+        whole = zoom < WHOLE
+        places, force = (np.hstack([places, more]), np.hstack([force, known])) if whole else (more, known)
         order = np.argsort(places, axis=1, kind="stable")
         places, force = np.take_along_axis(places, order, 1), np.take_along_axis(force, order, 1)
         step = step / CLOSER
@@ -113,9 +119,10 @@ def flat_window(
 
 
 def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[FloatArray, ...]:
-    """Return start and end of each curve's longest window that starts at a sample, and where it is highest and lowest.
+    """Return start and end of each curve's longest window, and where it is highest and lowest.
 
-    Between two samples the force is linear.
+    Between two samples the force is linear. The longest of the windows that start at a sample is widened to where the
+    force leaves the band before it.
     """
     levels = _levels(force)
     reach = _reach(levels, flatness)
@@ -136,7 +143,15 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
     inside = (np.arange(n) >= first[:, None]) & (np.arange(n) <= last[rows, first][:, None])
     top = places[rows, np.where(inside, force, -np.inf).argmax(axis=1)]
     bottom = places[rows, np.where(inside, force, np.inf).argmin(axis=1)]
-    found = places[rows, first], end[rows, first], top, bottom
+    at_end = here[rows, first] + np.nan_to_num(share[rows, first] * (there - here)[rows, first])
+    most, least = np.maximum(high[rows, first], at_end), np.minimum(low[rows, first], at_end)
+    before = np.maximum(first - 1, 0)
+    level = np.where(force[rows, before] > most, least / (1.0 - flatness), (1.0 - flatness) * most)
+    with np.errstate(all="ignore"):
+        back = (level - force[rows, first]) / (force[rows, before] - force[rows, first])
+    back = np.clip(np.where(np.isfinite(back), back, 0.0), 0.0, 1.0)
+    start = places[rows, first] + back * (places[rows, before] - places[rows, first])
+    found = start, end[rows, first], top, bottom
     return tuple(np.where(none, np.nan, one) for one in found)
 
 

@@ -13,10 +13,11 @@ import numpy as np
 
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.longest_window import extreme, flat_window
+from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -213,13 +214,15 @@ class Solution:
 
     def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
         """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
-        before = push.travel <= end
-        leaves, spring = push.leaves.stress[before], push.spring_stress[before]
+        travel = push.travel[push.travel <= end]
         if push.travel[0] < end < push.travel[-1]:
-            place = np.array([end])
-            leaves = np.append(leaves, self.sampler.leaves(place).stress)
-            spring = np.append(spring, self.sampler.spring(place + push.preload)[1])
-        return float(leaves.max(initial=0.0)), float(spring.max(initial=0.0))
+            travel = np.append(travel, end)
+        laws = (
+            lambda places: self.sampler.leaves(places).stress,
+            lambda places: self.sampler.spring(places + push.preload)[1],
+        )
+        leaves, spring = (_largest(law, travel) for law in laws)
+        return leaves, spring
 
     @property
     def window_force(self) -> float | None:
@@ -260,3 +263,14 @@ class Solution:
 def force_of(sampler: PartSampler, travel: FloatArray, preload: float) -> FloatArray:
     """Return the force on the shuttle at some travels and a preload [N]."""
     return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
+
+
+def _largest(law: Callable[[FloatArray], FloatArray], travel: FloatArray) -> float:
+    """Return the largest value of a law at some travels and between them; zero where there is no travel."""
+    if not len(travel):
+        return 0.0
+    samples = np.asarray(law(travel))
+    most, _ = extremes(
+        lambda at: np.asarray(law(at.ravel())).reshape(at.shape), travel[None], samples[None], uneven=True
+    )
+    return max(float(most[0]), 0.0)
