@@ -53,7 +53,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     """
     from cfmkit.runs.specfile import bind, read_spec
 
-    return bind(read_spec(os.fspath(path), changes))
+    return bind(read_spec(os.fspath(path), (changes,) if isinstance(changes, str) else changes))
 
 
 def loads(text: str | bytes, source: str = "text") -> Spec:

@@ -11,7 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.runs import run_findings, specfile
 from cfmkit.runs.files import files
@@ -41,6 +41,15 @@ def test_the_readme_example_works():
 def test_load_takes_changes_as_the_option_set_does():
     spec = cfmkit.load(CAM, ["mechanism.roller_radius=10 mm", "analysis.points=11"])
     assert (spec.mechanism.roller_radius, spec.analysis.points) == (0.01, 11)
+
+
+def test_load_takes_one_change_as_it_stands():
+    assert cfmkit.load(CAM, "mechanism.roller_radius=10 mm").mechanism.roller_radius == pytest.approx(0.01)
+
+
+def test_an_empty_block_is_called_empty(spec):
+    with pytest.raises(SpecError, match="vary: the block is empty; at least 1 must be there"):
+        cfmkit.sweep(spec, vary={})
 
 
 def test_loads_names_its_source_in_every_fault():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import subprocess
 import sys
@@ -606,6 +607,14 @@ def test_elastica_that_are_pulled_taut_have_no_limit_point(support):
     assert early.cures == ("analysis.fidelity=extensible",)
     freed = cfmkit.analyze(result.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
     assert freed.curve.motion[-1] == pytest.approx(8 * MM)
+
+
+def test_elastica_that_a_force_pulls_taut_before_the_first_point_are_said_to_be():
+    drive = (("kind: displacement", "kind: force"), ("travel: 8 mm", "force: 1e6 N"))
+    result = cfmkit.analyze(cfmkit.loads(functools.reduce(lambda text, change: text.replace(*change), drive, TAUT)))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "the beams are taut at " in result.message
+    assert "limit point" not in result.message
 
 
 @pytest.mark.parametrize(

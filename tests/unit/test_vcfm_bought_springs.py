@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.families.vcfm.leaves.springs import Coils
+from cfmkit.results import Status
 from cfmkit.stock.springs.catalogue import generic
 
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
@@ -73,6 +75,22 @@ def test_slack_and_overstretched_springs_are_told(spec):
     over = cfmkit.analyze(spec.replace({"mechanism.springs.max_elongation": "6 mm"}))
     (told,) = [item.message for item in over.warnings if item.name == "spring_overstretched"]
     assert "deflected by 6.674 mm, their limit is 6 mm, reached at 4.08 mm of travel" in told
+
+
+def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec):
+    springs = spec.mechanism.springs
+    room = springs.free_length - springs.wound.wound("compression").body_length
+    pressed = cfmkit.analyze(spec.replace({"analysis.preloads": (0.0, 8e-3)}))
+    assert pressed.status is Status.PARTIAL
+    assert "its turns touch" in pressed.message
+    assert "'mechanism.springs.free_length' of 22.26 mm" in pressed.message
+    assert pressed.curve.motion[-1] == pytest.approx(4.754e-3)
+    assert room * 0.99 < pressed.load_cases[0].motion[-1] + 8e-3 <= room * (1 + 1e-9)
+    closed = cfmkit.analyze(spec.replace({"analysis.preloads": (60e-3,)}))
+    assert closed.status is Status.NO_EQUILIBRIUM
+    told = float(re.search(r"free_length'\s+of ([0-9.]+) mm", pressed.message)[1])
+    cured = pressed.spec.replace({"mechanism.springs.free_length": f"{told} mm"})
+    assert cfmkit.analyze(cured).status is Status.COMPLETE
 
 
 def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(spec):

@@ -315,6 +315,7 @@ def test_leaves_too_thin_to_be_traced_are_said_to_be(thickness, status):
     found = analyzed(*about, preloads="[0 mm, 2.5 mm]")
     assert found.status is status
     assert "the leaves were followed to 0 mm only" in found.message
+    assert "'mechanism.bistable.thickness'" in found.message
 
 
 def test_what_is_not_flat_is_told_of_the_part_of_the_window_that_the_curve_covers():

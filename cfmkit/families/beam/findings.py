@@ -114,12 +114,16 @@ def ending_of(solution: Solution) -> PathEnding:
     path = solution.path
     said = in_units(solution.assembly, path.message or path.status.value)
     rigid = solution.spec.fidelity == "inextensible"
-    if len(solution.keep) < 2:
-        return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
     taut = list(_taut(solution)) if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) else []
+    if not taut and len(solution.keep) < 2:
+        return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
     if not taut:
         return PathEnding(said)
-    where = format_short(float(solution.motion[-1]), solution.motion_dimension)
+    # a load may pull them straight before the first point of the curve, of which there is none then
+    if len(solution.keep) < 2:
+        where = drive_text(solution.assembly, float(path.drive[-1]))
+    else:
+        where = format_short(float(solution.motion[-1]), solution.motion_dimension)
     return PathEnding(
         f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams go no further: allow stretching "
         "('mechanism.axial: true')",
@@ -129,7 +133,9 @@ def ending_of(solution: Solution) -> PathEnding:
 
 def _taut(solution: Solution) -> Iterator[str]:
     """Yield the beams that are pulled straight at the last point, each with its length and the way between its ends."""
-    path, last = solution.path, int(solution.keep[-1])
+    path, last = solution.path, int(solution.keep[-1]) if len(solution.keep) > 1 else len(solution.path) - 1
+    if last < 0:
+        return
     for name, beam in path.layout.network.beams.items():
         line = path.shape(name, last)
         chord = line[-1] - line[0]

@@ -89,14 +89,25 @@ def share_of(positive: Positive) -> float:
 
 
 def spring_room(spec: VcfmSpec) -> float:
-    """Return how far the spring can be compressed until its rigid blocks meet [m]; infinite where none do."""
-    about = spec.mechanism.positive
+    """Return how far the spring can be compressed until its blocks or its turns meet [m]; infinite where none do."""
+    about, bought = spec.mechanism.positive, spec.mechanism.springs
     if about is None:
-        return inf
+        return inf if bought is None else _room_of_coils(bought)
     rims = 2.0 * RIM * about.thickness
     if about.structure == "diamond":
         return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
     return 2.0 * about.radius - rims if about.structure == "u-shape" and about.radius else inf
+
+
+def _room_of_coils(springs: BoughtSprings) -> float:
+    if springs.kind == "extension" or springs.free_length is None:
+        return inf
+    return max(springs.free_length - closed_length(springs), 0.0)
+
+
+def closed_length(springs: BoughtSprings) -> float:
+    """Return the length of a spring with its turns on each other [m]; 0 where its wire is not known."""
+    return 0.0 if springs.wound is None else springs.wound.wound(springs.kind).body_length
 
 
 def parts(spec: VcfmSpec) -> Parts:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -155,13 +155,13 @@ class ExactSampler:
         self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
         self.pulled = traced(network, "shuttle", -back)
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
-        self.problem = problem_of("leaves were", (self.pushed, self.pulled), 1.0)
+        self.problem = problem_of("bistable", (self.pushed, self.pulled), 1.0)
         if self.coils is not None:
             return
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
-        self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
+        self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
@@ -214,10 +214,14 @@ class ExactSampler:
         )
 
 
-def problem_of(subject: str, paths: Sequence[Any], travel: float) -> str:
+def problem_of(part: Literal["bistable", "positive"], paths: Sequence[Any], travel: float) -> str:
     """Return how far a part was followed, in shares `travel` of its node, and why no farther; empty if to the end."""
     short = next((one for one in paths if one.problem), None)
-    return "" if short is None else f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}"
+    if short is None:
+        return ""
+    subject = {"bistable": "leaves were", "positive": "spring was"}[part]
+    keys = ", ".join(f"'mechanism.{part}.{size}'" for size in ("length", "angle", "thickness"))
+    return f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}; look at {keys}"
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:

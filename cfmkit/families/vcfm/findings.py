@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate, too_soft
 from cfmkit.families.vcfm.bought_parts import spring_faults
-from cfmkit.families.vcfm.build import spring_room
+from cfmkit.families.vcfm.build import closed_length, spring_room
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.s_form import POLE
 from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
@@ -50,7 +50,7 @@ FINDINGS = {
     "out_of_plane_buckling": "the leaves are so narrow that they buckle out of the plane first",
     "overstressed": "the stress exceeds the allowable one",
     "imperfection": "waviness of the leaves as made spoils the flatness",
-    "spring_closed": "preload and travel compress the spring until its rigid blocks touch",
+    "spring_closed": "preload and travel compress the spring until its rigid blocks, or its turns, touch",
     "theory_range": "an angle or a travel is outside the range in which the closed forms hold",
     "unstable_branch": "the reported force is that of an unstable equilibrium, which a real leaf leaves",
     "truss_law": "the paper's truss law neglects bending: force and flatness are not those of the mechanism",
@@ -442,15 +442,20 @@ def spring_closed(solution: Solution) -> Iterator[Finding]:
     most = max(spec.analysis.preloads)
     if most + spec.travel <= room * (1 + ROUNDING):
         return
-    positive, needed = spec.mechanism.flexures, most + spec.travel - room
+    positive, bought, needed = spec.mechanism.positive, spec.mechanism.springs, most + spec.travel - room
     place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
-    if positive.structure == "diamond":
+    meeting = "blocks" if bought is None else "turns"
+    if bought is not None:
+        key, size = "mechanism.springs.free_length", at_least(closed_length(bought) + most + spec.travel)
+    elif positive is None:
+        return
+    elif positive.structure == "diamond":
         key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
     else:
         key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
     yield finding(
         "spring_closed",
-        f"the spring closes: its blocks touch when it is compressed by {mm(room)}, with a preload of {mm(most)} "
+        f"the spring closes: its {meeting} touch when it is compressed by {mm(room)}, with a preload of {mm(most)} "
         f"{place}, and curves end there; use less preload ('analysis.preloads') or travel ('analysis.travel'), or "
         f"'{key}' of {size}",
         f"{key}={size}",

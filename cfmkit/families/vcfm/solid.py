@@ -121,14 +121,14 @@ class SolidSampler(ExactSampler):
         leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
         self.pushed, self.mesh_error = _path(leaves.fine), leaves.error
         self.pulled = _pulled(spec, leaf, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
-        self.sides, self.problem = [], problem_of("leaves were", (self.pushed, self.pulled), 1.0)
+        self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
         for one in spring:
             self.chain = spring_chain(spec)
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
             springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
             pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
-            self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
+            self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
