@@ -256,7 +256,16 @@ def _number(report: Report, name: str) -> NumberRow:
     if name == "allowable_stress":
         return NumberRow(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
     window = left_of(window_of(report.result), report.result)
-    return NumberRow(words(name), _branches(report, name, report.metrics) + _over(report, name, window))
+    rule = _allowed(report) if name == "safety_factor" else ""
+    return NumberRow(words(name), _branches(report, name, report.metrics) + _over(report, name, window) + rule)
+
+
+def _allowed(report: Report) -> str:
+    """Return the stress that a safety factor is of, where no row of its own says it."""
+    allowed = report.result.allowable_stress
+    if allowed is None or "allowable_stress" in report.metrics:
+        return ""
+    return f", of {format_short(allowed, 'stress')}{_rule(report.result.spec)}"
 
 
 def _stroke(report: Report) -> str:

@@ -195,7 +195,12 @@ def _bound(document: Document, wanted: RunRequest) -> Spec:
 
 
 def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
-    found = verb.compute(spec, run)
+    try:
+        found = verb.compute(spec, run)
+    except SpecError as error:  # what a model refuses has a path, and the file knows its place
+        raise SpecError(
+            [one if one.source else document.problem(one.path, one.message) for one in error.problems]
+        ) from None
     if found.result.status is Status.INVALID:
         raise SpecError([placed(document, verb.name, found.result.message)])
     return found

@@ -282,3 +282,21 @@ def test_the_hint_for_a_sweep_of_nothing_varies_a_value_of_that_mechanism(cli, n
     assert cli("sweep", "mine.yaml", "--vary", hint, "--max-points", "4").err.count("5 points") == 1
     told = cli("sensitivity", "mine.yaml").err
     assert f"--vary '{hint.partition('=')[0]}=normal" in told
+
+
+def test_what_a_model_refuses_is_told_with_its_place_in_the_file(cli, cam):
+    spec = cli.folder / "cam.yaml"
+    text = spec.read_text().replace(
+        "  roller_radius: 16 mm\n", "  left: {roller_radius: 15 mm}\n  roller_radius: 16 mm\n", 1
+    )
+    spec.write_text(text)
+    line = text[: text.index("  left: ")].count("\n") + 1
+    run = cli(*RUN)
+    assert run.code == ExitCode.INVALID
+    assert run.err.startswith(f"cam.yaml:{line}:9: mechanism.left: the quasi-static model is symmetric")
+
+
+def test_a_safety_factor_says_of_which_stress_it_is(cli, cam):
+    pressed = "mechanism.contact={material: steel-s235, width: 10 mm}"
+    run = cli(*RUN, "--set", pressed, "--set", "mechanism.safety_factor=2")
+    assert "of 117.5 MPa: yield strength / 2" in " ".join(run.out.split())
