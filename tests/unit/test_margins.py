@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
+from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families.base import Run
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.studies import margins
@@ -183,6 +185,37 @@ def test_a_closed_model_is_moved_as_well():
     assert before < 50.2 < after
 
 
+class TwoLimits:
+    """A part of which one limit misses most, more the larger the value is, and another misses fewer then."""
+
+    def __init__(self):
+        self.rows = SimpleNamespace(matrix=np.eye(3), constant=np.zeros(3))
+        self.made = SimpleNamespace(nominal=np.zeros(2), seed=0, drawn=self.drawn)
+
+    @staticmethod
+    def drawn(count, seed):
+        return np.random.default_rng(seed).standard_normal((count, 2))
+
+    def __call__(self, x, errors):
+        left = 1.0 - 0.4 * x[0]
+        return np.array([left + 2.0 * errors[0], left - 2.0 * errors[0], x[0] - 0.5 + 0.2 * errors[1]])
+
+
+def test_the_largest_yield_is_found_where_the_worst_parts_cannot_be_helped():
+    """Aiming at 99 % ends where the worst parts of both limits are equally bad, and few parts are good."""
+    sight = TwoLimits()
+    drawn = sight.drawn(4000, 1)
+    about = np.array([0, 0, 1])
+    problem = RobustProblem(
+        sight, np.array([[0.0, 0.9]]), drawn, np.ones(2), sight.rows.matrix, sight.rows.constant, about, 0.99
+    )
+    alone = margins.checked(sight, with_margins(problem, np.array([0.1])).x)
+    largest = max(margins.checked(sight, np.array([x])) for x in np.linspace(0.0, 0.9, 46))
+    _, good = margins._held(problem, sight, np.array([0.1]))
+    assert alone < 0.85 * largest
+    assert good >= 0.95 * largest
+
+
 def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path, capsys):
     options = ["--set", "design.tolerances={mechanism.material.youngs_modulus: {normal: 12 %}, "
                "mechanism.beam.width: {normal: 0.05 mm}}", "--set", "design.yield=95 %"]  # fmt: skip
@@ -190,4 +223,5 @@ def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path
     found = json.loads(capsys.readouterr().out)
     assert code == 4
     assert "youngs_modulus" in found["message"]
-    assert found["nearest_feasible"]["design.yield"].endswith(" %")
+    # the force follows E: of parts 12 % off 73 % are within 0.2 N of 1.5 N
+    assert 60 <= float(found["nearest_feasible"]["design.yield"].removesuffix(" %")) <= 85
