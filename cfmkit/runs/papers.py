@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 VERDICTS: Mapping[str, str] = {
     "agrees": "computed here, the same to its last digit, or to the tolerance that the row gives a reason for",
-    "given": "an input: the example holds it as printed",
+    "given": "an input: the example holds it as printed, or the command beside it sets it",
     "misprint": "wrong as printed: the row says why, and what is right",
     "disagrees": "computed here with another result; the row says what is known of the reason",
     "measured there": "an experiment of the authors; if the model has the same quantity, its value is shown beside it",
@@ -340,7 +340,7 @@ _TWO: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt")
-} | {"abs": abs, "min": min, "max": max}
+} | {"abs": abs, "min": min, "max": max, "count": len}
 _BLOCKS = ("mechanism", "analysis", "design")
 
 

@@ -19,6 +19,7 @@ TABLES = {  # numbers in the body of each table, counted in the papers
     ("sanchez-salinas-2022", "Table 1"): 14,
     ("sanchez-salinas-2022", "Table 2"): 6,
     ("sanchez-salinas-2022", "Table 3"): 33,
+    ("lan-2010", "Table 1"): 5,
     ("lan-2010", "Table 2"): 12,
     ("lan-2010", "Table 3"): 24,
     ("lan-2010", "Table 4"): 20,
