@@ -7,6 +7,7 @@ import pytest
 
 from cfmkit.elastica import (
     CLAMPED,
+    PINNED,
     Beam,
     Control,
     Displacement,
@@ -14,6 +15,7 @@ from cfmkit.elastica import (
     Node,
     Path,
     PathStatus,
+    Rotation,
     Section,
     guided,
     trace,
@@ -65,6 +67,27 @@ def test_a_path_within_its_tolerance_marks_every_point_accurate() -> None:
     path = trace(strip(), BENDING)
     assert path.status is PathStatus.COMPLETE
     assert path.accurate.all()
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+def test_a_path_on_which_nothing_bears_a_load_is_as_accurate_as_its_poses(tolerance: float) -> None:
+    """A strip on pins is turned by one end: forces are rounding, and no mesh makes them agree."""
+    stiff, soft = Section(88e9, 8e-3, 1.2e-3), Section(1.8e9, 8e-3, 0.4e-3)
+    nodes = {
+        "hinge": Node(0.0186, 0.0337, PINNED),
+        "end": Node(0.0185, 0.0788),
+        "joint": Node(0.0532, 0.0035),
+        "wall": Node(0.0733, 0.0398, CLAMPED),
+    }
+    beams = {
+        "arm": Beam("joint", "hinge", stiff),
+        "strip": Beam("end", "hinge", soft, start_joint="pin"),
+        "leg": Beam("joint", "wall", stiff),
+    }
+    path = trace(Network(nodes, beams), Rotation("end", np.array([-0.3, -0.9])), Control(tolerance))
+    assert path.status is PathStatus.COMPLETE
+    assert path.error < 1e-8
+    assert np.abs(path.effort).max() < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -132,3 +132,14 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
     back = trace(net, Displacement("b", np.pi, went), control)
     assert back.events == ()
     np.testing.assert_allclose(back.effort[back.at_requested] / critical, factors, rtol=2e-5)
+
+
+@pytest.mark.parametrize("slenderness", [1000, 5000])
+def test_a_long_first_step_leads_to_the_side_that_a_column_is_bent_to(slenderness: float) -> None:
+    """One that jumps over the corner may come to lie on the mirror image, with the mean slope that is expected."""
+    first = 26.6 * np.pi**2 / slenderness**2  # in critical shortenings
+    drive = Displacement("b", np.pi, np.array([first, 0.1]) * LENGTH)
+    bent = 0.0864 * LENGTH * np.sqrt(12) / slenderness
+    path = trace(column(slenderness, clamped=False), drive, Control(1e-4, imperfection=bent))
+    assert path.status is PathStatus.COMPLETE
+    assert np.sign(path.motion("a")[1:, 2]).tolist() == [np.sign(path.fits["x"].angle(0.0, 0.5))] * (len(path) - 1)

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.equilibrium.meshed_network import Solver
 
 
+_ROUNDING = (
+    30 * np.finfo(float).eps
+)  # share of the stiffest segment's force for one unit of motion: rounding, with room
+_NOISE = 0.1  # change of forces that small, by half the step, as a share of themselves: there is no force
+
+
 def largest_force(trail: Trail) -> FloatArray:
     """Return the largest dimensionless force or moment at the end of a beam at every point."""
     forces: FloatArray = np.abs(trail.points.y[:, trail.solver.n_free : trail.solver.n]).max(axis=1)
@@ -40,9 +46,20 @@ def errors(problem: PathProblem, trail: Trail, indices: list[int], largest: floa
     fine, scale = trail.solver.finer(tolerance), max(1e-12, largest)
     ys, drives, far = trail.points.y[indices], trail.points.drive[indices], 0.1 * max(1.0, scale)
     found = []
-    for k, (pose, force, most) in zip(indices, fine.solve_each(ys, drives)[1].tolist(), strict=True):
+    changes = fine.solve_each(ys, drives)[1]
+    if changes[:, 1].max() > _NOISE * scale and largest < _ROUNDING * _stiffest(fine):
+        scale = 1.0  # nothing bears a load: forces are errors themselves
+    for k, (pose, force, most) in zip(indices, changes.tolist(), strict=True):
         found.append(max(pose, force / scale) if most <= far else _across(trail, fine, k, scale, far))
     return found
+
+
+def _stiffest(solver: Solver) -> float:
+    """Return the largest force on the end of a segment that is moved by a unit length, dimensionless."""
+    whole = np.add.reduceat(solver.table[:, :, 1:4].sum(axis=1), solver.cut.segment_step[:-1])
+    length, turn, stretch = whole.T
+    bent = 12.0 / (length**2 * turn)
+    return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
 
 
 def _across(trail: Trail, fine: Solver, index: int, scale: float, far: float) -> float:

@@ -43,7 +43,8 @@ from cfmkit.elastica.kernels.status_codes import (
     WEIGHT,
 )
 
-VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
+VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc, and between
+# a step of the drive and those at either end of it: of 256 slightly bent columns two went to the wrong side without it
 LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 STRETCH = 1.3  # factor on a step that lands on a requested value: rather than a short one after it
@@ -53,6 +54,7 @@ CREEPS, STRAIGHT = (
     100.0,
 )  # short steps in a row that are enough; change of forces for one of poses that counts for ten
 NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
+STILL = 1e-7  # change of a pose that is none: rounding has any direction
 AGAIN = 1e-5  # change of a pose between two solutions of one point
 SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
 
@@ -136,7 +138,7 @@ def _creeps(slow, ahead, moved, new, old, options, n_free, n):
 def _refused(code, moved, missed, bent, turn, count):
     """Tell whether a step led to no equilibrium, too far, or off what the points before it or its slopes foretell."""
     off = max(bent, missed if count > 1 else 0.0)
-    return code != SOLVED or not (moved <= turn and off <= MISSED * moved + 1e-7)
+    return code != SOLVED or not (moved <= turn and off <= MISSED * moved + STILL)
 
 
 @kernel
@@ -164,15 +166,39 @@ def _slopes_behind(code, m, n_free, natural, weight, tangent, slope, room, scrat
 
 
 @kernel
-def _strays(code, known, ahead, options, both, state, index, n_free, n):
+def _veers(old, new, one, other, ahead, n_free, n):
+    """Tell whether a step by the drive leads away from where the poses go by their slopes before or behind it.
+
+    A jump across a corner to the mirror image of a path may have the right mean slope by chance.
+    """
+    along, across, size, first, last = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(new.shape[0]):
+        if i < n_free or (i >= n and (i - n) % 6 < 3):
+            change = new[i] - old[i]
+            along += change * one[i]
+            across += change * other[i]
+            size += change * change
+            first += one[i] * one[i]
+            last += other[i] * other[i]
+    if changes(old, new, n_free, n) <= STILL:
+        return False
+    sense = np.sign(ahead)
+    return sense * along < VEER * np.sqrt(size * first) or sense * across < VEER * np.sqrt(size * last)
+
+
+@kernel
+def _strays(code, known, ahead, options, points, both, state, index, n_free, n):
     """Tell whether in a step along the arc that led somewhere more happened than one limit point or one bifurcation.
 
     Or, from the slopes before and behind it, whether poses change in another direction: behind a sharp turn lie other
-    paths.
+    paths. points, both: before and behind a step, and the slopes there.
     """
-    if code != SOLVED or options[BY_DRIVE] > 0.5:
+    if code != SOLVED:
         return False
     old, new = both
+    if options[BY_DRIVE] > 0.5:
+        calm = known and state[1] == index and abs(ahead) > SHORTER * options[SMALLEST]
+        return calm and _veers(points[0], points[1], old, new, ahead, n_free, n)
     changed, last = abs(state[1] - index), new.shape[0] - 1
     several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
     if several and options[WATCHED] > 0.5 and ahead > LOOKED_INTO * options[LONGEST]:
@@ -227,7 +253,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
         refused = _refused(code, moved, missed, bent, turn, count)
         passed = _passed(state, index, count, natural, options[WATCHED] > 0.5, abs(ahead) / smallest)
-        passed = passed or _strays(code, known, ahead, options, (slopes[0], slope), state, index, n_free, n)
+        passed = passed or _strays(code, known, ahead, options, (old, new), (slopes[0], slope), state, index, n_free, n)
         if refused or passed or not (natural or _forward(border, new_tangent)):
             step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
             if abs(step) < smallest or denied >= options[LANDINGS]:

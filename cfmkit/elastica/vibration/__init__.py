@@ -1,9 +1,13 @@
 """Linear vibration of networks about the equilibria of a path: frequencies, and flutter under loads that turn.
 
-`frequencies` takes a `cfmkit.elastica.outcome.path.Path` and the `NetworkMasses` of its parts. Assumes: small
-motions, no damping, what is held does not move. References ---------- [Me] L. Meirovitch, Principles and Techniques
-of Vibrations (1997): the eigenvalue problem, Ritz's method. [Be] M. Beck, Z. angew. Math. Phys. 3 (1952) 225: the
-column under a force that turns with its end.
+`frequencies` takes a `cfmkit.elastica.outcome.path.Path` and the `NetworkMasses` of its parts.
+
+Assumes: small motions, no damping, what is held does not move.
+
+References
+----------
+[Me] L. Meirovitch, Principles and Techniques of Vibrations (1997): the eigenvalue problem, Ritz's method.
+[Be] M. Beck, Z. angew. Math. Phys. 3 (1952) 225: the column under a force that turns with its end.
 """
 
 from __future__ import annotations
