@@ -270,9 +270,9 @@ class Branch:
             raise Undefined(f"branch {self.name!r} turns back: its {self.kind} is many-valued")
         return Function(self.trace.motion[::way], self.trace.effort[::way])
 
-    @cached_property
-    def around(self) -> tuple[FloatArray, FloatArray, int]:
-        """Motion and relative offset ``F / F_ref - 1``, increasing, with the reference pose at the index given.
+    @property
+    def effort_at_reference(self) -> float:
+        """Effort at the reference pose [N or N m].
 
         Raises
         ------
@@ -280,14 +280,27 @@ class Branch:
             If the branch does not reach the reference pose, is many-valued, or has no effort there.
         """
         place, model = self.reference, self.frame.closed
-        here, (motion, effort) = self.at(place), self.function
+        here = self.at(place)
         if model is not None:  # an interpolated value may hide that there is no effort
             here = float(model.effort(self.name, np.array([place]))[0])
-        if abs(here) <= ZERO * float(np.nanmax(np.abs(effort))):
+        if abs(here) <= ZERO * float(np.nanmax(np.abs(self.function.effort))):
             raise Undefined(f"the {self.kind} at the reference pose is zero")
-        index, offset = int(motion.searchsorted(place)), effort / here - 1
-        motion = np.concatenate((motion[:index], [place], motion[index:]))
-        return motion, np.concatenate((offset[:index], [0.0], offset[index:])), index
+        return here
+
+    @cached_property
+    def many(self) -> ManyBranches:
+        """The branch as one row, over the window's ends: at every place where the model gives that, else as sampled.
+
+        Raises
+        ------
+        Undefined
+            If it is sampled and folds back.
+        """
+        if self.closed is not None:
+            return self.closed
+        motion, effort = self.function
+        low, high, pose = (np.array([place]) for place in (*self.ends, self.reference))
+        return ManyBranches(motion[None, :], effort[None, :], low, high, pose=pose)
 
     @cached_property
     def closed(self) -> ManyBranches | None:

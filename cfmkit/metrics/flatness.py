@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics import spread
+from cfmkit.metrics import ranges_many, spread
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 from cfmkit.metrics.traces import BranchTrace, Undefined, Window
@@ -72,21 +72,20 @@ def deviation_from_target(branch: Branch) -> float:
     return float(spread.deviation_from_target(branch.spread, branch.frame.needed_target()))
 
 
+@np.errstate(all="ignore")
 def rms_to_target(branch: Branch) -> float:
     """Return the root mean square of F - target at places uniform in the motion, the window's start excluded."""
-    target = branch.frame.needed_target()
-    offset = _uniform(branch)[1] - target
-    return sqrt(float(offset @ offset) / UNIFORM_POINTS)
+    target = np.array([branch.frame.needed_target()])
+    branch.inside  # noqa: B018  (raises where the window is not covered)
+    return float(ranges_many.rms_to_target(branch.many, target)[0])
 
 
+@np.errstate(all="ignore")
 def _uniform(branch: Branch) -> tuple[FloatArray, FloatArray]:
     """Return places uniform in the motion, the start of the window left out, and the efforts there."""
     branch.inside  # noqa: B018  (raises where the window is not covered)
-    lo, hi = branch.ends
-    places = lo + (hi - lo) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
-    function, model = branch.function, branch.frame.closed
-    sampled = np.interp(places, function.motion, function.effort)
-    return places, sampled if model is None else model.effort(branch.name, places)
+    places = ranges_many.uniform_places(branch.many)
+    return places[0], branch.many.at(places)[0]
 
 
 def deviation_from_curve(branch: Branch) -> float:

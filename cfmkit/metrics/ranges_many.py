@@ -1,7 +1,8 @@
-"""Metrics that are lengths of travel, for many curves at once: those of `ranges`, row by row.
+"""Metrics that are lengths of travel, for many curves at once, row by row; one curve is one row (`ranges`).
 
-Each row is one branch: its motion increases, and its effort is known at every sample.
-The formulas are those for one curve, in the same order.
+Each row is one branch, whose motion increases. Places between two samples are found by linear interpolation. A sample
+without equilibrium (no effort) is outside every band, and so is the way from there to the next sample. Where the model
+is known at every place places are solved for, whatever the samples.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class ManyBranches:
     Attributes
     ----------
     motion, effort : (d, n) array
-        Increasing along each row [m or rad], and finite [N or N m].
+        Increasing along each row [m or rad], and what is known there [N or N m].
     low, high : (d,) array
         Ends of the window, or of the travel where there is no window.
     pose : (d,) array, optional
@@ -78,26 +79,31 @@ class ManyBranches:
         start, stop = self.motion[rows, left], self.motion[rows, left + 1]
         first, second = self.effort[rows, left], self.effort[rows, left + 1]
         inside = (second - first) / (stop - start) * (places - start) + first
+        inside = np.where(places == start, first, inside)  # though there is no effort at the next sample
         beyond = np.where(places >= self.motion[:, -1:], self.effort[:, -1:], inside)
         found: FloatArray = np.where(places <= self.motion[:, :1], self.effort[:, :1], beyond)
         return found
 
 
 def rms_to_target(many: ManyBranches, target: FloatArray) -> FloatArray:
-    """Return `flatness.rms_to_target` of each row, (d,); `target` is (d,)."""
-    low, high = many.low[:, None], many.high[:, None]
-    places = low + (high - low) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
-    offset = many.at(places) - target[:, None]
+    """Return the root mean square of F - target at `uniform_places` of each row, (d,); `target` is (d,)."""
+    offset = many.at(uniform_places(many)) - target[:, None]
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / UNIFORM_POINTS))
 
 
+def uniform_places(many: ManyBranches) -> FloatArray:
+    """Return places uniform in the motion, the start of the window left out, (d, `UNIFORM_POINTS`)."""
+    low, high = many.low[:, None], many.high[:, None]
+    return np.asarray(low + (high - low) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS)
+
+
 def range_95(many: ManyBranches) -> FloatArray:
-    """Return `ranges.range_95` of each row, (d,); call it with numpy's warnings off, as all of these."""
+    """Return d - c of each row, (d,), with F(c) = 0.95 F(d); call it with numpy's warnings off, as all of these."""
     return many.high - _first_95(many)
 
 
 def range_95_fraction(many: ManyBranches) -> FloatArray:
-    """Return `ranges.range_95_fraction` of each row, (d,)."""
+    """Return (d - c)/d of each row, (d,)."""
     return np.where(many.high > 0, (many.high - _first_95(many)) / many.high, np.nan)
 
 
@@ -128,7 +134,7 @@ def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, F
 
 
 def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
-    """Return `ranges.band_range` of each row about its reference pose, (d,); one of `BAND_RANGES`."""
+    """Return the width within a tolerance about the reference pose of each row, (d,); one of `BAND_RANGES`."""
     if many.exact is not None:
         return many.solved[1][:, list(BAND_RANGES.values()).index(tolerance)]
     motion, place = many.motion, many.reference
@@ -214,7 +220,7 @@ def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
 def usable_interval(
     branches: Sequence[ManyBranches], target: FloatArray, band: float, valid: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return start and end of `ranges.usable_interval` of each row, (d,) each; NaN where there is none.
+    """Return start and end of the largest usable interval of each row, (d,) each; NaN where there is none.
 
     Parameters
     ----------
