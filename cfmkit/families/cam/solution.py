@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.geometry.profile import brace_tangent
-from cfmkit.families.cam.statics import Forces, Loads, jams
+from cfmkit.families.cam.statics import Forces, Loads, jams, levers
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -181,8 +181,7 @@ class Sides:
         spring, weight = self.spring(loads, rest), loads.roller_weight
         for x, slope in zip(self.x, self.slope, strict=True):
             tangent = brace_tangent(x, loads.brace_length)
-            turn = 1.0 + friction * slope
-            lever = slope - friction - tangent * turn
+            turn, lever = levers(slope, tangent, friction)
             lever = np.where(lever > 0, lever, np.nan)
             pull = pull + (spring * turn + weight * (slope - friction)) / lever
             contacts.append(np.hypot(1.0, slope) * (spring + weight * tangent) / lever)

@@ -131,6 +131,13 @@ class Forces:
     lost: dict[str, FloatArray] | None = None
 
 
+def levers(slope: Real, tangent: Real, friction: Any) -> tuple[Real, Real]:
+    """Return 1 + mu f, by which friction turns the load, and the slider's lever f - mu - t (1 + mu f) [SS, eq. 1]."""
+    turn: Real = 1.0 + friction * slope
+    lever: Real = slope - friction - tangent * turn
+    return turn, lever
+
+
 def spring_force(states: TrackStates, loads: Loads) -> FloatArray:
     """Return the spring force on one roller [N]; springs do not push."""
     stretch: FloatArray = 2.0 * loads.stiffness * np.maximum(states.x - loads.rest_half_width, 0.0)
@@ -160,12 +167,11 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
         return _forces_with_losses(states, loads, abs(friction), way if friction == 0.0 else float(np.sign(friction)))
     slope, weight = states.slope, loads.roller_weight
     tangent = brace_tangent(states.x, loads.brace_length)
-    turn = 1.0 + friction * slope
-    lever = slope - friction - tangent * turn
+    turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
-    pull = _over(2.0 * (spring * turn + weight * (slope - friction) if weight else spring * turn), lever)
+    pull = over(2.0 * (spring * turn + weight * (slope - friction) if weight else spring * turn), lever)
     along = np.sqrt(1.0 + slope * slope)
-    contact = _over(along * (spring + weight * tangent if weight else spring), lever)
+    contact = over(along * (spring + weight * tangent if weight else spring), lever)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
     idle = np.flatnonzero(at_rest & (np.abs(lever) < 1e-13))
     if idle.size and not weight:
@@ -175,7 +181,7 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
     return Forces(pull + loads.slider_weight, contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent))
 
 
-def _over(load: FloatArray, lever: FloatArray) -> FloatArray:
+def over(load: FloatArray, lever: FloatArray) -> FloatArray:
     """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
     moves = lever > 0
     force = load / np.where(moves, lever, 1.0)
@@ -240,8 +246,7 @@ def leverage(x: FloatArray, slope: FloatArray, brace_length: float, losses: Loss
     tangent = brace_tangent(x, brace_length)
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
     along = np.sqrt(1.0 + slope * slope)
-    one = 1.0 + turn * slope
-    lever = slope - turn - tangent * one
+    one, lever = levers(slope, tangent, turn)
     rubbed = losses.pin * (one / cos + sin * lever) - losses.bearing * float(np.sqrt(1.0 + turn**2)) * along
     found: FloatArray = lever - way * rubbed / (cos * brace_length)
     return found
@@ -258,8 +263,7 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     tangent = brace_tangent(states.x, length)
     cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
     turn = way * normal_turn(losses, losses.rolling)
-    one, along = 1.0 + turn * slope, np.sqrt(1.0 + slope * slope)
-    lever = slope - turn - tangent * one
+    (one, lever), along = levers(slope, tangent, turn), np.sqrt(1.0 + slope * slope)
     spring = spring_force(states, loads)
     pulled, hooks = spring - outward, losses.pin * spring
     bearing = losses.bearing * float(np.sqrt(1.0 + turn**2))
@@ -359,7 +363,7 @@ def jams(
                 moves: Real = with_all + 1e-12
                 return moves
             # Rounding at a start without any lever is not a jam.
-            margin: Real = slope - friction - brace_tangent(x, track.brace_length) * (1.0 + friction * slope) + 1e-12
+            margin: Real = levers(slope, brace_tangent(x, track.brace_length), friction)[1] + 1e-12
             return margin
 
         if states is None and not jammed and lever(part.low) >= 0 and lever(part.high) >= 0:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.geometry.track import KNOTS, Pivot, pivot_angle
 from cfmkit.numerics.roots import invert_increasing
 
@@ -26,11 +27,6 @@ if TYPE_CHECKING:
 
 HALVINGS = 60
 """Bisections of a bracket between two knots: what is left of it is rounding."""
-
-
-def tangents(x: FloatArray, brace: FloatArray) -> FloatArray:
-    """Return `profile.brace_tangent` where every brace has its own length."""
-    return x / ((brace - x) * (brace + x)) ** 0.5
 
 
 def sign_changes(
@@ -116,11 +112,11 @@ class ManyTracks:
         law, shift = self.profile.path.law, self.shift[rows]
         slope = law.slope(u)
         if not shift.any():
-            rate = slope - tangents(u, self.brace[rows, None])
+            rate = slope - brace_tangent(u, self.brace[rows, None])
             return self.slider(u, self.profile.path.height(u), rows), rate, u, slope
         length = (1.0 + slope * slope) ** 0.5
         x, y = u + shift * (slope / length), self.profile.path.height(u) + shift * (-1.0 / length)
-        rate = (slope - tangents(x, self.brace[rows, None])) * (1.0 + shift / law.curvature_radius(u))
+        rate = (slope - brace_tangent(x, self.brace[rows, None])) * (1.0 + shift / law.curvature_radius(u))
         return self.slider(x, y, rows), rate, x, slope
 
     def on_corner(self, turn: FloatArray | float, rows: NDArray[np.intp]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -159,7 +155,7 @@ class ManyTracks:
         first, x, slope = self.on_corner(self.pivot.low, self._every)
         _, x_last, steep = self.on_corner(self.pivot.high, self._every)
         brace = self.brace[:, None]
-        return first, slope - tangents(x, brace), steep - tangents(x_last, brace) > 0
+        return first, slope - brace_tangent(x, brace), steep - brace_tangent(x_last, brace) > 0
 
     @cached_property
     def start(self) -> FloatArray:

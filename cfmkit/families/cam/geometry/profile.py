@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -33,15 +33,23 @@ from cfmkit.arrays import FloatArray
 from cfmkit.numerics.roots import bracketed_root
 
 Real = TypeVar("Real", float, FloatArray)
-"""A number or an array of numbers: what the formulas take they give back."""
+"""A number or an array of numbers: what the formulas take they give back. Their parameters are numbers, or columns."""
 
 
-def brace_tangent(x: Real, brace_length: float) -> Real:
+def brace_tangent(x: Real, brace_length: Any) -> Real:
     """Return tan(alpha) of a brace whose roller is `x` [m] off the axis, sin(alpha) = x/l."""
-    return x / ((brace_length - x) * (brace_length + x)) ** 0.5
+    tangent: Real = x / ((brace_length - x) * (brace_length + x)) ** 0.5
+    return tangent
 
 
-def drop(x: Real, x0: float, brace_length: float) -> Real:
+def rise_rate(x: Real, force_constant: Any, brace_length: Any) -> Real:
+    """Return dp/dx of a path that carries no weight, the derivative of [SS, eq. 3] [1/m]."""
+    across = (brace_length - x) * (brace_length + x)
+    rate: Real = 1.0 / force_constant + brace_length**2 / (across * across**0.5)
+    return rate
+
+
+def drop(x: Real, x0: Real | float, brace_length: Real | float) -> Real:
     """Return sqrt(l^2 - x^2) - sqrt(l^2 - x0^2) without cancellation [m]."""
     at_x = ((brace_length - x) * (brace_length + x)) ** 0.5
     at_x0 = ((brace_length - x0) * (brace_length + x0)) ** 0.5
@@ -117,8 +125,7 @@ class SlopeLaw:
 
     def _rise(self, x: Real) -> Real:
         """Return dp/dx [1/m]."""
-        across = (self.brace_length - x) * (self.brace_length + x)
-        return self.slope_factor * (1.0 / self.force_constant + self.brace_length**2 / (across * across**0.5))
+        return self.slope_factor * rise_rate(x, self.force_constant, self.brace_length)
 
     def curvature_radius(self, x: Real) -> Real:
         """Return the radius of curvature of the path [m]; a larger roller undercuts the cam.

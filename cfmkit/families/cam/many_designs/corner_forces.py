@@ -14,13 +14,12 @@ import numpy as np
 
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
-from cfmkit.families.cam.statics import jams
+from cfmkit.families.cam.statics import jams, levers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -156,7 +155,7 @@ class CornerSlab(Slab):
         angle = pivot_angle(self.starts[chosen, None] + np.maximum(travel[few], 0.0), pivot)
         angle = np.where(travel[few] <= 0.0, pivot.low, angle)
         stretch = pivot.x + pivot.radius * np.sin(angle) - cams.x0[:, None]
-        tangent = tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+        tangent = brace_tangent(cams.x0[:, None] + stretch, cams.brace[:, None])
         for whole, part in zip(flank, (stretch, np.tan(angle), tangent), strict=True):
             whole[few] = np.where(corner[few], part, whole[few])
         return flank
@@ -166,7 +165,7 @@ class CornerSlab(Slab):
         """Where rollers leave the corner, as the tracks have it: next to a jam the last digits decide."""
         x, slope = (np.array([getattr(one.begin, name)[0] for one in self.found]) for name in ("x", "slope"))
         x, slope = x[self.which, None], slope[self.which, None]
-        tangent = tangents(x, self.designs.brace[:, None])
+        tangent = brace_tangent(x, self.designs.brace[:, None])
         pose = Pose(x - self.designs.x0[:, None], slope, tangent)
         up, down = (force_at(self.designs, pose, way) for way in (1.0, -1.0))
         return Begin(up, down, slope, tangent, self.corner_travel[:, None] <= self.travel[:, -1:])
@@ -197,9 +196,8 @@ class CornerSlab(Slab):
     def _forces(self, friction: FloatArray) -> ForcesOfCams:
         """Return the forces at all samples, as `statics.forces` does without weight."""
         stretch, slope, mu = self.stretch, self.slope, friction[:, None]
-        tangent = tangents(self.half_width, self.designs.brace[:, None])
-        turn = 1.0 + mu * slope
-        lever = slope - mu - tangent * turn
+        tangent = brace_tangent(self.half_width, self.designs.brace[:, None])
+        turn, lever = levers(slope, tangent, mu)
         moves = lever > 0
         spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(stretch, 0.0)
         divisor = np.where(moves, lever, 1.0)

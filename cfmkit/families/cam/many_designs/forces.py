@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.many_tracks import tangents
+from cfmkit.families.cam.geometry.profile import brace_tangent, drop, rise_rate
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
+from cfmkit.families.cam.statics import levers
 from cfmkit.metrics.continuous_curves import extremes
 
 if TYPE_CHECKING:
@@ -56,10 +57,9 @@ class Designs:
     @cached_property
     def curvature_radius(self) -> FloatArray:
         """Radius of curvature of the path at its start, where it is smallest [m]."""
-        p = tangents(self.x0, self.brace)
-        across = (self.brace - self.x0) * (self.brace + self.x0)
+        p = brace_tangent(self.x0, self.brace)
         length = 1.0 + p * p
-        return length * length**0.5 / (1.0 / self.constant + self.brace**2 / (across * across**0.5))
+        return length * length**0.5 / rise_rate(self.x0, self.constant, self.brace)
 
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
@@ -156,8 +156,7 @@ class Slab:
             (cams.brace - cams.end) * (cams.brace + cams.end),
             (cams.brace - cams.x0) * (cams.brace + cams.x0),
         )
-        drop = -(cams.end - cams.x0) * (cams.end + cams.x0) / (at_end**0.5 + at_start**0.5)
-        height = (cams.end - cams.x0) ** 2 / (2.0 * cams.constant) - drop
+        height = (cams.end - cams.x0) ** 2 / (2.0 * cams.constant) - drop(cams.end, cams.x0, cams.brace)
         total = (height + at_end**0.5) - at_start**0.5
         return total[:, None] * (np.arange(self.points) / (self.points - 1.0))
 
@@ -174,7 +173,7 @@ class Slab:
     @cached_property
     def tangent(self) -> FloatArray:
         """Tangent of the brace's angle from the axis."""
-        return tangents(self.half_width, self.designs.brace[:, None])
+        return brace_tangent(self.half_width, self.designs.brace[:, None])
 
     @cached_property
     def slope(self) -> FloatArray:
@@ -194,8 +193,7 @@ class Slab:
     def _forces(self, friction: FloatArray) -> ForcesOfCams:
         """Return the forces of one direction, as `statics.forces` does without weight."""
         cams, mu = self.designs, friction[:, None]
-        turn = 1.0 + mu * self.slope
-        lever = self.slope - mu - self.tangent * turn
+        turn, lever = levers(self.slope, self.tangent, mu)
         spring = 2.0 * cams.stiffness[:, None] * self.stretch
         slider = 2.0 * spring * turn / lever
         contact = (1.0 + self.slope * self.slope) ** 0.5 * spring / lever if self.contacts else None
@@ -240,7 +238,7 @@ class Slab:
         """Return how the rollers stand at travels of some designs, (r, m) [m]."""
         cams, travel = self.designs.take(rows), np.minimum(np.maximum(travel, 0.0), self.travel[rows, -1:])
         stretch = (2.0 * cams.constant[:, None] * travel) ** 0.5
-        tangent = tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+        tangent = brace_tangent(cams.x0[:, None] + stretch, cams.brace[:, None])
         return Pose(stretch, stretch / cams.constant[:, None] + tangent, tangent)
 
     @cached_property
@@ -311,7 +309,7 @@ class Slab:
         cams, mu = self.designs, self.designs.friction
         stretch = np.zeros(len(cams))
         for _ in range(8):
-            tangent = tangents(cams.x0 + stretch, cams.brace)
+            tangent = brace_tangent(cams.x0 + stretch, cams.brace)
             # Rounding at a start without any lever is not a jam, as in `statics.jams`.
             stretch = np.maximum(cams.constant * (mu * (1.0 + tangent * tangent) - 1e-12) / (1.0 - mu * tangent), 0.0)
         return np.where(mu > 0, stretch * stretch / (2.0 * cams.constant), 0.0)
@@ -361,8 +359,8 @@ class Slab:
 def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:
     """Return the force on the slider on the way up (1) or down (-1) [N]; NaN where friction holds a roller."""
     mu, (stretch, slope, tangent) = way * cams.friction[:, None], pose
-    turn = 1.0 + mu * slope
-    lever, spring = slope - mu - tangent * turn, 4.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0) * turn
+    turn, lever = levers(slope, tangent, mu)
+    spring = 4.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0) * turn
     with np.errstate(divide="ignore", invalid="ignore"):
         force = np.asarray(spring / lever)
     held = ~(lever > 0)

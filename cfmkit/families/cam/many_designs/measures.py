@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.many_tracks import tangents
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import metric_of, metrics_of
@@ -121,7 +121,7 @@ CYCLES: dict[str, Callable[[Slab, Window], FloatArray]] = {
 
 def _smallest_constant(cams: Slab) -> FloatArray:
     one = cams.designs
-    p = tangents(one.x0, one.brace)
+    p = brace_tangent(one.x0, one.brace)
     inverse = (1.0 + p * p) ** 1.5 / one.radius - (1.0 + p * p) ** 1.5 / one.brace
     return np.where(inverse > 0, 1.0 / inverse, np.nan)
 

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
-from cfmkit.families.cam.geometry.many_tracks import sign_changes, tangents
+from cfmkit.families.cam.geometry.many_tracks import sign_changes
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
-from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point
+from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.traces import ROUNDING, TOLERANCE
 from cfmkit.results import WINDOW_OUTSIDE
@@ -130,7 +131,7 @@ class BuiltSlab(Slab):
     def pose(self, travel: FloatArray, rows: Rows) -> Pose:
         """Return how the rollers stand at travels of some mechanisms, (r, m) [m]."""
         found, cams = self._poses_at(travel, rows), self.designs.take(rows)
-        return Pose(found.x - cams.x0[:, None], found.slope, tangents(found.x, cams.brace[:, None]))
+        return Pose(found.x - cams.x0[:, None], found.slope, brace_tangent(found.x, cams.brace[:, None]))
 
     @property
     def half_width(self) -> FloatArray:
@@ -185,9 +186,8 @@ class BuiltSlab(Slab):
     def _levers(self, poses: Poses, rows: Rows, way: float | FloatArray) -> tuple[FloatArray, ...]:
         """Return friction, tangent, 1 + mu f, the lever, and the spring force on one roller [N]."""
         cams = self.designs.take(rows)
-        mu, tangent = way * cams.friction[:, None], tangents(poses.x, cams.brace[:, None])
-        turn = 1.0 + mu * poses.slope
-        lever = poses.slope - mu - tangent * turn
+        mu, tangent = way * cams.friction[:, None], brace_tangent(poses.x, cams.brace[:, None])
+        turn, lever = levers(poses.slope, tangent, mu)
         spring = 2.0 * cams.stiffness[:, None] * np.maximum(poses.x - cams.x0[:, None], 0.0)
         return mu, tangent, turn, lever, spring
 
@@ -196,7 +196,7 @@ class BuiltSlab(Slab):
         mu, _, turn, lever, spring = self._levers(poses, rows, way)
         weight = self.around.roller_weight[rows, None]
         load = spring * turn
-        pull = _over(2.0 * (load + weight * (poses.slope - mu) if weight.any() else load), lever)
+        pull = over(2.0 * (load + weight * (poses.slope - mu) if weight.any() else load), lever)
         for at in self._idle(poses, rows, lever):
             pull[at] = self._limit(poses, rows, way, at)
         return pull + self.around.slider_weight[rows, None]
@@ -205,7 +205,7 @@ class BuiltSlab(Slab):
         """Return the force at a contact [N], as `statics.forces` does."""
         _, tangent, turn, lever, spring = self._levers(poses, rows, way)
         weight, along = self.around.roller_weight[rows, None], np.sqrt(1.0 + poses.slope * poses.slope)
-        contact = _over(along * (spring + weight * tangent if weight.any() else spring), lever)
+        contact = over(along * (spring + weight * tangent if weight.any() else spring), lever)
         for at in self._idle(poses, rows, lever):
             contact[at] = 0.5 * self._limit(poses, rows, way, at) * along[at] / turn[at]
         return contact
@@ -284,7 +284,7 @@ class BuiltSlab(Slab):
         tracks, which = self.around.tracks, self.around.which[rows]
         x, slope = tracks.on_corner(place, which)[1:] if on_corner else tracks.on_flank(place, which)[2:]
         mu, brace = self.designs.friction[rows, None], self.designs.brace[rows, None]
-        return slope - mu - tangents(x, brace) * (1.0 + mu * slope) + 1e-12
+        return levers(slope, brace_tangent(x, brace), mu)[1] + 1e-12
 
     @property
     def jammed(self) -> NDArray[np.bool_]:
@@ -432,9 +432,3 @@ class BuiltSlab(Slab):
     def same(self, value: float | None) -> FloatArray:
         """Return one value for every mechanism; NaN where there is none."""
         return np.full(len(self.designs), np.nan if value is None else float(value))
-
-
-def _over(load: FloatArray, lever: FloatArray) -> FloatArray:
-    """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
-    moves = lever > 0
-    return np.where(moves | (load == 0), load / np.where(moves, lever, 1.0), np.nan)
