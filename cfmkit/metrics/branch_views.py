@@ -370,7 +370,6 @@ class Cycle:
     @cached_property
     def usable(self) -> tuple[float, float] | None:
         """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
-
         return usable_interval(self)
 
 
