@@ -130,9 +130,12 @@ class Contour:
         corners = np.concatenate([_corners(edge) for edge in self.edges])
         return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
 
-    def points(self, sagitta: float) -> FloatArray:
-        """Return points (n, 2) [m] along closed edges: within `sagitta` [m] of arcs, smooth ones' own."""
-        found = [_along(edge, sagitta) for edge in self.edges]
+    def points(self, sagitta: float, turn: float = math.inf) -> FloatArray:
+        """Return points (n, 2) [m] along closed edges: within `sagitta` [m] of arcs, smooth ones' own.
+
+        On arcs neighbouring lines differ by `turn` [rad] at most.
+        """
+        found = [_along(edge, sagitta, turn) for edge in self.edges]
         return np.concatenate([piece[:-1] for piece in found])
 
 
@@ -144,12 +147,12 @@ def _corners(edge: Edge) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
 
 
-def _along(edge: Edge, sagitta: float) -> FloatArray:
+def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
     if isinstance(edge, Smooth):
         return edge.points
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end])
-    step = 2.0 * math.acos(max(1.0 - sagitta / edge.radius, 0.0))
+    step = min(2.0 * math.acos(max(1.0 - sagitta / edge.radius, 0.0)), turn)
     count = max(math.ceil(abs(edge.end - edge.start) / step), 2)
     angle = np.linspace(edge.start, edge.end, count + 1)
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])

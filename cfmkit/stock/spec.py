@@ -347,7 +347,9 @@ class CutPart(Model):
         "value; default: the smallest radius of `process` if stated, or 0.5 mm",
     )
     sheet: AboveZero | None = Field(
-        None, description="thickness of the sheet that everything is cut from: every width must be equal to it"
+        None,
+        description="thickness of the sheet that everything is cut from: every width must be equal to it, and a design "
+        "adapts other values",
     )
     holes: Annotated[tuple[Hole, ...], Field(max_length=1000)] = Field(
         (), description="fixing pattern: [{at: [x, y], diameter: 4 mm}]"
@@ -369,6 +371,11 @@ class PaddedPart(CutPart):
     frame: AroundFrame | None = Field(
         None, description="{wall, shuttle, ground}: depths of the pads, and a frame around the part that joins them"
     )
+
+
+def sheet_of(part: CutPart | None) -> float | None:
+    """Return the thickness of the sheet that everything is cut from [m]; None where none is stated."""
+    return None if part is None else part.sheet
 
 
 def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str | int, ...], str]:

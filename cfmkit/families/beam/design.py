@@ -25,6 +25,7 @@ from cfmkit.families.beam.scalar_results import ranges, window_of
 from cfmkit.numerics.cubic import value_at
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, Share, format_short
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -74,6 +75,7 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
     wanted : Rescale
         What is to change.
     """
+    wanted = wanted.model_copy(update={"free": wanted.adapted(sheet_of(spec.mechanism.part))})
     changed = changed_spec(spec, wanted)
     found = _validity(spec, wanted)
     for _ in range(ROUNDS):

@@ -18,9 +18,9 @@ from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
+from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque, format_short
 from cfmkit.specs.units.fields import LARGEST
-from cfmkit.stock.spec import sheet_faults
+from cfmkit.stock.spec import sheet_faults, sheet_of
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}
@@ -84,7 +84,10 @@ class Rescale(Model):
     force: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="target force at the end of the window; default: the one that results from the changes"
     )
-    free: Literal["width", "thickness", "size"] = Field("width", description="value that is adapted to reach the force")
+    free: Literal["width", "thickness", "size"] = Field(
+        "width",
+        description="value that is adapted to reach the force; from a sheet the thickness in place of the width",
+    )
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
     material: MaterialField | None = Field(None, description="another material")
     thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
@@ -98,6 +101,22 @@ class Rescale(Model):
         if self.force is not None and getattr(self, self.free) is not None:
             raise ValueError(f"{self.free!r} is given and cannot follow from the force: change 'free'")
         return self
+
+    def adapted(self, sheet: float | None) -> Literal["width", "thickness", "size"]:
+        """Return the value that is adapted: the width of what is cut from a sheet [m] stays."""
+        return "thickness" if sheet is not None and self.free == "width" else self.free
+
+    def sheet_fault(self, sheet: float | None) -> dict[tuple[str | int, ...], str]:
+        """Return what contradicts a sheet that everything is cut from [m], by its key; else nothing."""
+        if sheet is None:
+            return {}
+        said = format_short(sheet, "length")
+        if self.width is not None and abs(self.width / sheet - 1.0) > 1e-9:
+            return {("design", "rescale", "width"): f"the sheet is {said} ('mechanism.part.sheet'): make them equal"}
+        if self.force is not None and self.thickness is not None and self.free == "width":
+            told = f"the sheet ({said}) keeps the width, so the thickness follows from the force: leave it out"
+            return {("design", "rescale", "thickness"): f"{told}, or 'free: size'"}
+        return {}
 
 
 LEAST_DRAWN = 20
@@ -220,6 +239,8 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
         refuse("BeamSpec", sheet_faults(self.mechanism.part, self.out_of_plane_widths))
+        if self.design is not None and self.design.rescale is not None:
+            refuse("BeamSpec", self.design.rescale.sheet_fault(sheet_of(self.mechanism.part)))
         return self
 
     def old_keys(self) -> Iterator[tuple[str, str, str]]:

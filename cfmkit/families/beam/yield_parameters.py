@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.designing.variables import around
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,8 +33,9 @@ def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
     if design.optimise is not None:
         return dict(_of_shapes(design.optimise, designed))
     mechanism, found = designed.mechanism, dict[str, tuple[float, float]]()
-    if design.rescale is not None and design.rescale.free != "size":
-        name, value = design.rescale.free, getattr(mechanism, design.rescale.free)
+    name = None if design.rescale is None else design.rescale.adapted(sheet_of(mechanism.part))
+    if name is not None and name != "size":
+        value = getattr(mechanism, name)
         found |= {f"mechanism.{name}": around(value)} if isinstance(value, float) else {}
     return found
 

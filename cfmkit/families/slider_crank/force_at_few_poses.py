@@ -15,6 +15,7 @@ from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
 from cfmkit.families.slider_crank.printed.model import chain_of
 from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.solution import Solution
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -51,6 +52,8 @@ def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
 def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
     """Return thicknesses and width of a designed strip with the ranges of `design.beam`; of springs, their rates.
 
+    The width of a strip from a sheet stays.
+
     Parameters
     ----------
     given : SliderCrankSpec
@@ -68,7 +71,7 @@ def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[f
             found |= {f"mechanism.beam.thickness.{k}": ends for k, ends in enumerate(ranges)}
     else:
         found["mechanism.beam.thickness"] = wanted.thickness or DEFAULT_THICKNESS
-    if isinstance(wanted.width, tuple):
+    if isinstance(wanted.width, tuple) and sheet_of(designed.mechanism.part) is None:
         found["mechanism.beam.width"] = wanted.width
     return {path: (float(low), float(high)) for path, (low, high) in found.items() if low < high}
 

@@ -3,12 +3,14 @@
 With F_c = K h and dF = K dr the rise is h = F_c dr/dF. The stroke gives the thickness, since the linear region is
 (4 h/3) sqrt(1 - (pi/Q)^2) long; the stress gives the shortest leaf; K_n = K its width. The spring is as long as its
 stress at full travel and preload allows. Forces are exactly linear in the widths, so that the two factors that make the
-exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do.
+exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do. Where a sheet fixes
+the widths, lengths and numbers are found in a few passes (`sheet_sizing`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import cos, sqrt
 from typing import TYPE_CHECKING
 
@@ -33,9 +35,19 @@ from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
 from cfmkit.families.vcfm.model import LawSampler, rest_of
+from cfmkit.families.vcfm.sheet_sizing import (
+    NEAR,
+    PASSES,
+    leaf_of_sheet,
+    next_leaf,
+    next_side,
+    side_of_sheet,
+    stress_unreachable,
+)
 from cfmkit.families.vcfm.spring_choice import with_bought_springs
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -122,20 +134,27 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> DesignSizes:
             ),
             {"design.leaf_length": at_least(shortest)},
         )
-    leaf = sized_leaf(spec, target, thickness, length)
-    sizes = DesignSizes(leaf, spring_side(spec, target, leaf), onset_and_exit(leaf))
+    sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
+    if sheet is None:
+        leaf = sized_leaf(spec, target, thickness, length)
+    else:
+        count, leaf = leaf_of_sheet(spec, target, thickness, length, sheet)
+    side = spring_side(spec, target, leaf, spec.mechanism.flexures.thickness)
+    if sheet is not None:
+        side = side_of_sheet(partial(spring_side, spec, target, leaf), side, target.min_thickness or 0.0, sheet)
+    sizes = DesignSizes(leaf, side, onset_and_exit(leaf), count)
     check_width(spec, target, leaf)
     check_room(target, sizes)
     return sizes
 
 
-def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> LeafStrip:
+def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip, thickness: float) -> LeafStrip:
     """Return a leaf of the diamond: as long as its stress at the end of the linear region and full preload allows."""
     made, positive = spec.mechanism.material, spec.mechanism.flexures
     deflection = 0.5 * (float(onset_and_exit(leaf)[1]) + target.preload_stroke)
-    e, t, tilt = made.modulus, positive.thickness, positive.angle
-    length = sqrt(3.0 * e * t * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
-    side = LeafStrip(length, tilt, t, 1.0, e, made.poisson)
+    e, tilt = made.modulus, positive.angle
+    length = sqrt(3.0 * e * thickness * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
+    side = LeafStrip(length, tilt, thickness, 1.0, e, made.poisson)
     return replace(side, width=float(target.level / target.height / Diamond(side, share_of(positive)).stiffness))
 
 
@@ -161,11 +180,13 @@ def written(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
     leaf, side = sizes.leaf, sizes.side
     return spec.replace(
         {
+            "mechanism.bistable.half_beams": sizes.half_beams,
             "mechanism.bistable.length": float(leaf.length),
             "mechanism.bistable.angle": float(leaf.angle),
             "mechanism.bistable.thickness": float(leaf.thickness),
             "mechanism.bistable.width": float(leaf.width),
             "mechanism.positive.length": float(side.length),
+            "mechanism.positive.thickness": float(side.thickness),
             "mechanism.positive.width": float(side.width),
         }
     )
@@ -180,11 +201,12 @@ ROOM = 1.02
 
 @dataclass(frozen=True)
 class DesignSizes:
-    """The leaves of a design, and the end of the linear region [m]."""
+    """One leaf and one of the spring, the ends of the linear region [m], and the number of leaves."""
 
     leaf: LeafStrip
     side: LeafStrip
     linear: tuple[float, float]
+    half_beams: int
 
 
 def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
@@ -205,11 +227,15 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
 def refined(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSizes:
     """Return the sizes with both widths corrected by the exact model, and leaves long enough for its stress.
 
+    From a sheet, whose widths stay, lengths and number are corrected instead.
+
     Raises
     ------
     Infeasible
         If the exact stress stays above the allowable one.
     """
+    if (sheet := sheet_of(spec.mechanism.part)) is not None:
+        return _refined_for_sheet(spec, target, sizes, sheet)
     allowable = spec.mechanism.allowable_stress or 0.0
     for _ in range(RESCALES):
         sizes, stresses = fit_widths(spec, target, sizes)
@@ -225,7 +251,7 @@ def refined(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSiz
         if over[1] > 1.0 + 1e-4:
             longer = float(side.length) * sqrt(1.0005 * over[1])
             side = replace(side, length=longer, width=side.width * (longer / side.length) ** 3)
-        sizes = DesignSizes(leaf, side, sizes.linear)
+        sizes = replace(sizes, leaf=leaf, side=side)
     worst = max(stresses)
     raise Infeasible(
         finding(
@@ -235,6 +261,21 @@ def refined(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> DesignSiz
         ),
         {"design.leaf_length": at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
     )
+
+
+def _refined_for_sheet(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes, sheet: float) -> DesignSizes:
+    """Return the sizes for which the widths that the exact model wants are the sheet."""
+    allowable, least = spec.mechanism.allowable_stress or 0.0, target.min_thickness or 0.0
+    for _ in range(PASSES):
+        fitted, stresses = fit_widths(spec, target, sizes)
+        wide, stiff = fitted.leaf.width / sheet, fitted.side.width / sheet
+        over = [stress / allowable for stress in stresses]
+        if max(over) <= 1.0 + 1e-4 and max(abs(wide - 1.0), abs(stiff - 1.0)) <= NEAR:
+            return sizes
+        count, leaf = next_leaf(sizes.half_beams, sizes.leaf, wide, over[0], target.height)
+        side = next_side(sizes.side, stiff, over[1], least)
+        sizes = DesignSizes(leaf, side, onset_and_exit(leaf), count)
+    raise stress_unreachable(sizes.leaf, max(stresses), allowable)
 
 
 def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[DesignSizes, tuple[float, float]]:
@@ -271,9 +312,8 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     wanted = np.full(len(places), target.level) if target.curve is None else _followed(target.curve, places)
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
     leaf, side = sizes.leaf, sizes.side
-    fitted = DesignSizes(
-        replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff)), sizes.linear
-    )
+    wider = replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff))
+    fitted = replace(sizes, leaf=wider[0], side=wider[1])
     end = np.concatenate([[_rest(sampler, full, (wide, stiff))], np.linspace(0.0, last, 201)])
     stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
     return fitted, stresses

@@ -392,8 +392,10 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
         part = self.mechanism
-        if self.design is not None and part.part is not None and part.part.sheet is not None:
-            refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
+        sheet = None if part.part is None else part.part.sheet
+        if sheet is not None and self.design is not None and self.design.leaf_length is not None:
+            told = "the length of leaves from a sheet follows from the force: drop it, or 'mechanism.part.sheet'"
+            refuse("Spec", {("design", "leaf_length"): told})
         refuse("Spec", sheet_faults(part.part, self.out_of_plane_widths))
         return self
 

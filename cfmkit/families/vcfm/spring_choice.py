@@ -28,7 +28,9 @@ from cfmkit.families.vcfm.leaf_sizing import (
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, onset_and_exit
+from cfmkit.families.vcfm.sheet_sizing import NEAR, PASSES, leaf_of_sheet, next_leaf
 from cfmkit.results import Design, Status
+from cfmkit.stock.spec import sheet_of
 from cfmkit.stock.springs.catalogue import Miss, nearest
 from cfmkit.stock.springs.in_use import SpringInUse
 from cfmkit.stock.springs.spec import offers, wire_of
@@ -59,12 +61,15 @@ class LeavesAroundSprings:
         One leaf.
     linear : (float, float)
         Where the leaves' stiffness is constant [m].
+    half_beams : int
+        Number of leaves.
     """
 
     springs: BoughtSprings
     target: VcfmDesign
     leaf: LeafStrip
     linear: tuple[float, float]
+    half_beams: int
 
     @property
     def label(self) -> str:
@@ -190,12 +195,25 @@ def _around(
         return Miss(
             label, shortest / target.leaf_length - 1.0, f"leaves of at least {mm(shortest)} ('design.leaf_length')"
         )
-    leaf = sized_leaf(spec, own, thickness, length)
-    while leaf.width < SQUAT * leaf.thickness and target.leaf_length is None:
-        length *= 1.02  # narrower leaves buckle out of the plane; a longer leaf has to be wider
-        leaf = sized_leaf(spec, own, thickness, length)
-    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf))
+    sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
+    if sheet is not None:
+        try:
+            count, leaf = leaf_of_sheet(spec, own, thickness, length, sheet)
+        except Infeasible as problem:
+            return Miss(label, 1.0, problem.finding.message)
+    else:
+        leaf = _wide_enough(spec, own, thickness, length)
+    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count)
     return _missed(spec, target, found, offer) or found
+
+
+def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: float) -> LeafStrip:
+    """Return a leaf that does not buckle out of the plane: a longer one has to be wider. A stated length stays."""
+    leaf = sized_leaf(spec, own, thickness, length)
+    while leaf.width < SQUAT * leaf.thickness and own.leaf_length is None:
+        length *= 1.02
+        leaf = sized_leaf(spec, own, thickness, length)
+    return leaf
 
 
 def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
@@ -227,6 +245,7 @@ def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
         {
             "mechanism.positive": None,
             "mechanism.springs": found.springs.model_dump(exclude_unset=True),
+            "mechanism.bistable.half_beams": found.half_beams,
             "mechanism.bistable.length": float(leaf.length),
             "mechanism.bistable.angle": float(leaf.angle),
             "mechanism.bistable.thickness": float(leaf.thickness),
@@ -243,8 +262,8 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> L
     first, last = found.linear
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
-    worst = np.inf
-    for _ in range(RESCALES):
+    worst, sheet = np.inf, sheet_of(spec.mechanism.part)
+    for _ in range(RESCALES if sheet is None else PASSES):
         made = _written(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
         back = own.preload_stroke
         sampler = ExactSampler(made, last, back)
@@ -255,6 +274,12 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> L
         fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
         ends = np.linspace(-_rest(sampler, wide, back), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable
+        if sheet is not None:
+            if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= NEAR:
+                return _missed(spec, target, found, None) or found
+            count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own.height)
+            found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
+            continue
         if worst <= 1.0 + 1e-4:
             return _missed(spec, target, fitted, None) or fitted
         if target.leaf_length is not None:

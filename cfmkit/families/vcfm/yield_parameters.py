@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from cfmkit.designing.variables import around
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
     """Return both widths, and length, angle and thickness of the leaves, within the limits of the design.
+
+    From a sheet the widths stay, and length and thickness of the spring may move.
 
     Parameters
     ----------
@@ -35,6 +38,11 @@ def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
         found["mechanism.positive.width"] = around(spring.width, high=wanted.max_width)
     if wanted.leaf_length is None:
         found["mechanism.bistable.length"] = around(leaf.length, high=longest)
+    if sheet_of(designed.mechanism.part) is not None:  # widths are those of the sheet
+        found = {path: ends for path, ends in found.items() if not path.endswith(".width")}
+        if spring is not None:
+            found["mechanism.positive.length"] = around(spring.length)
+            found["mechanism.positive.thickness"] = around(spring.thickness, low=wanted.min_thickness)
     return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
 
 

@@ -19,7 +19,7 @@ from cfmkit.designing.audit import measured, searched
 from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.designing.variables import rounded
 from cfmkit.errors import InputError
-from cfmkit.families.findings import mm, newton, percent
+from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
@@ -34,12 +34,14 @@ from cfmkit.families.slider_crank.printed.search import (
     infeasible,
     search,
     uniform_for_stroke,
+    uniform_for_width,
 )
 from cfmkit.families.slider_crank.printed.sizing import design_flexures
 from cfmkit.families.slider_crank.printed.spec import StripSpec
 from cfmkit.families.slider_crank.printed.sqp_program import Form, Task
 from cfmkit.numerics.sqp import SearchEnding
 from cfmkit.results import Design, Finding, Searched, Status
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -256,7 +258,7 @@ def form_of(
 ) -> tuple[Form, Ranges]:
     """Return how the strip is described, and the ranges of its numbers."""
     beam = spec.mechanism.beam
-    width = wanted.width if wanted.width is not None else (beam.width if beam is not None else DEFAULT_WIDTH)
+    width = sheet_of(spec.mechanism.part) or wanted.width or (beam.width if beam is not None else DEFAULT_WIDTH)
     fixed = None if isinstance(width, tuple) else float(width)
     per_piece: tuple[int, ...] = ()
     shares: tuple[tuple[float, ...], ...] = ()
@@ -292,7 +294,13 @@ def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
 
 
 def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Ranges) -> Design:
-    """Return the uniform strip for a stroke: thickness from the stress, width from the force."""
+    """Return the uniform strip for a stroke: thickness from the stress, width from the force.
+
+    Where the width is stated, the thickness follows from the force.
+    """
+    fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted.width, tuple) else wanted.width)
+    if fixed is not None:
+        return _of_width(spec, task, ranges, float(fixed))
     found = uniform_for_stroke(task)
     if found is None:
         return no_design(
@@ -317,6 +325,33 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
         return no_design(finding("target_unreachable", text), nearest)
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
+    return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+
+
+def _of_width(spec: SliderCrankSpec, task: Task, ranges: Ranges, width: float) -> Design:
+    """Return the uniform strip of a stated width, its thickness from the force."""
+    found = uniform_for_width(task, width)
+    if found is None:
+        return no_design(finding("target_unreachable", "the strip has no equilibrium over 'design.travel'"))
+    (thickness, stress), allowed = found, task.material.allowable_stress
+    low, high = ranges.form[0] / 1e3
+    # the stress goes with the thickness, and the force with its cube
+    thickest = high if allowed is None else min(high, thickness * allowed / stress)
+    if not low <= thickness <= thickest * (1 + 1e-9):
+        limit = (
+            "the stress" if allowed is not None and thickness * allowed / stress < high else "'design.beam.thickness'"
+        )
+        nearest = (float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force * spec.mechanism.sets
+        text = (
+            f"a strip {mm(width)} wide would have to be {mm(thickness)} thick; {limit} allows {mm(low)} to "
+            f"{mm(thickest)}, which is about {newton(nearest)}"
+        )
+        cure = {"design.force": newton(nearest)} if thickest >= low else {}
+        return no_design(finding("target_unreachable", text), cure)
+    part = _part(spec, {"width": width, "thickness": round(thickness, DECIMALS), "shares": None})
+    text = f"width {mm(width)} as stated, thickness {mm(thickness)} from the force"
+    if allowed is not None:
+        text += f", stress {mpa(stress)} at {mm(task.stroke)}"
     return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
 
 

@@ -165,6 +165,25 @@ def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] |
     return thickness, width
 
 
+def uniform_for_width(task: Task, width: float, guess: float = 1e-3) -> tuple[float, float] | None:
+    """Return thickness [m] and largest stress at the stroke [Pa] of the strip of a width [m] that has the force.
+
+    The force goes nearly with the cube of the thickness. None where there is no equilibrium.
+    """
+    thickness = guess
+    for _ in range(_ROUNDS):
+        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
+        factor = (2.0 * task.force / (state.force.max() + state.force.min())) ** (1.0 / 3.0)
+        if abs(factor - 1.0) < 1e-10:
+            break
+        thickness *= factor
+    return thickness, worst
+
+
 @dataclass(frozen=True)
 class OneStart:
     """What a process does: from the number of a start to a record of the strip that it led to.

@@ -30,6 +30,7 @@ from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
+from cfmkit.stock.spec import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -103,11 +104,42 @@ class Sized:
         Force of the closed forms' flexures over that of the springs.
     stress_factor : float
         Their largest stress over that of pure bending.
+    over : float
+        Largest stress at last over the allowable one.
     """
 
     flexures: tuple[Flexure, ...]
     force_factor: float
     stress_factor: float
+    over: float
+
+
+@dataclass(frozen=True)
+class FixedWidth:
+    """Flexures of a width that stays, that of a sheet: thicknesses follow from the force, lengths from the stress.
+
+    Attributes
+    ----------
+    shortest : tuple of float
+        Lengths as stated; they grow where the stress asks for it [m].
+    stays : bool
+        Whether they do not.
+    """
+
+    shortest: tuple[float, ...]
+    stays: bool
+
+    def corrected(self, parts: Sequence[Flexure], by_force: float, by_stress: float) -> tuple[Flexure, ...]:
+        """Return flexures whose force is smaller by a factor, and whose stress is the allowable one or less.
+
+        The force goes with h^3/L and the stress with h/L.
+        """
+        least = max(length / one.length for length, one in zip(self.shortest, parts, strict=True))
+        longer = 1.0 if self.stays else max(least, np.sqrt(by_stress**3 / by_force))
+        thicker = (longer / by_force) ** (1.0 / 3.0)
+        return tuple(
+            Flexure(float(one.length * longer), float(one.thickness * thicker), one.width, one.before) for one in parts
+        )
 
 
 def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Design:
@@ -134,7 +166,12 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     stroke = float(wanted.travel[1])
     side = side_of(spec, linkage, unloaded)
     turn = np.abs(rotations(linkage, unloaded, np.array([stroke]))[:, 0])
-    first = one_width(rates, lengths, turn, made_of)
+    sheet, stays = sheet_of(spec.mechanism.part), wanted.flexures.length is not None
+    first = (
+        one_width(rates, lengths, turn, made_of)
+        if sheet is None
+        else of_width(rates, lengths, turn, made_of, sheet, stays)
+    )
     stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
@@ -142,11 +179,19 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         return no_design(finding("target_unreachable", f"{text}: no flexure; {cure}"))
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
     springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
-    found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact)
+    kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
+    found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact, kept)
     if found is None:
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
         )
+    if found.over > 1.0 + 1e-6 and sheet is not None:
+        # the stress goes with the power -2/3 of the length
+        longer = mm(1.01 * max(lengths) * found.over**1.5)
+        text = (
+            f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {found.over:.4g} times the stress allowed"
+        )
+        return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
     over = (
         "over that of the springs, on average, of flexures by the closed forms",
         "over that of pure bending, of those",
@@ -182,6 +227,24 @@ def one_width(
     return tuple(Flexure(length, float(h), widest) for length, h in zip(lengths, thickness, strict=True))
 
 
+def of_width(
+    rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity, width: float, stays: bool
+) -> tuple[Flexure, ...]:
+    """Return flexures of a width [m] with the rates [N m/rad], by the closed forms.
+
+    Where their stress would be too large they are longer than stated, unless their lengths stay.
+    """
+    stress, young = (made_of.allowable_stress or np.inf) / PEAK_FACTOR, made_of.youngs_modulus
+    found = []
+    for rate, length, psi in zip(rates, lengths, turn, strict=True):
+        thickness = (12.0 * rate * length / (young * width)) ** (1.0 / 3.0)
+        over = thickness / thickness_from_stress(stress, length, young, float(psi))
+        # h goes with the cube root of L, so the stress with its power -2/3
+        longer = 1.0 if stays else max(1.0, over**1.5)
+        found.append(Flexure(float(length * longer), float(thickness * longer ** (1.0 / 3.0)), width))
+    return tuple(found)
+
+
 def corrected(
     flexures: Sequence[Flexure],
     made_of: Elasticity,
@@ -189,6 +252,7 @@ def corrected(
     travel: FloatArray,
     force: FloatArray,
     exact: bool,
+    fixed: FixedWidth | None = None,
 ) -> Sized | None:
     """Return flexures whose beams have a mean force and the allowable stress; None without equilibrium.
 
@@ -204,10 +268,12 @@ def corrected(
         Where the force is compared, and that of the springs [m, N].
     exact : bool
         Whether to correct; else the factors are found only.
+    fixed : FixedWidth, optional
+        How, where the width stays.
     """
     parts, factors = tuple(flexures), (1.0, 1.0)
     limit = made_of.allowable_stress or np.inf
-    for number in range(_ROUNDS):
+    for number in range(_ROUNDS if fixed is None else 4 * _ROUNDS):
         pressed = chain_of_flexures(parts, made_of, *built_in).press(travel)
         if pressed.ending is not PressingEnd.COMPLETE:
             return None
@@ -217,17 +283,24 @@ def corrected(
             factors = (by_force, by_stress * PEAK_FACTOR)
         if not exact or max(abs(by_force - 1.0), abs(by_stress - 1.0)) < 1e-9:
             break
+        if fixed is not None:
+            before, parts = parts, fixed.corrected(parts, by_force, by_stress)
+            if all(abs(one.length / old.length - 1.0) < 1e-9 for one, old in zip(parts, before, strict=True)) and (
+                abs(by_force - 1.0) < 1e-9
+            ):
+                break
+            continue
         parts = tuple(
             Flexure(one.length, one.thickness / by_stress, one.width / by_force * by_stress**3, one.before)
             for one in parts
         )
-    return Sized(parts, *factors)
+    return Sized(parts, *factors, by_stress)
 
 
 def _written(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
     blocks = [
         FlexureSpec(
-            length=one.length,
+            length=round(one.length, 9),
             thickness=float(np.floor(one.thickness * 1e8) / 1e8),
             width=round(one.width, 8),
             before=one.before,
