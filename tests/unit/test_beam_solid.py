@@ -198,7 +198,7 @@ COARSE = {
 @pytest.mark.parametrize(
     ("holes", "said"),
     [
-        ("{at: [-0.991 mm, -0.133 mm], diameter: 1.9996 mm}", "is too thin, or its edge too sharply curved, at (-1.98"),
+        ("{at: [-0.991 mm, -0.133 mm], diameter: 1.9996 mm}", "is too thin, or its edge too sharply curved, at (-0.85"),
         ("{at: [12 mm, 1.65 mm], diameter: 3 mm}", "the hole round (12 mm, 1.65 mm) is not inside the outline"),
         (
             "{at: [-1 mm, -0.1 mm], diameter: 1 mm}, {at: [-1.2 mm, -0.1 mm], diameter: 1 mm}",
