@@ -126,7 +126,7 @@ class Part:
         share = SHARE * size / (self.thinnest / ACROSS)
         across = self.thinnest / size if self.largest > 1.0 else 2.0
         seams = [seam for place in self.places for seam in place.seams]
-        grid = mesh(self.rings, self.largest * size, share, across, seams)
+        grid = mesh(self.rings, self.largest * size, share, across, seams, ON)
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         unjudged = held | self._beside_clamps(grid, held)

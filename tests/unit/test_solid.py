@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.contours import circle
+from cfmkit.export import contours
 from cfmkit.solid.edge_rings import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
@@ -405,5 +405,18 @@ def test_uniaxial_stretch_is_the_closed_form_of_either_law():
 
 def test_the_lines_that_stand_for_an_arc_turn_by_a_degree_at_most():
     # coarser ones are corners beside which the stress of a small fillet is wrong, and grows with finer meshes
-    (ring,) = rings_of([circle((0.0, 0.0), 0.2e-3, "cut")])
+    (ring,) = rings_of([contours.circle((0.0, 0.0), 0.2e-3, "cut")])
     assert np.degrees(np.abs(ring.turns)).max() <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("size", [0.3e-3, 0.35e-3, 0.4e-3, 0.5e-3, 0.6e-3])
+def test_a_side_of_an_element_is_not_held_in_its_middle_alone_where_a_fillet_leaves_a_clamp(size):
+    # forces of such meshes were 1.9e-3 off by chance
+    turn = np.linspace(np.pi, 1.5 * np.pi, 91)
+    fillet = 1e-3 * np.column_stack([2.0 + np.cos(turn), 1.0 + np.sin(turn)])  # down a web, out on the face y = 0
+    ends = 1e-3 * np.array([[0, 0], [0, 3], [1, 3]]), 1e-3 * np.array([[4, 0], [4, -1], [0, -1]])
+    ring = Ring.of(np.concatenate([ends[0], fillet, ends[1]]), False)
+    grid = mesh((ring,), size, share=0.15, seams=[np.array([[0.0, 0.0], [4e-3, 0.0]])], near=5e-6)
+    held = grid.nodes[:, 1] <= 5e-6
+    first, last, middle = held[grid.edges].T
+    assert ((first & last) == middle).all()
