@@ -211,7 +211,7 @@ def _leaving(ring: Ring, start: FloatArray, end: FloatArray, near: float) -> NDA
     from shapely import LineString, distance, points
 
     close = np.asarray(distance(LineString([start, end]), points(ring.points)) <= near)
-    return close & ~(np.roll(close, 1) & np.roll(close, -1))
+    return np.asarray(close & ~(np.roll(close, 1) & np.roll(close, -1)))
 
 
 def _laid(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArray:
