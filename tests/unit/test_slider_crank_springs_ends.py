@@ -295,3 +295,19 @@ def test_places_of_all_metrics_are_solved_for_together(monkeypatch: pytest.Monke
     assert metrics["band_range_1pct"].value is not None
     assert metrics["usable_stroke"].value is not None
     assert len(places) <= 3 * 7 + 8
+
+
+def test_a_travel_up_to_the_stretched_position_tells_what_the_angle_does_where_springs_are():
+    """Springs that are not there have an unbounded effort at the end of the reach: numpy warned, no value was told."""
+    given = {
+        "mechanism": {
+            "crank_length": "52 mm", "coupler_length": "95 mm", "offset": "-82 mm", "branch": "left",
+            "unloaded_angle": "-148 deg", "springs": {"slider": "0.12 N/mm"},
+        },
+        "analysis": {"drive": "force", "travel": ("-5 mm", "5 mm")},
+    }  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = cfmkit.analyze(config("li2019", **given)).values["force_per_degree"].value
+    assert found is not None
+    assert math.isfinite(found)

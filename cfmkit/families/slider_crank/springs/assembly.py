@@ -349,7 +349,8 @@ def effort_per_angle(assembly: Assembly, motion: FloatArray) -> FloatArray:
     for step in (STEP, -STEP):
         other, less = turned(assembly, step)
         rows.append(other.forces(motion - less))
-    change: FloatArray = (rows[0] - rows[1]) / (2.0 * STEP)
+    with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
+        change: FloatArray = (rows[0] - rows[1]) / (2.0 * STEP)
     return change
 
 

@@ -141,9 +141,10 @@ def _trim(solution: Solution) -> Iterator[tuple[str, float | None]]:
         motion = solution.motion
         window = solution.character.window or (float(motion[0]), float(motion[-1]))
         per_rate = mean_effort_per_angle(solution.assembly, window)
-        bounded = bool(np.isfinite(per_rate).all())  # not where the window reaches a pole of the force
+        rates, there = solution.assembly.rates, solution.assembly.rates > 0.0
+        bounded = bool(np.isfinite(per_rate[there]).all())  # not where the window reaches a pole of the force
         per_degree = float(np.radians(1.0))
-        yield "force_per_degree", float(solution.assembly.rates @ per_rate) * per_degree if bounded else None
+        yield "force_per_degree", float(rates[there] @ per_rate[there]) * per_degree if bounded else None
 
 
 def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:

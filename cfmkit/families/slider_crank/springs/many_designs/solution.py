@@ -464,7 +464,7 @@ VALUES: dict[str, Callable[[Slab], Any]] = {
     "stretched_stiffness": lambda slab: slab.at(slab.base.assembly.stretched, "stiffness"),
     "energy_max": lambda slab: (slab.rates @ (0.5 * slab.base.units.turn**2)).max(axis=1),
     "start_force": lambda slab: slab.start_effort,
-    "force_per_degree": lambda slab: slab.rates @ slab.base.per_degree,
+    "force_per_degree": lambda slab: np.where(slab.rates > 0.0, slab.rates * slab.base.per_degree, 0.0).sum(axis=1),
     "bistable_factor": lambda slab: slab.factors[:, 0],
     "positive_factor": lambda slab: slab.factors[:, 1],
     "small_angle_number": lambda slab: np.array([small_angle_number(one) for one in slab.assemblies], dtype=float),
