@@ -19,6 +19,7 @@ def invert_increasing(
     bracket: tuple[float | FloatArray, float | FloatArray],
     guess: FloatArray,
     iterations: int = 80,
+    before: FloatArray | None = None,
 ) -> FloatArray:
     """Return x in the bracket with value(x) = target for an increasing function, element by element.
 
@@ -37,6 +38,8 @@ def invert_increasing(
         First estimates; clipped to the bracket.
     iterations : int
         At most so many steps.
+    before : (n,) array, optional
+        How far off the values were a step before the guess, where that step was at least one of Newton's.
 
     Returns
     -------
@@ -54,7 +57,7 @@ def invert_increasing(
     x = np.minimum(np.maximum(guess, bracket[0]), bracket[1])
     fine = 16.0 * EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
     tolerance = 16.0 * EPS * np.maximum(np.abs(bracket[0]), np.abs(bracket[1]))
-    before = np.zeros(targets.shape)
+    before = np.zeros(targets.shape) if before is None else before
     for _ in range(iterations):
         value, slope = evaluate(x)
         error = value - targets

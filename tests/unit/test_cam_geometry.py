@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.many_tracks import ManyTracks
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Track
@@ -230,3 +231,19 @@ def test_a_dead_point_on_the_corner_is_where_brace_and_roller_are_in_line():
     # The stretch begins at the slider's start position, on the far side of the dead point.
     assert first.at(first.low)[0] == pytest.approx(track.start, abs=1e-12)
     assert first.low > turn[np.argmin(slider)]
+
+
+def test_rollers_on_a_cam_that_other_parts_run_on_are_found_in_two_steps(monkeypatch):
+    """Twice as many made sweeps of a cut cam two thirds slower than those of cams as designed."""
+    profile = assemble(cam()).track.profile
+    tracks = ManyTracks(profile, profile.roller_radius + np.linspace(-5e-5, 5e-5, 8), np.linspace(0.1998, 0.2002, 8))
+    rows = np.arange(8)
+    places = tracks.start + np.linspace(0.004, 0.23, 60)
+    calls = []
+    plain = ManyTracks._bent
+    monkeypatch.setattr(ManyTracks, "_bent", lambda self, u, rows: calls.append(u.shape) or plain(self, u, rows))
+    found = tracks.poses(places, rows)
+    assert calls.count(places.shape) == 2
+    one = Track(profile, float(tracks.radius[0]), float(tracks.brace[0])).states(places[0])
+    np.testing.assert_allclose(found.x[0], one.x, rtol=1e-14)
+    np.testing.assert_allclose(found.slope[0], one.slope, rtol=1e-13)

@@ -109,15 +109,23 @@ class ManyTracks:
 
     def on_flank(self, u: FloatArray, rows: NDArray[np.intp]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return slider position, its derivative along the flank, x and slope at path coordinates, (r, n) each."""
-        law, shift = self.profile.path.law, self.shift[rows]
-        slope = law.slope(u)
-        if not shift.any():
-            rate = slope - brace_tangent(u, self.brace[rows, None])
-            return self.slider(u, self.profile.path.height(u), rows), rate, u, slope
+        slider, rate, x, slope, _ = self._bent(u, rows)
+        return slider, rate, x, slope
+
+    def _bent(
+        self, u: FloatArray, rows: NDArray[np.intp]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return `on_flank`, and the second derivative of the slider's position, roughly: as on a circle."""
+        shift, brace = self.shift[rows], self.brace[rows, None]
+        slope, bend = self.profile.path.law.slopes(u)
         length = (1.0 + slope * slope) ** 0.5
+        longer = 1.0 + shift * (bend / (length * length * length))
         x, y = u + shift * (slope / length), self.profile.path.height(u) + shift * (-1.0 / length)
-        rate = (slope - brace_tangent(x, self.brace[rows, None])) * (1.0 + shift / law.curvature_radius(u))
-        return self.slider(x, y, rows), rate, x, slope
+        across = (brace - x) * (brace + x)
+        level = across**0.5
+        lever = slope - x / level
+        turned = bend - brace * brace / (across * level) * longer
+        return y + level, lever * longer, x, slope, turned * longer
 
     def on_corner(self, turn: FloatArray | float, rows: NDArray[np.intp]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return slider position, x and slope where the contact normal on the corner is turned by an angle [rad]."""
@@ -272,5 +280,22 @@ class ManyTracks:
         def evaluate(u: FloatArray) -> tuple[FloatArray, FloatArray]:
             return self.on_flank(u, chosen)[:2]
 
-        ideal[few] = invert_increasing(evaluate, wanted, (low[few], high[few]), guess)
+        bracket = low[few], high[few]
+        nearer, off = self._nearer(wanted, chosen, np.minimum(np.maximum(guess, bracket[0]), bracket[1]))
+        ideal[few] = invert_increasing(evaluate, wanted, bracket, nearer, before=off)
         return ideal
+
+    def _nearer(self, slider: FloatArray, rows: NDArray[np.intp], guess: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return path coordinates nearer than a guess to those of slider positions, and how far off these are there.
+
+        By Chebyshev's step, which cubes the error: the parts are a little off those that the guess is right for, and
+        one step of Newton's does the rest.
+        """
+        position, rate, *_, bend = self._bent(guess, rows)
+        off = position - slider
+        with np.errstate(all="ignore"):
+            step = off / rate
+            skew = 0.5 * step * bend / rate
+            nearer = guess - step * (1.0 + skew)
+        near = np.abs(skew) < 0.5
+        return np.where(near, nearer, guess), np.where(near, np.abs(off), 0.0)

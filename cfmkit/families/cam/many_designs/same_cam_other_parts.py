@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
-from cfmkit.families.cam.geometry.many_tracks import sign_changes
+from cfmkit.families.cam.geometry.many_tracks import Poses, sign_changes
 from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.many_tracks import ManyTracks, Poses
+    from cfmkit.families.cam.geometry.many_tracks import ManyTracks
     from cfmkit.families.cam.solution import Assembly
 
     Rows = NDArray[np.intp]
@@ -389,9 +389,13 @@ class BuiltSlab(Slab):
 
     @cached_property
     def pressure_max(self) -> FloatArray:
-        """Largest pressure of the contact on the flank, on the way up [Pa]."""
+        """Largest pressure of the contact on the flank, on the way up [Pa]; NaN where none is asked about."""
+        if not self._pressed:
+            return np.full(len(self.designs), np.nan)
         travel = np.concatenate([self.corner_travel[:, None], self.travel], axis=1)
-        pressed = YIELD_PRESSURE * self.stress_at(1.0, travel, self._every)
+        first = self._poses_at(self.corner_travel[:, None], self._every)
+        poses = Poses(*(np.concatenate(pair, axis=1) for pair in zip(first, self._poses, strict=True)))
+        pressed = self._pressure(poses, self._every, self._contact(poses, self._every, 1.0))
         known = np.isfinite(pressed)
         # Where the roller leaves a corner on the travel, that place comes before the samples on the flank.
         known[:, :1] &= self.begin_there
