@@ -98,6 +98,17 @@ class Quantity:
         return None if self.value is None or not self.words else self.words[int(self.value)]
 
 
+def quantities(definitions: Mapping[str, tuple[str, str]], numbers: Mapping[str, float | None]) -> dict[str, Quantity]:
+    """Return scalar results by name, each with its dimension and definition.
+
+    Examples
+    --------
+    >>> quantities({"rise": ("length", "height at the start")}, {"rise": 0.01})["rise"].definition
+    'height at the start'
+    """
+    return {name: Quantity(value, *definitions[name]) for name, value in numbers.items()}
+
+
 @dataclass(frozen=True)
 class Searched:
     """A number that only a design search knows, with the model and the window that it is of.

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.label_placement import Label
-from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, styled
+from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -182,6 +183,21 @@ def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], 
         ax.locator_params("x", nbins=4)
         ax.ticklabel_format(axis="x", style="plain")
     return found
+
+
+@styled
+def poses(heading: Heading, box: Box, titles: Sequence[str]) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a titled panel for each of up to three poses, all showing one box [m] to scale."""
+    slender = (box[3] - box[1]) / (box[2] - box[0])
+    size = (min(43.5, 120.0 / slender), min(43.5 * slender, 120.0))
+    figure = new_figure(160.0, 10.0 + size[1] + TITLE + heading.height_mm)
+    write_heading(figure, heading)
+    found = panels(figure, size, titles)
+    for ax in found:
+        to_scale(ax, box)
+        ax.tick_params(labelleft=ax is found[0])
+    found[0].set_ylabel("y [mm]")
+    return figure, found
 
 
 def part_name(text: str, points: Any, toward: Point, color: str = INK, prefer: float = 0.5) -> Label:

@@ -295,14 +295,12 @@ class Spec(Model):
         return tuple(one for one in self.requirements if one.metric not in OF_MANY_PARTS)
 
     @property
-    def motion(self) -> Literal["length", "angle"] | None:
-        """What the curves run over: displacements, or angles; None where a family does not say."""
-        return None
+    def motion(self) -> Literal["length", "angle"]:
+        """What the curves run over: displacements, or angles where a family says so."""
+        return "length"
 
     @model_validator(mode="after")
     def _windows_are_of_the_motion(self) -> Self:
-        if self.motion is None:
-            return self
         right = DIMENSIONS[self.motion]
         faults = {
             path: f"the curve runs over {right.phrase}: write its window in {right.unit}, or in shares of the travel: "
@@ -330,8 +328,6 @@ class Spec(Model):
 
     @model_validator(mode="after")
     def _target_is_of_the_motion(self) -> Self:
-        if self.motion is None:
-            return self
         right = "torque" if self.motion == "angle" else "force"
         faults: dict[tuple[str | int, ...], str] = {
             path: f"is a curve of {target.kind}, and this mechanism is driven by {right}"

@@ -366,7 +366,7 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
         "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
     }
     places = sight.rows.places
-    motion = sight.spec.motion or "length"
+    motion = sight.spec.motion
     about = searched(numbers, sight.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
     return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", told)))
 

@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
-from cfmkit.results import Quantity
+from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         numbers |= extremes(solution) | _events(solution)
     if solution.spec.mechanism.drive.kind == "displacement":
         numbers |= ranges(solution)
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return quantities(DEFINITIONS, numbers)
 
 
 def window_of(solution: OnCurve) -> tuple[float, float]:

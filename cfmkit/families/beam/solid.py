@@ -21,7 +21,7 @@ from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.families.findings import bracket
-from cfmkit.results import Quantity, Result, Status
+from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
 
 if TYPE_CHECKING:
@@ -297,7 +297,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
         numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | ranges(solution)
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return quantities(DEFINITIONS, numbers)
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:

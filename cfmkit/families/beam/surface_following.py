@@ -23,7 +23,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
 from cfmkit.numerics.cubic import bisect, values_at
-from cfmkit.results import Quantity
+from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -385,7 +385,7 @@ def curve_of(found: Ride) -> Curve:
 
 def values_along(found: Ride) -> Mapping[str, Quantity]:
     """Return the scalar results of a ride by name."""
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in found.values.items()}
+    return quantities(DEFINITIONS, found.values)
 
 
 def findings_along(found: Ride) -> Iterator[Finding]:

@@ -45,7 +45,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import CurveFrame, Registration, feet, gaps_across, register, registered_where_it_is
 from cfmkit.numerics.smoothing import smoothed
-from cfmkit.results import Quantity, Result, Status
+from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.data_files import DataSource
 from cfmkit.tables.measured_outline import read_sides
 
@@ -296,7 +296,7 @@ def _values(built: Built) -> Mapping[str, Quantity]:
     }
     if built.assembly.spec.mechanism.contact:
         numbers["contact_pressure_max"] = largest(pressure_of(built, 1.0))
-    shared = {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    shared = quantities(DEFINITIONS, numbers)
     return shared | dict(values_of_built(built))
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.solution import Built, Sides, Solution
-from cfmkit.results import Quantity
+from cfmkit.results import Quantity, quantities
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,7 +81,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
     if not np.isfinite(list(numbers.values())).all():
         why = "no friction and rest length of this model give the measured loop"
         return {name: Quantity(None, *DEFINITIONS[name], why) for name in DEFINITIONS}
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return quantities(DEFINITIONS, numbers)
 
 
 def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:

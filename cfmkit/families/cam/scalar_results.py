@@ -14,7 +14,7 @@ from cfmkit.families.cam.geometry.track_records import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.continuous_curves import extremes
-from cfmkit.results import Quantity
+from cfmkit.results import Quantity, quantities
 from cfmkit.specs.target_function import TargetCurve
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
@@ -180,7 +180,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         shares = solution.band.deviations()
         numbers["manufacturing_force_share"] = float(np.median(shares))
         numbers["manufacturing_force_share_95"] = float(np.quantile(shares, 0.95))
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()} | _wire(solution)
+    return quantities(DEFINITIONS, numbers) | _wire(solution)
 
 
 def _wire(solution: Solution) -> dict[str, Quantity]:

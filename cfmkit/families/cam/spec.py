@@ -481,11 +481,6 @@ class CamSpec(Spec):
         return self
 
     @property
-    def motion(self) -> Literal["length", "angle"]:
-        """What the curves run over: the displacement of the slider."""
-        return "length"
-
-    @property
     def fidelity(self) -> Literal["quasi-static", "dynamic"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or ("dynamic" if self.analysis.dynamics else "quasi-static")

@@ -484,11 +484,6 @@ class VcfmSpec(Spec):
         return None if found.fatigue is None else Durability(found.fatigue)
 
     @property
-    def motion(self) -> Literal["length", "angle"]:
-        """What the curves run over: the displacement of the shuttle."""
-        return "length"
-
-    @property
     def travel(self) -> float:
         """How far the shuttle goes [m]."""
         leaf = self.mechanism.bistable

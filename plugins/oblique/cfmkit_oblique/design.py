@@ -10,17 +10,14 @@ It grows with g: the largest g within the tolerance has the shortest springs. g 
 from __future__ import annotations
 
 from math import hypot, sqrt
-from typing import TYPE_CHECKING
 
+from cfmkit.families.base import Run
 from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit_oblique.model import finding
-
-if TYPE_CHECKING:
-    from cfmkit.families.base import Run
-    from cfmkit_oblique.spec import Mechanism, ObliqueDesign, ObliqueSpec
+from cfmkit_oblique.spec import Mechanism, ObliqueDesign, ObliqueSpec
 
 LEAST, MOST = 0.01, 0.99
 """Of a over L0: springs of a hundred half spans, and springs compressed by a hundredth, which play would use up."""

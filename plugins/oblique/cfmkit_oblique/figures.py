@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.line_diagram import Limit
 from cfmkit.plots.loop_figure import loop_figure
-from cfmkit.plots.style import new_figure, styled
-from cfmkit.plots.text import Heading, value_text, write_heading
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.figure import Figure
-
-    from cfmkit.results import Result
-    from cfmkit_oblique.model import Solution
+from cfmkit.plots.style import styled
+from cfmkit.plots.text import Heading, value_text
+from cfmkit.results import Result
+from cfmkit_oblique.model import Solution
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -37,17 +33,13 @@ def loop(result: Result) -> Figure:
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale: relaxed, with the oblique springs flat, and at the end."""
     solution: Solution = result.state
-    part, heading = solution.spec.mechanism, Heading.of(result, "mechanism to scale")
+    part = solution.spec.mechanism
     span, base = part.half_span, solution.height - part.vertical.free_length
     end = float(result.curve.motion[-1])
     places = {"relaxed": 0.0, "flat": min(solution.height, end), "end": end}
     box = (-1.3 * span, min(base, solution.height - end) - 0.2 * span, 1.3 * span, solution.height + 0.6 * span)
-    slender = (box[3] - box[1]) / (box[2] - box[0])
-    size = (min(43.5, 120.0 / slender), min(43.5 * slender, 120.0))
-    figure = new_figure(160.0, 10.0 + size[1] + parts.TITLE + heading.height_mm)
-    write_heading(figure, heading)
     titles = [f"{name}: {value_text(place, 'length')}" for name, place in places.items()]
-    panels = parts.panels(figure, size, titles)
+    figure, panels = parts.poses(Heading.of(result, "mechanism to scale"), box, titles)
     for ax, place in zip(panels, places.values(), strict=True):
         at = (0.0, solution.height - place)
         for name, anchor in (("left", (-span, 0.0)), ("right", (span, 0.0)), ("base", (0.0, base))):
@@ -55,7 +47,4 @@ def mechanism(result: Result) -> Figure:
             parts.contact(ax, anchor, f"anchor-{name}")
         parts.slider(ax, at, 0.12 * span)
         parts.force_arrow(ax, (at[0], at[1] + 0.5 * span), (at[0], at[1] + 0.1 * span))
-        parts.to_scale(ax, box)
-        ax.tick_params(labelleft=ax is panels[0])
-    panels[0].set_ylabel("y [mm]")
     return figure

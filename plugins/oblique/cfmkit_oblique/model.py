@@ -15,38 +15,27 @@ A. Carrella, M.J. Brennan, T.P. Waters, J. Sound Vib. 301 (2007) 678-689; its di
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import FloatArray
 from cfmkit.curves import Column, Curve
+from cfmkit.families.base import Run
 from cfmkit.families.findings import finder, mm, newton, rate
-from cfmkit.results import Quantity, Result, Status
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
-    from cfmkit.results import Finding
-    from cfmkit_oblique.spec import ObliqueSpec
+from cfmkit.results import Finding, Quantity, Result, Status, quantities
+from cfmkit_oblique.spec import ObliqueSpec
 
 DEFINITIONS = {
     "plateau_position": ("length", "displacement at which the oblique springs lie flat"),
     "plateau_force": ("force", "force there, carried by the vertical spring alone"),
     "plateau_stiffness": ("stiffness", "slope of the force there"),
     "stiffness_ratio": ("factor", "stiffness of one oblique spring over that of the vertical one"),
-    "zero_stiffness_ratio": (
-        "factor",
-        "the same ratio for which the slope is zero where the oblique springs lie flat",
-    ),
+    "zero_stiffness_ratio": ("factor", "the same ratio for which the slope is zero where the oblique springs lie flat"),
     "geometry_ratio": ("ratio", "half span over free length: cosine of the oblique springs' first inclination"),
-    "soft_range": (
-        "length",
-        "displacements around there at which the slope is below the vertical spring's stiffness",
-    ),
+    "soft_range": ("length", "displacements around there at which the slope is below the vertical spring's stiffness"),
 }
 FINDINGS = {
     "stiff": "the slope where the oblique springs lie flat is above zero: the oblique springs are too soft",
@@ -158,16 +147,16 @@ def _values(solution: Solution) -> dict[str, Quantity]:
     part = solution.spec.mechanism
     # the slope is that of the vertical spring where L^3 = L0 a^2
     soft = np.sqrt(max((part.oblique.free_length * part.half_span**2) ** (2 / 3) - part.half_span**2, 0.0))
-    found = (
-        solution.height,
-        part.vertical.stiffness * solution.height,
-        solution.stiffness,
-        part.oblique.stiffness / part.vertical.stiffness,
-        solution.zero_ratio,
-        part.half_span / part.oblique.free_length,
-        2.0 * float(soft),
-    )
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in zip(DEFINITIONS, found, strict=True)}
+    numbers = {
+        "plateau_position": solution.height,
+        "plateau_force": part.vertical.stiffness * solution.height,
+        "plateau_stiffness": solution.stiffness,
+        "stiffness_ratio": part.oblique.stiffness / part.vertical.stiffness,
+        "zero_stiffness_ratio": solution.zero_ratio,
+        "geometry_ratio": part.half_span / part.oblique.free_length,
+        "soft_range": 2.0 * float(soft),
+    }
+    return quantities(DEFINITIONS, numbers)
 
 
 def _touching(solution: Solution) -> Iterator[Finding]:

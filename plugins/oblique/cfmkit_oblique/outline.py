@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from cfmkit.export.contours import TOLERANCE, Contour, Drawing, Line, circle, polygon
 from cfmkit_oblique.model import Solution
-
-if TYPE_CHECKING:
-    from cfmkit_oblique.spec import ObliqueSpec
+from cfmkit_oblique.spec import ObliqueSpec
 
 MARGIN, PIN = 0.25, 0.04
 """Of the plate around the anchors, and radius of holes and half width of the slot, in half spans."""

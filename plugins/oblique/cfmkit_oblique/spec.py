@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, PositiveLength, Spec
-from cfmkit.specs.units import Force, Length, Ratio, Stiffness
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, PositiveForce, PositiveLength, Spec
+from cfmkit.specs.units import Ratio, Stiffness
 
 
 class Coil(Model):
@@ -15,7 +15,7 @@ class Coil(Model):
 
     stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="of this spring alone")
     free_length: PositiveLength = Field(description="when nothing presses it")
-    solid_length: Annotated[Length, Field(ge=0)] = Field(0.0, description="at which its coils touch")
+    solid_length: NonNegativeLength = Field(0.0, description="at which its coils touch")
 
     @model_validator(mode="after")
     def _can_be_compressed(self) -> Self:
@@ -41,7 +41,7 @@ class Mechanism(Model):
 class ObliqueDesign(DesignBlock):
     """A force that stays constant over a range."""
 
-    force: Annotated[Force, Field(gt=0)] = Field(description="where the oblique springs lie flat")
+    force: PositiveForce = Field(description="where the oblique springs lie flat")
     range: PositiveLength = Field(description="of displacements around that place, half of it to each side")
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] = Field(0.01, description="largest departure from the force there")
     height_max: PositiveLength | None = Field(None, description="from the anchors up to the relaxed slider, at most")
@@ -61,8 +61,3 @@ class ObliqueSpec(Spec):
     mechanism: Mechanism
     design: ObliqueDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: ObliqueAnalysis = Field(default_factory=ObliqueAnalysis, description="how it is run")
-
-    @property
-    def motion(self) -> Literal["length"]:
-        """What the curve runs over."""
-        return "length"
