@@ -19,6 +19,8 @@ from cfmkit.families import family
 from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
 from cfmkit.plots.moving_svg import poses
+from cfmkit.plots.style import axes_mm, new_figure
+from cfmkit.plots.vector_formats import inline, svg
 from cfmkit.results import Finding, Result, Status
 from cfmkit.runs import batch_files, run_findings, run_page, study_page, suggestion_files
 from cfmkit.studies.batch_entries import Entry
@@ -100,6 +102,23 @@ def test_a_page_holds_verdict_requirements_metrics_figures_and_film_and_asks_for
     assert outside == []
     assert "@import" not in text
     assert not re.search(r"url\((?!#)", text)
+
+
+@pytest.mark.parametrize("name", ["cam", "beam", "springs"])
+def test_no_two_parts_of_a_page_have_the_same_id(reports, name):
+    ids = [attributes["id"] for _, attributes in Outline(made(reports[name])).tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+
+
+def test_numbers_that_are_read_in_a_figure_keep_their_digits_on_a_page():
+    figure = new_figure(80.0, 60.0)
+    ax = axes_mm(figure, (20.0, 20.0, 50.0, 30.0))
+    ax.plot([0.0, 0.004], [0.0, 1.0])
+    ax.set_title("friction 0.0025, radius 10.125 mm")
+    text = Outline(inline(svg(figure), "figure")).text
+    assert "friction 0.0025, radius 10.125 mm" in text
+    assert "0.002" in text
+    assert not re.search(r"\d\.\d{3}[^<>]*>", inline(svg(figure), "figure"))  # those of the drawing are short
 
 
 @pytest.mark.parametrize("name", ["cam", "vcfm", "strip"])
