@@ -21,14 +21,14 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
-from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, packing, predictor
-from cfmkit.elastica.kernels.compiling_progress import reported
+from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, march, packing
+from cfmkit.elastica.kernels.compiled import reported
 from cfmkit.elastica.kernels.packing import HEAD, objects
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
 from cfmkit.store.disk import trusted
 
-_count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
+_count, _solve, _predict = dense.positive_count, dense.lu_solve, march._predict
 
 
 @numba.njit

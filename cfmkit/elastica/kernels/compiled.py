@@ -6,25 +6,57 @@ import contextlib
 import ctypes
 import logging
 import struct
+import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.kernels import disk_cache, machine_code
-from cfmkit.elastica.kernels.compiling_progress import reported
 from cfmkit.elastica.kernels.packing import HEAD, REFUSED, Kind, flat, objects
 from cfmkit.elastica.kernels.signatures import DOORS, EACH, FORCES, MARCH, SOLVE, TANGENT
 from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
 
 _Pair = ctypes.c_int64 * 2
 _compiling = threading.Lock()
+_LOG = logging.getLogger("cfmkit.elastica")
+
+_PARTS = {
+    "solver": "equilibria and paths",
+    "states": "states along beams",
+    "complex_states": "states along beams, complex",
+    "slopes": "derivatives of equilibria",
+    "row_slopes": "derivatives of states",
+    "held_slopes": "derivatives of forces",
+}
+_LASTS = {"solver": "about 12 s", "slopes": "about 8 s"}
+
+
+@contextlib.contextmanager
+def reported(name: str) -> Iterator[Callable[[float], None]]:
+    """Say that a door is compiled; yield what shows, on a terminal, the share that is done."""
+    text = f"compiling the beam engine, once: {_PARTS[name]}, {_LASTS.get(name, 'a moment')}"
+    if sys.stderr is None or not sys.stderr.isatty():
+        _LOG.warning(text)
+        yield lambda _share: None
+        return
+
+    def show(share: float) -> None:
+        sys.stderr.write(f"\r{text}: {100 * share:.0f} %")
+        sys.stderr.flush()
+
+    show(0.0)
+    try:
+        yield show
+    finally:
+        sys.stderr.write("\r" + " " * (len(text) + 7) + "\r")
+        sys.stderr.flush()
 
 
 class Door:
@@ -95,8 +127,6 @@ def _made(name: str) -> Callable[[bytes, Any], int]:
         disk_cache.write(name, code)
     return run
 
-
-_LOG = logging.getLogger("cfmkit.elastica")
 
 _doors = {name: Door(name) for name in DOORS}
 _solver = _doors["solver"]
@@ -178,7 +208,7 @@ def slopes(
 
 
 def row_slopes(m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
-    """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.output_slopes.row_slopes`."""
+    """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.design_derivatives.row_slopes`."""
     room = np.zeros(9 * dys.shape[2])
     _doors["row_slopes"](_whole(n_free), m.block, design.block, objects((ys, drives, dys, out, room)))
 
@@ -186,7 +216,7 @@ def row_slopes(m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, d
 def held_slopes(
     m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any
 ) -> None:
-    """Set the derivatives of forces; see `cfmkit.elastica.kernels.output_slopes.held_slopes`."""
+    """Set the derivatives of forces; see `cfmkit.elastica.kernels.design_derivatives.held_slopes`."""
     room = held_slope_space(m)
     given = objects((ys, drives, dys, out, *flat(room)))
     _doors["held_slopes"](_whole(n_free), m.block, design.block, given)

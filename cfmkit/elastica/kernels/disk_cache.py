@@ -35,7 +35,7 @@ def digest() -> str:
     return whole.hexdigest()
 
 
-_NOT_COMPILED = ("compiled.py", "disk_cache.py", "compiling_progress.py")
+_NOT_COMPILED = ("compiled.py", "disk_cache.py")
 """What calls the code, keeps it and tells of it: the code does not follow from them."""
 
 _SETTINGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_ENABLE_AVX", "NUMBA_OPT")

@@ -5,16 +5,15 @@ Importing this imports the compiler: only `cfmkit.elastica.kernels.build` does, 
 
 from __future__ import annotations
 
-from cfmkit.elastica.kernels import design_derivatives as _columns
+from cfmkit.elastica.kernels import design_derivatives as _design
 from cfmkit.elastica.kernels import march as _march
 from cfmkit.elastica.kernels import newton as _newton
 from cfmkit.elastica.kernels import observe as _observe
-from cfmkit.elastica.kernels import output_slopes as _outputs
 from cfmkit.elastica.kernels.signatures import EACH, MARCH, SOLVE, TANGENT
 
 _follow, _solve, _each = _march.march, _newton.solve, _newton.solve_each
 _forces, _states, _tangent = _observe.forces, _observe.states, _observe.tangent
-_slopes, _row_slopes, _held_slopes = _columns.slopes, _outputs.row_slopes, _outputs.held_slopes
+_slopes, _row_slopes, _held_slopes = _design.slopes, _design.row_slopes, _design.held_slopes
 
 
 def solver(task, n_free, one, m, options, arrays, scratch, room):

@@ -18,7 +18,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.sensitivity import outputs
-from cfmkit.elastica.sensitivity.slopes import Slopes
+from cfmkit.elastica.sensitivity.outputs import Slopes
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
