@@ -194,7 +194,7 @@ class DesignKeys(Model):
     tolerances: dict[str, tuple[MetricValue, MetricValue] | Tolerance] | None = Field(
         None,
         min_length=1,
-        description="how far values of made parts are off, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
+        description="deviations of manufactured parts, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
     )
     process: Literal["laser", "wire-edm", "fdm", "sls", "mill"] | None = Field(
         None,

@@ -30,7 +30,7 @@ class ExportOptions(OneSpec):
     ] = None
     format: Annotated[
         str | None,
-        option("--format", metavar="LIST", text="Of dxf,svg,csv,stl,3mf,step,inp; default: dxf,svg,csv."),
+        option("--format", metavar="LIST", text="Any of dxf,svg,csv,stl,3mf,step,inp; default: dxf,svg,csv."),
     ] = None
     quiet: Quiet = False
 

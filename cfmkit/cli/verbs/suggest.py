@@ -47,31 +47,40 @@ class SuggestOptions(Common):
     ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '[19 N, 21 N]'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
-    travel: Annotated[str | None, _key("travel", "LENGTH", "Over which the force is constant.")] = None
-    angle: Annotated[str | None, _key("angle", "ANGLE", "Over which the torque is constant.")] = None
-    ripple: Annotated[str | None, _key("ripple", "SHARE", "Largest (max - min)/max over the travel; else 5 %.")] = None
+    travel: Annotated[str | None, _key("travel", "LENGTH", "Travel over which the force is to be constant.")] = None
+    angle: Annotated[str | None, _key("angle", "ANGLE", "Angle over which the torque is to be constant.")] = None
+    ripple: Annotated[str | None, _key("ripple", "SHARE", "Largest (max - min)/max over the travel; default: 5 %.")] = (
+        None
+    )
     room: Annotated[
-        str | None, _key("room", "AxBxCmm", "Across the travel, along it, and the depth, which may be left out.")
+        str | None, _key("room", "AxBxCmm", "Space available: across the travel, along it, and the depth (optional).")
     ] = None
     material: Annotated[
-        list[str] | None, _key("material", "A,B", "What it may be made of: `show materials`. May be repeated.")
+        list[str] | None,
+        _key("material", "A,B", "Permitted materials; `cfmkit show materials` lists them. Repeatable."),
     ] = None
-    process: Annotated[str | None, _key("process", "NAME", "fdm, sls, laser, wire-edm or mill.")] = None
-    adjustable: Annotated[str | None, _key("adjustable", "A,B", "Between which forces it is adjusted: 15N,25N.")] = None
-    hysteresis: Annotated[str | None, _key("hysteresis", "SHARE", "Largest loss of a cycle, over its work.")] = None
+    process: Annotated[
+        str | None, _key("process", "NAME", "Manufacturing process: fdm, sls, laser, wire-edm or mill.")
+    ] = None
+    adjustable: Annotated[str | None, _key("adjustable", "A,B", "Lowest and highest adjustable force: 15N,25N.")] = None
+    hysteresis: Annotated[
+        str | None, _key("hysteresis", "SHARE", "Largest energy loss of a cycle, as a share of its work.")
+    ] = None
     cycles: Annotated[
         str | None, _key("cycles", "N", "Required life in cycles; checked for materials with fatigue data.")
     ] = None
-    made_well: Annotated[str | None, _key("yield", "SHARE", "Share of made parts that meet the wish.")] = None
+    made_well: Annotated[
+        str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the wish.")
+    ] = None
     prefer: Annotated[
         list[str] | None,
-        _key("prefer", "A,B", "What decides the order: size,ripple,parts,stress,depth. May be repeated."),
+        _key("prefer", "A,B", "Ranking, most important first: size,ripple,parts,stress,depth. Repeatable."),
     ] = None
     time_budget: Annotated[
-        str, option("--time-budget", metavar="TIME", shown=True, text="Time for everything: 60s, 10min.")
+        str, option("--time-budget", metavar="TIME", shown=True, text="Time for the whole command: 60s, 10min.")
     ] = BUDGET
     verify: Annotated[
-        bool, flag("--verify", text="Run the next better model of each proposal, which takes longer.")
+        bool, flag("--verify", text="Solve each proposal with the next more accurate model, too; takes longer.")
     ] = False
     out: Out = None
     seed: Seed = 0

@@ -70,7 +70,7 @@ class SweepOptions(Studying):
         ),
     ] = None
     design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False
-    curves: Annotated[bool, flag("--curves", text="Keep the curve of every point in curves.csv.")] = False
+    curves: Annotated[bool, flag("--curves", text="Write the curve of every point to curves.csv.")] = False
     metrics: Annotated[str | None, option("--metrics", metavar="A,B", text="Columns of results.csv; default: all.")] = (
         None
     )

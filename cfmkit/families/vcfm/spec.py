@@ -90,7 +90,7 @@ class BoughtSprings(Model):
     shorter (longer) than relaxed, and all are relaxed as made.
     """
 
-    kind: Literal["compression", "extension"] = Field("compression", description="what they are loaded by")
+    kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel")
     initial_tension: Annotated[Force, Field(ge=0)] = Field(

@@ -110,11 +110,11 @@ class Optimise(Model):
     limits: ShapeLimits = Field(default_factory=ShapeLimits, description="limits for every shape")
     force: ForceWanted = Field(default_factory=ForceWanted, description="mean force over the window")
     starts: int = Field(20, ge=1, le=10_000, description="random starts")
-    drawn: int = Field(60, ge=1, le=100_000, description="random networks looked at for each start")
+    drawn: int = Field(60, ge=1, le=100_000, description="random networks examined for each start")
     widened: int = Field(8, ge=1, le=10_000, description="how many of the best are widened, for `range`")
     time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after this time")
     tolerances: Tolerances = Field(
-        default_factory=Tolerances, description="for the audit; given, an old name of `design.tolerances`, too"
+        default_factory=Tolerances, description="for the audit; if stated, also read as `design.tolerances` (old name)"
     )
 
     def scatter(self, mechanism: Mechanism) -> dict[str, Tolerance]:
