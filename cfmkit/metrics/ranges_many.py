@@ -68,6 +68,16 @@ class ManyBranches:
         """Where 95 % is first reached, (d,), and the widths of `BAND_RANGES`, (d, 3), of branches that are known."""
         return _solved(self)
 
+    @cached_property
+    def rise(self) -> FloatArray:
+        """The first of these alone: of a beam every place takes an equilibrium, and bands need six times as many."""
+        return self.solved[0] if "solved" in self.__dict__ else _solved(self, with_bands=False)[0]
+
+    @cached_property
+    def bands(self) -> FloatArray:
+        """The second; with the first in the same calls unless that is known."""
+        return _solved(self, with_rise=False)[1] if "rise" in self.__dict__ else self.solved[1]
+
     def at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of each row, (d, m), by linear interpolation."""
         if self.exact is not None:
@@ -109,7 +119,8 @@ def range_95_fraction(many: ManyBranches) -> FloatArray:
 
 def _first_95(many: ManyBranches) -> FloatArray:
     if many.exact is not None:
-        return many.solved[0]
+        # of many branches a call costs more than its places, of one the places cost
+        return many.rise if len(many.motion) == 1 else many.solved[0]
     nominal, first, step, (earlier, later) = _rise(many)
     crossed = _crossing(step, (earlier - 0.95 * nominal, later - 0.95 * nominal))
     return np.where(nominal == 0, np.nan, np.where(first == 0, many.motion[:, 0], crossed))
@@ -136,7 +147,7 @@ def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, F
 def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
     """Return the width within a tolerance about the reference pose of each row, (d,); one of `BAND_RANGES`."""
     if many.exact is not None:
-        return many.solved[1][:, list(BAND_RANGES.values()).index(tolerance)]
+        return many.bands[:, list(BAND_RANGES.values()).index(tolerance)]
     motion, place = many.motion, many.reference
     here = many.at(place[:, None])[:, 0]
     offset = many.effort / here[:, None] - 1
@@ -171,12 +182,17 @@ def _edge(
     return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
 
 
-def _solved(many: ManyBranches) -> tuple[FloatArray, FloatArray]:
-    """Return `ManyBranches.solved`: all ends are looked for together, as calls of the model are what takes the time."""
+def _solved(many: ManyBranches, with_rise: bool = True, with_bands: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Return `ManyBranches.solved`: all ends are looked for together, as calls of the model are what takes the time.
+
+    Without the rise, or the bands, these are NaN.
+    """
     nominal, first, (start, stop), _ = _rise(many)
     start, some = np.where(first == 0, many.motion[:, 0], start), np.isfinite(nominal) & (nominal != 0)
     stop = np.where(some & (first > 0), stop, start)
+    start, stop = (start, stop) if with_rise else (start, start)
     here, inside, outside, ends = _bands(many)
+    outside = outside if with_bands else inside
     widths, effort = np.repeat(list(BAND_RANGES.values()), 2) * (1 + ROUNDING), many.exact
     if effort is None:
         raise ValueError("the branches are not known at every place")
@@ -192,7 +208,7 @@ def _solved(many: ManyBranches) -> tuple[FloatArray, FloatArray]:
     places = last_places(excess, np.column_stack([start, inside]), np.column_stack([stop, outside]))
     found = np.where(np.isnan(ends), places[:, 1:], ends)
     bands = np.where(here == 0, np.nan, found[:, 1::2] - found[:, ::2])
-    return np.where(some, places[:, 0], np.nan), bands
+    return np.where(some & with_rise, places[:, 0], np.nan), bands if with_bands else np.full_like(bands, np.nan)
 
 
 def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:

@@ -17,7 +17,7 @@ from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_tolerances import assumed, tolerances, tolerances_of
-from cfmkit.studies.near_design import most_parts, slopes, step_of
+from cfmkit.studies.near_design import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.requirement_rows import sampled_of
 
 if TYPE_CHECKING:
@@ -137,7 +137,10 @@ def _moved(
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the force of the design at places (p,), on its first branch, and its derivatives by the errors (p, d)."""
     spec, branch = made.spec, result.curve.branches[0]
-    if 2 * len(made.paths) > most_parts(spec):
+    exact = exact_slopes(spec, places, made.paths)
+    by_exact = [exact[path].effort.get(branch) for path in made.paths if path in exact]
+    known = len(by_exact) == len(made.paths) and all(one is not None for one in by_exact)
+    if not known and 2 * len(made.paths) > most_parts(spec):
         return None
 
     def force(part: Spec) -> FloatArray | None:
@@ -148,6 +151,8 @@ def _moved(
     nominal = force(spec)
     if nominal is None:
         return None
+    if known:
+        return nominal, np.array(by_exact).T
     steps = {one.path: (one.spread.nominal, step_of(one.spread.standard_deviation)) for one in made.parameters}
     by_error = slopes(force, spec, steps)
     return None if by_error is None else (nominal, np.column_stack(by_error))

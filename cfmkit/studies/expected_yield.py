@@ -14,10 +14,20 @@ from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_tolerances import MODULUS, assumed
-from cfmkit.studies.near_design import most_parts, slopes, step_of
-from cfmkit.studies.requirement_rows import metrics_in, numbers_of, places_of, rows_of, sampled_of
+from cfmkit.studies.near_design import exact_slopes, most_parts, slopes, step_of
+from cfmkit.studies.requirement_rows import (
+    metrics_in,
+    metrics_of_part,
+    numbers_in,
+    numbers_of,
+    places_of,
+    rows_of,
+    sampled_of,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
@@ -106,7 +116,9 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     middle = None if rows is None else _numbers(spec, rows, run)
     if rows is None or middle is None:
         raise YieldUnknown("the design cannot be followed at a few poses")
-    if 2 * len(paths) > most_parts(spec, by_looks=not rows.metrics):
+    exact = {path: numbers_in(one) for path, one in exact_slopes(spec, places, paths).items()}
+    by_looks = bool(rows.metrics) or len(exact) < len(paths)
+    if by_looks and 2 * len(paths) > most_parts(spec, by_looks=not rows.metrics):
         quick = family(spec.family).sampled is not None and not rows.metrics
         raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
     if rows.metrics and (thin := _thinned(result)) is not None:
@@ -120,9 +132,7 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     steps = {path: (nominal[path], step_of(sigma)) for path, sigma in found.deviations.items()}
     if found.modulus:
         steps[MODULUS] = nominal[MODULUS], 1e-3 * nominal[MODULUS]
-    by_error = slopes(lambda part: _numbers(part, rows, run), spec, steps)
-    assert by_error is not None  # a part without numbers has ended the estimate
-    for path, slope in zip(steps, by_error, strict=True):
+    for path, slope in _slopes(spec, rows, steps, exact, run).items():
         if path == MODULUS and found.modulus is not None:
             errors = generator.uniform(*found.modulus, PARTS) - nominal[path]
         else:
@@ -136,6 +146,28 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     return share, measured
 
 
+def _slopes(
+    spec: Spec,
+    rows: RequirementRows,
+    steps: Mapping[str, tuple[float, float]],
+    exact: Mapping[str, FloatArray],
+    run: Run,
+) -> dict[str, FloatArray]:
+    """Return the derivatives of what rows look at; `exact`: those of effort and stress that are known."""
+    whole = exact.keys() < steps.keys()
+    if not whole and not rows.metrics:
+        return {path: exact[path] for path in steps}
+
+    def numbers(part: Spec) -> FloatArray | None:
+        return _numbers(part, rows, run, whole)
+
+    found = slopes(numbers, spec, steps)
+    assert found is not None  # a part without numbers has ended the estimate
+    if whole:
+        return dict(zip(steps, found, strict=True))
+    return {path: np.concatenate([exact[path], one]) for path, one in zip(steps, found, strict=True)}
+
+
 def _thinned(result: Result) -> Spec | None:
     """Return a design whose curve has fewer points; None where metrics are taken from points, or are few already.
 
@@ -147,10 +179,10 @@ def _thinned(result: Result) -> Spec | None:
     return result.spec.replace({"analysis.points": FEW_POINTS})
 
 
-def _numbers(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray:
-    """Return what rows look at of a part; a part without it ends the estimate."""
+def _numbers(spec: Spec, rows: RequirementRows, run: Run, whole: bool = True) -> FloatArray:
+    """Return what rows look at of a part, all of it or metrics alone; a part without it ends the estimate."""
     try:
-        found = numbers_of(spec, rows, run)
+        found = numbers_of(spec, rows, run) if whole else metrics_of_part(spec, rows, run)
     except CfmError as error:
         raise YieldUnknown(str(error)) from None
     if found is None or not np.isfinite(found).all():

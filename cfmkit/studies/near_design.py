@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.robust_design import SIGMA_STEP
+from cfmkit.errors import CfmError
 from cfmkit.families import family
+from cfmkit.families.base import function_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Sampled
     from cfmkit.specs.spec import Spec
 
 MOST_LOOKS, MOST_ANALYSES = 24, 12
@@ -30,6 +33,16 @@ def most_parts(spec: Spec, by_looks: bool = True) -> int:
 def step_of(deviation: float) -> float:
     """Return the error at which a part is solved for its derivative, of an error's standard deviation."""
     return SIGMA_STEP * deviation
+
+
+def exact_slopes(spec: Spec, places: FloatArray, paths: Sequence[str]) -> dict[str, Sampled]:
+    """Return the derivatives of effort and stress at places, by those values of a design by which they are known."""
+    quick = family(spec.family).sampled_slopes
+    try:
+        found = None if quick is None else function_named(quick)(spec, places, tuple(paths))
+    except CfmError:
+        return {}
+    return {} if found is None else dict(found.by)
 
 
 def slopes(

@@ -309,12 +309,18 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None
         return None
     numbers = [numbers_in(found)]
     if rows.metrics:
-        study = Study(spec, (), rows.metrics, lean=True)
-        result = family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
-        if not result.curves:
+        metrics = metrics_of_part(spec, rows, run)
+        if metrics is None:
             return None
-        numbers.append(metrics_in(result, rows))
+        numbers.append(metrics)
     return np.concatenate(numbers)
+
+
+def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
+    """Return the last of these numbers alone, metrics of a whole analysis; None of a part without a curve."""
+    study = Study(spec, (), rows.metrics, lean=True)
+    result = family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
+    return metrics_in(result, rows) if result.curves else None
 
 
 def metrics_in(result: Result, rows: RequirementRows) -> FloatArray:

@@ -56,3 +56,24 @@ def test_of_a_strip_its_thickness_is_measured_not_the_error_of_it():
     assert "measure beam.thickness (0.7 mm to 1.1 mm as drawn)" in measured(
         "make_pom_strip", **{"mechanism.beam.thickness": ["1.1 mm", "0.7 mm", "1 mm"]}
     )
+
+
+def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monkeypatch):
+    from cfmkit.studies import bench_instructions
+
+    spec = cfmkit.load("configs/beam_design_arch.yaml")
+    result, numbers = cfmkit.analyze(spec), []
+    exact = bench_instructions.exact_slopes
+    for slopes in (exact, lambda *_: {}):
+        monkeypatch.setattr(bench_instructions, "exact_slopes", slopes)
+        numbers.append([float(text) for text in re.findall(r"([\d.]+) N", bench(result, Run()))])
+    assert exact(result.spec, np.array([0.006, 0.012]), ("mechanism.beams.s.thickness", "mechanism.thickness"))
+    assert len(numbers[0]) == 6
+    np.testing.assert_allclose(*numbers, rtol=5e-3)
+
+
+def test_many_errors_need_no_part_more_where_the_engine_has_the_derivatives():
+    spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
+    assert 2 * len(spec.design.tolerances) > 24  # more parts than are solved for a sentence
+    told = bench(cfmkit.analyze(spec), Run())
+    assert re.search(r"measure (beams|nodes)\..* expect [\d.]+ N \(", told)

@@ -85,3 +85,16 @@ def test_a_spread_is_judged_in_the_direction_of_its_mean_and_without_a_target_no
     assert metric_of("force_ripple", rows, None) == pytest.approx([2 / 3, 4 / 3])
     assert metric_of("force_max", rows, None).tolist() == [-1.0, 1.0]
     assert np.isnan(metric_of("deviation_from_target", rows, None)).all()
+
+
+def test_the_first_95_percent_alone_are_those_that_are_solved_for_beside_the_bands():
+    def effort(places, _rows):
+        return np.tanh(places) * (1.0 - 0.02 * places)
+
+    motion = np.linspace(0.0, 4.0, 41)[None]
+    many = ManyBranches(motion, effort(motion, None), np.array([0.0]), np.array([4.0]), exact=effort)
+    with np.errstate(all="ignore"):
+        both = many.solved
+        alone = ManyBranches(motion, many.effort, many.low, many.high, exact=effort)
+        np.testing.assert_allclose(alone.rise, both[0], rtol=1e-11)
+        np.testing.assert_allclose(alone.bands, both[1], rtol=1e-11)
