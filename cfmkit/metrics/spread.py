@@ -2,6 +2,7 @@
 
 The numbers of a `Spread` are floats for one curve and (d,) arrays for many; every metric is written once, for both.
 An effort whose mean is negative is judged in its own direction: the opposite sign convention gives the same ripple.
+Where the mean is zero, as over a full turn, the larger extreme says the direction; a mean of rounding alone is zero.
 A share of something that is not positive is NaN.
 """
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
     Number = Any  # a float or a (d,) array: what goes in comes out
     Pair = tuple[FloatArray, FloatArray]
+
+
+ROUNDED = 1e-13
+"""A mean that is smaller than this part of the largest effort is rounding: sums of 10 000 points stay below it."""
 
 
 class Spread(NamedTuple):
@@ -41,15 +46,18 @@ class Spread(NamedTuple):
     def of(cls, mean: Number, largest: Number, smallest: Number) -> Spread:
         """Return the spread of efforts with this mean and these extremes."""
         if isinstance(mean, float):
-            return cls(-mean, -smallest, -largest, -1.0) if mean < 0 else cls(mean, largest, smallest, 1.0)
-        down = mean < 0
+            mean = 0.0 if abs(mean) <= ROUNDED * max(abs(largest), abs(smallest)) else mean
+            down = (mean or largest + smallest) < 0
+            return cls(abs(mean), -smallest, -largest, -1.0) if down else cls(mean, largest, smallest, 1.0)
+        mean = np.where(np.abs(mean) <= ROUNDED * np.maximum(np.abs(largest), np.abs(smallest)), 0.0, mean)
+        down = np.where(mean == 0, largest + smallest, mean) < 0
         high, low = np.where(down, -smallest, largest), np.where(down, -largest, smallest)
         return cls(np.abs(mean), high, low, np.where(down, -1.0, 1.0))
 
 
 def level(found: Spread) -> Number:
     """Return the mean effort."""
-    return found.sign * found.mean
+    return found.sign * found.mean + 0.0  # no minus before a zero
 
 
 def largest(found: Spread) -> Number:

@@ -98,3 +98,13 @@ def test_the_first_95_percent_alone_are_those_that_are_solved_for_beside_the_ban
         alone = ManyBranches(motion, many.effort, many.low, many.high, exact=effort)
         np.testing.assert_allclose(alone.rise, both[0], rtol=1e-11)
         np.testing.assert_allclose(alone.bands, both[1], rtol=1e-11)
+
+
+@pytest.mark.parametrize("mean", [-3e-16, 0.0, 3e-16])
+def test_where_the_mean_is_zero_the_larger_extreme_says_the_direction(mean):
+    """Over a full turn the rounding of the mean decided: a ripple of 197.5 or 202.6 % by the number of points."""
+    alone = Spread.of(mean, 1.25, -1.5)
+    many = Spread.of(np.array([mean, 0.5]), np.array([1.25, 2.0]), np.array([-1.5, -3.0]))
+    assert alone == (0.0, 1.5, -1.25, -1.0)
+    assert tuple(float(item[0]) for item in many) == alone
+    assert tuple(float(item[1]) for item in many) == (0.5, 2.0, -3.0, 1.0)
