@@ -143,3 +143,19 @@ def test_a_long_first_step_leads_to_the_side_that_a_column_is_bent_to(slendernes
     path = trace(column(slenderness, clamped=False), drive, Control(1e-4, imperfection=bent))
     assert path.status is PathStatus.COMPLETE
     assert np.sign(path.motion("a")[1:, 2]).tolist() == [np.sign(path.fits["x"].angle(0.0, 0.5))] * (len(path) - 1)
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.7, 2.1])
+def test_a_strip_that_does_not_stretch_is_straight_up_to_its_critical_load(
+    direction: float,
+) -> None:
+    """Its poses change by rounding only, which leads nowhere."""
+    c, s = np.cos(direction), np.sin(direction)
+    nodes = {"a": Node(0, 0, PINNED), "b": Node(LENGTH * c, LENGTH * s, guided(direction, rotates=True))}
+    network = Network(nodes, {"x": Beam("a", "b", Section(2e9, 10e-3, 0.3e-3, axial=False))})
+    critical = np.pi**2 * 2e9 * 10e-3 * 0.3e-3**3 / 12 / LENGTH**2
+    load = PointLoad("b", fx=-critical * c, fy=-critical * s)
+    path = trace(network, Loading((load,), np.array([0.3, 0.9, 1.2])), Control(1e-6, branch="primary"))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
+    assert path.events[0].drive == pytest.approx(1.0, rel=1e-6)

@@ -291,7 +291,7 @@ def _veers(old, new, one, other, ahead, n_free, n):
             size += change * change
             first += one[i] * one[i]
             last += other[i] * other[i]
-    if changes(old, new, n_free, n) <= STILL:
+    if changes(new, old, n_free, n) <= STILL:
         return False
     sense = np.sign(ahead)
     return sense * along < VEER * np.sqrt(size * first) or sense * across < VEER * np.sqrt(size * last)
