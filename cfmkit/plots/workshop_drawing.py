@@ -176,9 +176,11 @@ def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) ->
     arm = radius + 1.2 / scale
     ax.plot([x - arm, x + arm], [y, y], color=GREY, linewidth=0.5, zorder=2)
     ax.plot([x, x], [y - arm, y + arm], color=GREY, linewidth=0.5, zorder=2)
-    near = 0.75 * arm
     text = SMALL * POINT / scale * 0.6 * len(str(number)), SMALL * POINT / scale
-    right, up = next((side for side in SIDES if _is_clear(drawing, (x, y), side, near, text)), SIDES[0])
+    # beside the hole, or beyond the line around it
+    spots = [(side, share * arm) for share in (0.75, 1.1, 1.5, 2.0) for side in SIDES]
+    clear = (spot for spot in spots if _is_clear(drawing, (x, y), spot[0], spot[1], text))
+    (right, up), near = next(clear, spots[0])
     ha, va = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
     ax.text(x + right * near, y + up * near, str(number), fontsize=SMALL, color=VERMILLION, ha=ha, va=va, zorder=6)
 

@@ -115,7 +115,8 @@ def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:
 def _drawn(drawing: Drawing, spec: Spec) -> Figure:
     from cfmkit.plots.workshop_drawing import drawing_figure
 
-    told = stated_tolerances(spec) or assumed_tolerances(spec)
+    stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
+    told = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
     return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", told)
 
 

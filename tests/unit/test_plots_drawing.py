@@ -78,3 +78,38 @@ def test_a_drawing_without_stated_tolerances_names_the_process_that_is_assumed()
     lines = assumed_tolerances(cfmkit.load(CONFIGS / "make_finger.yaml"))
     assert lines[:2] == ("process: fdm, assumed", "thickness +- 0.05 mm (standard deviation)")
     assert lines[-1] == "inside corners from 0.2 mm, walls from 0.4 mm"
+
+
+def test_the_holes_of_links_are_those_of_their_pins():
+    spec = cfmkit.load(CONFIGS / "slider_crank_bought.yaml").replace(
+        {"mechanism.pins": {"diameter": "6 mm", "friction": 0.1}}
+    )
+    drawing = part_of(spec)
+    assert [one.diameter for one in holes(drawing)] == pytest.approx([0.006] * 4)
+    assert dict(drawing.facts)["links"] == "12 mm wide, ends round"
+
+
+def test_numbers_of_holes_stand_clear_of_every_line():
+    from matplotlib.path import Path as Line
+
+    drawing = part_of(cfmkit.load(CONFIGS / "slider_crank_bought.yaml"))
+    figure = drawing_figure(drawing, "links")
+    figure.canvas.draw()
+    ax = figure.axes[0]
+    cut = [Line(line.get_xydata()) for line in ax.lines if line.get_gid() == "cut"]
+    numbers = [text for text in ax.texts if text.get_text() in list("1234")]
+    assert len(numbers) == 4
+    for text in numbers:
+        box = text.get_window_extent().transformed(ax.transData.inverted())
+        assert not any(line.intersects_bbox(box.shrunk(0.9, 0.9), filled=False) for line in cut)
+
+
+def test_a_drawing_with_stated_tolerances_names_the_process_too():
+    from cfmkit.runs.files import _drawn
+
+    spec = cfmkit.load(CONFIGS / "studies" / "cam_bought_parts.yaml")
+    found = texts(_drawn(part_of(spec), spec))
+    assert "process: laser, assumed" in found
+    assert "kerf 0.2 mm" in found
+    assert "mechanism.springs.stiffness: normal 2 %" in found
+    assert "position +-" not in found

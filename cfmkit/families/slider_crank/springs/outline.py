@@ -18,14 +18,19 @@ KEY = "mechanism.part.sheet"
 """Says how thick the links are: without springs that are part of them, they have no width."""
 
 EYE_SHARE, HOLE_SHARE = 0.08, 0.04
-"""Radii of eyes and pin holes in lengths of the shorter link."""
+"""Radii of eyes and pin holes in lengths of the shorter link, where no pins are stated."""
+
+EYE_OF_HOLE = 2.0
+"""Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
 
 
 def drawing(spec: SliderCrankSpec) -> Drawing:
     """Return crank and coupler of one leg, with a hole for each pin, beside each other."""
     linkage = linkage_of(spec.mechanism)
     short = min(linkage.crank, linkage.coupler)
-    eye, hole = EYE_SHARE * short, HOLE_SHARE * short
+    pins = spec.mechanism.pins
+    hole = HOLE_SHARE * short if pins is None else 0.5 * pins.diameter
+    eye = max(EYE_SHARE * short, EYE_OF_HOLE * hole)
     contours: list[Contour] = []
     for number, length in enumerate((linkage.crank, linkage.coupler)):
         y = -3.0 * eye * number
@@ -44,6 +49,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         DrawnDimension("coupler", (0.0, y), (linkage.coupler, y)),
     )
     facts = [("material", "not stated"), ("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
+    facts += [("links", f"{format_short(2.0 * eye, 'length')} wide, ends round")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
     sheet = Sheet(part.sheet if part else None, (), KEY)
     return Drawing("slider-crank", tuple(contours), sheet=sheet, dimensions=told, facts=tuple(facts))
