@@ -7,7 +7,7 @@ being made; who asks makes them, analyses each with its exact model and keeps th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -131,11 +131,7 @@ class FamilyOffer:
         Worth being made, the most promising first; empty where the wish is out of reach.
     reason : str
         Why there are none.
-    nearest : mapping of str to str
-        Where there are none: keys of the wish -> the nearest values that the family could meet, each with the other
-        keys as wished.
     """
 
     candidates: tuple[Candidate, ...] = ()
     reason: str = ""
-    nearest: Mapping[str, str] = field(default_factory=dict)

@@ -103,7 +103,7 @@ def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
                 "made": one.made,
                 "proposals": sum(each.family == one.family for each in found.proposals),
                 "reason": _reason(found, one.family, one.offer.reason),
-                "nearest": dict(one.offer.nearest),
+                "nearest": dict(one.nearest),
             }
             for one in found.answers
         ],

@@ -12,7 +12,7 @@ from cfmkit import families
 from cfmkit.families.base import Search
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-LONG = ("beam_design_lan",)
+LONG = ("beam_design_lan", "beam_lan_rising")
 
 
 JOURNAL = ".cfmkit-journal.jsonl"

@@ -35,7 +35,8 @@ def designable(path: Path) -> bool:
     return families.family(cfmkit.load(path).family).design is not None and cfmkit.load(path).design is not None
 
 
-SEARCHES = {"beam_design_lan", "slider_crank_taper_design", "slider_crank_paper_ranges"}  # designs by long searches
+SEARCHES = {"beam_design_lan", "beam_lan_rising", "slider_crank_taper_design", "slider_crank_paper_ranges"}
+"""Designs by long searches."""
 
 every_design = pytest.mark.parametrize(
     "path",

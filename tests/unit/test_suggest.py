@@ -11,6 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
+from cfmkit.designing.starts import NEVER
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
@@ -21,6 +22,7 @@ from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.studies.suggest import figures, good_parts, search
+from cfmkit.studies.suggest.nearest import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
 
@@ -242,16 +244,16 @@ def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next
     assert made(ProposalJob("slider-crank", designed, asked, 0)).message == ENDED_EARLY
     kept = []
     monkeypatch.setattr(search, "made", lambda job: Proposal(job.family, job.candidate.variant, message=ENDED_EARLY))
-    notes = SimpleNamespace(find=lambda _key: -1, add=lambda *one: kept.append(one))
+    monkeypatch.setattr(search, "nearest", lambda *_: {})
+    notes = SimpleNamespace(find=lambda _key: -1, add=lambda _key, record: kept.append(record))
     assert not suggest(wish(), Run(notes=notes)).proposals
-    assert not kept
+    assert not any("variant" in record for record in kept)
 
 
 def test_a_family_out_of_reach_says_what_it_would_need():
     offer = function_named(family("vcfm").propose)(wish(force="2 kN"), Run())
     assert not offer.candidates
-    assert "room" in offer.nearest
-    assert "N" in offer.nearest.get("force", "N")
+    assert " mm " in offer.reason
 
 
 def test_kept_shapes_scale_as_beams_that_only_bend():
@@ -326,3 +328,38 @@ def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
     assert short.without - began == pytest.approx(2.0, abs=1.0)
     bare = _Times.of(60.0, 0.0)
     assert bare.without - began == pytest.approx(57.0, abs=1.0)
+
+
+def test_the_nearest_wish_gets_a_proposal_when_it_is_asked():
+    asked = wish(room="[40 mm, 30 mm, 12 mm]")
+    propose = function_named(family("beam").propose)
+    assert not propose(asked, Run()).candidates
+    found = nearest(asked, "beam", 0, NEVER)
+    assert found
+    for key, value in found.items():
+        text = f"[{value.replace(' x ', ', ')}]" if key == "room" else value
+        again = wish(**{"room": "[40 mm, 30 mm, 12 mm]", key: text})
+        jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
+        assert any(made(job).good for job in jobs), key
+
+
+def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
+    keys = {"torque": "5 N*m", "angle": "10 deg", "ripple": "2 %"}
+    small, large = (wish_of(None, keys | {"room": room}).wish() for room in ("[5 mm, 5 mm]", "[50 mm, 250 mm]"))
+    propose = function_named(family("slider-crank").propose)
+    assert "fill the room" in propose(small, Run()).reason
+    assert propose(large, Run()).candidates
+
+
+def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_first():
+    asked = wish_of(None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "room": "[150 mm, 700 mm]"}).wish()
+    offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
+    assert any(made(ProposalJob("slider-crank", one, asked, 0)).good for one in offered[5:])
+
+
+def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
+    """An arch of half the size, read off its analysis, with 15 % more room: the pads are as large as ever."""
+    keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "room": "[39.6 mm, 12.2 mm, 9.2 mm]"}
+    asked = wish_of(None, keys | {"process": "laser"}).wish()
+    offered = function_named(family("beam").propose)(asked, Run()).candidates
+    assert any(made(ProposalJob("beam", one, asked, 0)).good for one in offered)

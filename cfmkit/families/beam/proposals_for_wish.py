@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 SHAPES = ("lan-2010", "lan-flat", "arch", "end-effector", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
 
-SIZES = (1.0, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
-"""Sizes that are tried, over the largest that fits the room."""
+SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
+"""Sizes that are tried, over the largest that fits the room with the pads scaled, too, which they are not."""
 
 STRESS = 0.95
 """Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
@@ -100,7 +100,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
     if wish.adjustable is not None:
         return FamilyOffer(reason="the force of a network of beams cannot be adjusted")
     found: list[Candidate] = []
-    missed: list[tuple[float, str, dict[str, str]]] = []
+    missed: list[tuple[float, str]] = []
     for kept in kept_shapes():
         largest = min(wish.room[0] / kept.room.across, wish.room[1] / kept.room.along)
         for share in SIZES:
@@ -112,8 +112,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                     missed.append(one)
     if found:
         return FamilyOffer(tuple(_varied(found)[:OFFERED]))
-    _, reason, nearest = min(missed, key=lambda one: one[0])
-    return FamilyOffer(reason=reason, nearest=nearest)
+    return FamilyOffer(reason=min(missed, key=lambda one: one[0])[1])
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
@@ -123,19 +122,13 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
 
-def _rescaled(
-    wish: Wish, kept: Kept, size: float, block: dict[str, Any]
-) -> Candidate | tuple[float, str, dict[str, str]]:
-    """Return a shape at a size, or how far it misses what is wished, why, and the nearest wish."""
+def _rescaled(wish: Wish, kept: Kept, size: float, block: dict[str, Any]) -> Candidate | tuple[float, str]:
+    """Return a shape at a size, or how far it misses what is wished, and why."""
     length = wish.travel / size
     low, high = float(kept.motion[0]), float(kept.motion[-1])
     if length > 0.98 * (high - low):
         longest = 0.6 * (high - low) * size
-        return (
-            length / (high - low),
-            (f"beams of this room travel {mm(longest)} at a constant force"),
-            {"travel": mm(longest), "room": " x ".join(mm(side * wish.travel / longest) for side in wish.room[:2])},
-        )
+        return length / (high - low), f"beams of this room travel about {mm(longest)} at a constant force"
     starts = np.linspace(low, high - length, 200)
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
@@ -144,7 +137,7 @@ def _rescaled(
     if not len(flat):
         least = float(ripple.min())
         reason = f"the force of beams in this room changes by {percent(least)} over the travel"
-        return 1.0 + least / wish.ripple, reason, {"ripple": percent(least / RIPPLE)}
+        return 1.0 + least / wish.ripple, reason
     best = int(flat[np.argmin(stress[flat] / 1e3 ** (1 - ripple[flat]))])
     window = float(starts[best]) * size, float(starts[best] + length) * size
     return _sized(wish, kept, size, block, window, (float(stress[best]), _mean(kept, starts[best], length)))
@@ -157,7 +150,7 @@ def _mean(kept: Kept, start: float, length: float) -> float:
 
 def _sized(
     wish: Wish, kept: Kept, size: float, block: dict[str, Any], window: tuple[float, float], curve: tuple[float, float]
-) -> Candidate | tuple[float, str, dict[str, str]]:
+) -> Candidate | tuple[float, str]:
     """Return the shape with its thickness from the stress and its width from the force."""
     material, own = MaterialSpec.model_validate(block), kept.spec.mechanism
     stiffer = material.modulus / own.material.modulus
@@ -165,7 +158,7 @@ def _sized(
     stress, force = curve
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
-        return 1e9, "no strength of the material is known", {}
+        return 1e9, "no strength of the material is known"
     thicker = min(STRESS * wish.strength_used * strength * size / (stress * stiffer), STOUT * size)
     wide = _width(wish, kept, size, stiffer, thicker, force)
     if wide < FLAT * thicker * thin:
@@ -173,15 +166,9 @@ def _sized(
         thicker *= (wide / (FLAT * thicker * thin)) ** 0.25
         wide = _width(wish, kept, size, stiffer, thicker, force)
     if thicker * thin < wish.thinnest:
-        return wish.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick", {}
+        return wish.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick"
     if wish.depth is not None and wide > 0.99 * wish.depth:
-        less = wish.target * wish.depth / wide
-        reason = f"the beams would be {mm(wide)} wide"
-        return (
-            wide / wish.depth,
-            reason,
-            {"force": f"{less:.3g} N", "room": " x ".join(mm(side) for side in (*wish.room[:2], 1.02 * wide))},
-        )
+        return wide / wish.depth, f"the beams would be {mm(wide)} wide"
     spec = _written(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
     variant = called(f"shape {kept.name}", wish, block)

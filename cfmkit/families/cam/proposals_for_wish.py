@@ -20,7 +20,7 @@ import numpy as np
 from cfmkit.families.cam.bounding_box import depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.spec import CamSpec, Springs
-from cfmkit.families.findings import mm, percent
+from cfmkit.families.findings import mm
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
@@ -201,20 +201,12 @@ def _written(
 
 
 def _out_of_reach(wish: Wish, found: dict[str, Any]) -> FamilyOffer:
-    """Return why no proportions fit, and the nearest wish that some would: one key changed at a time."""
+    """Return why no proportions fit."""
     if not found["there"].any():
         return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such a room")
-    nearest: dict[str, str] = {}
     flat = found["flat"] & found["lossless"]
-    if flat.any():
-        scale = np.maximum(found["width"] / wish.room[0], found["height"] / wish.room[1])[flat].min() / RESERVE
-        nearest["room"] = " x ".join(mm(side * float(scale)) for side in wish.room[:2])
-        reason = f"the rollers, braces and the slider's way need {nearest['room']} of room"
-    else:
-        reason = "friction of the rollers leaves more ripple or loss than wished"
-    roomy = found["fits"]
-    if roomy.any():
-        nearest["ripple"] = percent(float(found["ripple"][roomy].min()) / FLAT_RESERVE)
-        if wish.hysteresis is not None:
-            nearest["hysteresis"] = percent(float(found["hysteresis"][roomy].min()) / RESERVE)
-    return FamilyOffer(reason=reason, nearest=nearest)
+    if not flat.any():
+        return FamilyOffer(reason="friction of the rollers leaves more ripple or loss than wished")
+    scale = np.maximum(found["width"] / wish.room[0], found["height"] / wish.room[1])[flat].min() / RESERVE
+    need = " x ".join(mm(side * float(scale)) for side in wish.room[:2])
+    return FamilyOffer(reason=f"the rollers, braces and the slider's way need about {need} of room")

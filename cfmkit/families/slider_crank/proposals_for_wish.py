@@ -19,6 +19,8 @@ from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
+from cfmkit.stock.springs.catalogue import BENDING_SHARE
+from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -86,8 +88,18 @@ TURNED = (
     (1.0, 2.5, 0.0, -8.0),
     (1.0, 3.0, 0.3, -15.0),
     (1.0, 2.0, 0.5, -25.0),
+    (1.0, 1.65, 0.5, -88.0),
+    (1.0, 3.7, 0.0, -122.0),
+    (1.0, 10.0, 0.0, -82.5),
 )
-"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019."""
+"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019. The
+last three are the flattest of some thousands of random linkages over 40 to 90 deg: their springs are wound up first."""
+
+WOUND_UP = -math.radians(60.0)
+"""Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
+
+ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
+"""What round wire in bending holds at most, over its volume [J/m^3]."""
 
 OFFERED = 24
 
@@ -102,19 +114,29 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 
 def _of_torque(wish: Wish) -> FamilyOffer:
     if wish.depth is not None:
-        return FamilyOffer(
-            reason="springs at pins have no size here, and no depth: wish a room without one",
-            nearest={"room": " x ".join(mm(side) for side in wish.room[:2])},
-        )
+        return FamilyOffer(reason="springs at pins have no size here, and no depth: wish a room without one")
+    if (reason := _overfilled(wish)) is not None:
+        return FamilyOffer(reason=reason)
     found = [_turned(wish, *one) for one in TURNED]
     return FamilyOffer(tuple(one for one in found if one is not None))
+
+
+def _overfilled(wish: Wish) -> str | None:
+    """Return what is wrong where springs at pins would fill more than the room, taken as deep as it is wide."""
+    wire = wish.target * wish.travel / ENERGY
+    deep = wire / (wish.room[0] * wish.room[1])
+    if deep <= max(wish.room[:2]):
+        return None
+    return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
 
 
 def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: float) -> Candidate | None:
     """Return a linkage that turns as much as is wished around its stretched position, as large as the room allows."""
     low = math.radians(unloaded)
-    span = max(3.0 * wish.travel, math.radians(20.0))
-    angles = np.linspace(low, low + span, 181)
+    within = (0.0, max(1.6 * wish.travel, math.radians(60.0)))
+    if low > WOUND_UP:
+        within = (low, low + max(3.0 * wish.travel, math.radians(20.0)))
+    angles = np.linspace(low, within[1], 181)
     y = crank * np.sin(angles)
     inside = coupler**2 - (offset - y) ** 2
     if (inside <= 0.0).any():
@@ -131,9 +153,9 @@ def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: f
         },
         "design": {
             "torque": wish.target, "tolerance": min(0.45 * wish.ripple, 0.2),
-            "angle_within": (low, low + span),
+            "angle_within": within,
         },
-        "analysis": {"angle": (low, low + span), "points": 961},
+        "analysis": {"angle": (low, within[1]), "points": 961},
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:finish")
@@ -161,15 +183,11 @@ def _of_force(wish: Wish) -> FamilyOffer:
     fits = [printed_size(wish, lengths) for lengths in PUSHED]
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
-        less = wish.target * (wish.depth or max(wish.room)) / wide
-        return FamilyOffer(reason=f"a strip would have to be {mm(wide)} wide", nearest={"force": f"about {less:.2g} N"})
+        return FamilyOffer(reason=f"a strip would have to be about {mm(wide)} wide")
+    if wish.depth is None and (reason := _overfilled(wish)) is not None:
+        return FamilyOffer(reason=reason)
     need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
-    scale = max(need[0] / wish.room[0], need[1] / wish.room[1])
-    longest = wish.travel / scale
-    return FamilyOffer(
-        reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it",
-        nearest={"room": " x ".join(mm(side) for side in need), "travel": f"about {mm(longest)}"},
-    )
+    return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
 
 
 def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
@@ -189,6 +207,7 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
     """Return parts and linkages of some proportions at all sizes that fit."""
     printed = printed_size(wish, lengths)
     pinned = min(wish.room[0] / (lengths.offset + 2 * PIN), wish.room[1] / (lengths.stretched + 2 * PIN))
+    pins = wish.depth is None and _overfilled(wish) is None
     found = []
     for size in SIZES:
         for start in STARTS:
@@ -198,7 +217,7 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
             pair = size * pair_size(wish, lengths)
             if travel[1] <= lengths.reach * pair:
                 found += _pairs(wish, lengths, pair, travel)
-            if travel[1] <= lengths.reach * size * pinned and wish.depth is None and start == STARTS[0]:
+            if travel[1] <= lengths.reach * size * pinned and pins and start == STARTS[0]:
                 found.append(_springs(wish, lengths, size * pinned, travel))
     return found
 
@@ -258,7 +277,8 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
     longest = max(map(len, rows))
-    return [row[k] for k in range(longest) for row in rows if k < len(row)]
+    by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
+    return sorted(by_turns, key=lambda one: one.promise >= LATER)
 
 
 def _materials(wish: Wish) -> list[dict[str, Any]]:

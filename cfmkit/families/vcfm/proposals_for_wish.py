@@ -205,16 +205,11 @@ def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, floa
 
 
 def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> FamilyOffer:
-    """Return which side of the room is too small for the design that comes nearest, and the room that it needs."""
+    """Return which side of the room is too small for the design that comes nearest."""
     sides = dict(zip(("across", "along", "depth"), wish.room, strict=False))
-    need = {name: mm(side * max(1.0, over[name])) for name, side in sides.items()}
     worst = max(over, key=lambda name: over[name])
     words = {"across": "across the travel", "along": "along the travel", "depth": "out of the plane"}[worst]
-    reason = f"leaves and spring need {mm(sides[worst] * excess)} {words}"
-    nearest = {"room": " x ".join(need.values())}
-    if worst == "depth":
-        nearest["force"] = f"{wish.target / excess:.3g} N"
-    return FamilyOffer(reason=reason, nearest=nearest)
+    return FamilyOffer(reason=f"leaves and spring need {mm(sides[worst] * excess)} {words}")
 
 
 def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:

@@ -26,6 +26,7 @@ from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.identity import code_stamp, stable_hash
 from cfmkit.studies.pool import until
+from cfmkit.studies.suggest.nearest import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 
 if TYPE_CHECKING:
@@ -82,11 +83,15 @@ class _Times:
 
 @dataclass(frozen=True)
 class Answered:
-    """What one family had to say: how many candidates it named and how many were made, or why there are none."""
+    """What one family had to say: how many candidates it named and how many were made, or why there are none.
+
+    Where no family has a mechanism, `nearest` says with which values of a key it would have one.
+    """
 
     family: str
     offer: FamilyOffer
     made: int = 0
+    nearest: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -176,6 +181,8 @@ def suggest(
             break
         known = {}
     counts = {name: sum(one.family == name for one in done) for name in queues}
+    if not cut and not any(one.good for one in done):
+        answers = _with_nearest(answers, wish, run, times.without)
     return Suggestions(
         wish,
         tuple(ordered(distinct([one for one in done if one.good]), wish, prefer)),
@@ -185,6 +192,26 @@ def suggest(
         cut or (late() and bool(list(_next(queues, done, 1, enough)))),
         reused,
     )
+
+
+def _with_nearest(answers: list[Answered], wish: Wish, run: Run, deadline: float | None) -> list[Answered]:
+    """Return answers with the nearest wish that each family could meet, as far as the time allows."""
+    names = [one.family for one in answers]
+    content = {"wish": repr(wish), "seed": run.seed, "code": code_stamp()}
+    keys = {name: stable_hash(content | {"nearest": name})[:32] for name in names}
+    found = {name: run.notes.read(place, keys[name]) for name in names if (place := run.notes.find(keys[name])) >= 0}
+    left = [name for name in names if name not in found]
+    clock = Clock(deadline)
+    work = partial(_nearest_of, wish, run.seed, clock)
+    for name, outcome in until(run.executor, deadline)(work, iter(left), clock.late):
+        if isinstance(outcome, dict) and not clock.late():
+            found[name] = outcome
+            run.notes.add(keys[name], outcome)
+    return [replace(one, nearest=found.get(one.family, {})) for one in answers]
+
+
+def _nearest_of(wish: Wish, seed: int, clock: Clock, name: str) -> dict[str, str]:
+    return nearest(wish, name, seed, clock)
 
 
 def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions:
