@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -88,3 +89,14 @@ def test_what_cannot_be_drawn_is_told_in_one_line(tmp_path, monkeypatch, capsys,
     assert main(arguments) == 2
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["beam", "cam", "slider-crank", "vcfm"])
+def test_the_drawing_in_the_docs_says_what_show_figure_says(name):
+    # texts, not bytes: another matplotlib may draw the same lines in other words of SVG
+    shown = Path(__file__).parents[2] / "docs" / "images" / f"{name.replace('-', '_')}_dimensions.svg"
+    texts = [
+        re.findall(r"<text[^>]*>([^<]*)<", text) for text in (shown.read_text(), drawn(scheme(name), ".svg").decode())
+    ]
+    assert texts[0] == texts[1]
+    assert texts[0]
