@@ -22,10 +22,10 @@ KEY_DIGITS = 32
 
 
 class Notes(Protocol):
-    """Where finished starts are noted, for the run after this one."""
+    """Where a long run notes what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
 
     def find(self, key: str, /) -> int:
-        """Return where the record of a key lies; -1 if there is none."""
+        """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
 
     def read(self, place: int, key: str, /) -> Any:
         """Return the record of a key that lies at a place."""

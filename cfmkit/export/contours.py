@@ -255,7 +255,7 @@ class DrawnDimension:
 
 
 @dataclass(frozen=True)
-class Label:
+class EngravedText:
     """A text that is engraved: its middle [m], the height of its letters [m], and its direction [rad]."""
 
     text: str
@@ -281,7 +281,7 @@ class Drawing:
     sheet: Sheet = Sheet()
     dimensions: tuple[DrawnDimension, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
-    labels: tuple[Label, ...] = ()
+    labels: tuple[EngravedText, ...] = ()
 
     @property
     def extents(self) -> tuple[float, float, float, float]:

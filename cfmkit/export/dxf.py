@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import ModuleType
 
-    from cfmkit.export.contours import Drawing, Label
+    from cfmkit.export.contours import Drawing, EngravedText
 
 _MILLIMETRES, _METRIC = 4, 1
 _DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
@@ -55,7 +55,7 @@ def write_dxf(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
     return dxf_bytes(outlines(drawing, tolerance), drawing.labels)
 
 
-def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[Label] = ()) -> bytes:
+def dxf_bytes(drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as DXF; see `write_dxf`."""
     layers = looks([*(outline.layer for outline in drawn), *(ENGRAVED for _ in labels)])
     with _LOCK, _same_bytes(_ezdxf()) as ezdxf:
@@ -94,7 +94,7 @@ def _add_outline(space: Any, outline: Outline) -> None:
     space.add_lwpolyline(kept, format="xyb", close=outline.closed, dxfattribs=attributes)
 
 
-def _add_label(space: Any, label: Label) -> None:
+def _add_label(space: Any, label: EngravedText) -> None:
     x, y = (round(float(to_border(value, "length")), _DIGITS) for value in label.at)
     look = {"layer": ENGRAVED, "rotation": round(math.degrees(label.angle), _DIGITS)}
     text = space.add_text(label.text, height=round(float(to_border(label.height, "length")), _DIGITS), dxfattribs=look)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.contours import Label
+from cfmkit.export.contours import EngravedText
 from cfmkit.export.layers import DRIVEN, HELD
 from cfmkit.specs.units import format_short
 
@@ -43,7 +43,7 @@ def engraved(drawing: Drawing, name: str) -> Drawing:
     return replace(drawing, labels=tuple(_labels(drawing, name)))
 
 
-def _labels(drawing: Drawing, name: str) -> Iterator[Label]:
+def _labels(drawing: Drawing, name: str) -> Iterator[EngravedText]:
     from shapely import Polygon
 
     cut = [(one, Polygon(one.points(NEAR))) for one in drawing.contours if one.layer == "cut" and one.closed]
@@ -72,7 +72,7 @@ def _thickness(sheet: Sheet, at: Any) -> float | None:
     return max(own) if own else sheet.thickness
 
 
-def _placed(text: str, spot: Any) -> Label | None:
+def _placed(text: str, spot: Any) -> EngravedText | None:
     """Return a text in the middle of a rectangle, along its longer side and never upside down."""
     corners = np.array(spot.minimum_rotated_rectangle.exterior.coords)
     if len(corners) < 4:
@@ -84,4 +84,4 @@ def _placed(text: str, spot: Any) -> Label | None:
     angle = (angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi
     height = min(SHARE * float(lengths.min()), float(lengths.max()) / (BREADTH * len(text)), LARGEST)
     middle = spot.centroid
-    return Label(text, (float(middle.x), float(middle.y)), height, angle)
+    return EngravedText(text, (float(middle.x), float(middle.y)), height, angle)

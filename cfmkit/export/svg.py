@@ -19,7 +19,7 @@ from cfmkit.specs.units import to_border
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.export.contours import Drawing, Label
+    from cfmkit.export.contours import Drawing, EngravedText
 
 _MARGIN = 5.0  # around the drawing [mm]
 _STROKE = 0.25  # width of every line [mm]
@@ -43,7 +43,7 @@ def write_svg(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
     return svg_bytes(drawing.name, outlines(drawing, tolerance), drawing.labels)
 
 
-def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[Label] = ()) -> bytes:
+def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as SVG; see `write_svg`."""
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
     (left, low), (right, high) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
@@ -69,7 +69,7 @@ def _group(layer: str, look: LayerLook, members: Sequence[Outline]) -> list[str]
     return [f'<g id="{layer}" {style}>', *map(_shape, members), "</g>"] if members else []
 
 
-def _texts(labels: Sequence[Label]) -> list[str]:
+def _texts(labels: Sequence[EngravedText]) -> list[str]:
     """Return engraved texts, centred about their points; y is turned over, and with it the direction."""
     if not labels:
         return []

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.designing.starts import Notes
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
@@ -42,19 +43,6 @@ def _one_by_one(
         if stopping():
             return
         yield job, work(job)
-
-
-class Notes(Protocol):
-    """Where a long run notes what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
-
-    def find(self, key: str, /) -> int:
-        """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
-
-    def read(self, place: int, key: str, /) -> Any:
-        """Return the record of a key that lies at a place."""
-
-    def add(self, key: str, record: Any, /) -> int:
-        """Keep a record of plain numbers, words, lists and mappings; return where it lies."""
 
 
 class _Forgotten:

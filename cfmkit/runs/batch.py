@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.batch_entries import KeptRuns
     from cfmkit.studies.executors import Executor, Lost
     from cfmkit.studies.metric_changes import Known
-    from cfmkit.studies.reused_batch_runs import KeptRuns
     from cfmkit.tables import Table
 
 
@@ -409,10 +409,9 @@ def batch(
     """
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch_entries import folders, sources
+    from cfmkit.studies.batch_entries import KeptRuns, folders, sources
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
-    from cfmkit.studies.reused_batch_runs import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():

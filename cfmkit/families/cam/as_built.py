@@ -94,7 +94,7 @@ def analyze_built(spec: CamSpec) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=short,
         curves=(_curve(built),),
-        closed=MeasuredLoop(built, tracks),
+        closed=LoopAsBuilt(built, tracks),
         values=_values(built),
         warnings=(
             *found,
@@ -222,7 +222,7 @@ def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredLoop:
+class LoopAsBuilt:
     """The loop of a measured cam at every place (a `cfmkit.results.ClosedForm`): its tracks are known between nodes."""
 
     built: Built
