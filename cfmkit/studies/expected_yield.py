@@ -79,16 +79,16 @@ def _told(found: Assumed, shares: tuple[float, float]) -> str:
         low, high = (format_short(end, "stress") for end in found.modulus)
         told.append(f"modulus {low} to {high}")
     reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
-    text = f"{_percent(shares[0])} of parts would meet the requirements if made by {process.name} "
+    text = f"{_share(shares[0])} parts would meet the requirements if made by {process.name} "
     text += f"({', '.join(told)}; assumed{reason}; to first order)"
-    return text if found.modulus is None else f"{text}, {_percent(shares[1])} once the modulus is measured"
+    return text if found.modulus is None else f"{text}, {_share(shares[1])} parts once the modulus is measured"
 
 
-def _percent(share: float) -> str:
-    """Return a share of drawn parts as it is told: to two digits, and never as all of them or none."""
+def _share(share: float) -> str:
+    """Return a share of drawn parts, before the word 'parts': to two digits, and never as all of them or none."""
     if 100.0 * share >= 99.5:
-        return "over 99 %"
-    return f"about {100.0 * share:.2g} %" if share * PARTS >= 1.0 else "hardly any"
+        return "over 99 % of"
+    return f"about {100.0 * share:.2g} % of" if share * PARTS >= 1.0 else "hardly any"
 
 
 def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
