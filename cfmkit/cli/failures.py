@@ -113,9 +113,18 @@ def _told(error: BaseException) -> str:
     return errors.sentence_of(error)
 
 
+_PARSER_WORDS = (
+    ("Value error, ", ""),
+    ("Input should be a valid integer, unable to parse string as an integer", "a whole number is needed"),
+)
+"""Of the library that checks the types of options, and what to say instead."""
+
+
 def _of_the_parser(error: Any) -> str:
     """Return what is wrong with the command line, and where to look."""
     message = " ".join(error.format_message().split()).rstrip(".")
+    for theirs, ours in _PARSER_WORDS:
+        message = message.replace(theirs, ours)
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "cfmkit"
     joint = " See" if message.endswith("?") else "; see"

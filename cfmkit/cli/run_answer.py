@@ -327,7 +327,12 @@ def _kept(report: Report, outcome: Outcome) -> str:
     if outcome.metric in OF_MANY_PARTS:
         return _short(report.metrics[outcome.metric], 3)
     window = Window(*outcome.over) if outcome.over else None
-    measured = api.evaluate(report.result, window=window)
+    # only what the row shows: all metrics over its window would take longer than the model of a cam
+    branches = [f"{outcome.metric}[{branch}]" for branch in report.result.curve.branches]
+    own = report.result.values
+    by_branch = {item.name for item in known_metrics(report.result.curve.kind)} - set(own)
+    shown = [name for name in branches if name in own or outcome.metric in by_branch]
+    measured = api.evaluate(report.result, (outcome.metric, *shown), window)
     return _branches(report, outcome.metric, measured) + _over(report, outcome.metric, window)
 
 

@@ -376,18 +376,18 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
         raise DataError(f"{name}: {problem}") from None
     wanted = wanted or common
     slack = 1e-9 * (wanted.hi - wanted.lo)
-    inside = Window(max(wanted.lo, common.lo), min(wanted.hi, common.hi))
+    low, high = max(wanted.lo, common.lo), min(wanted.hi, common.hi)
     if wanted.lo >= common.lo - slack and wanted.hi <= common.hi + slack:
         return wanted, ()
     within_reach = wanted.lo >= source.reached.lo - slack and wanted.hi <= source.reached.hi + slack
-    if not within_reach or not inside.lo < inside.hi:
+    if not within_reach or not low < high:
         raise DataError(
             f"{name}: the window {span_text(wanted.lo, wanted.hi, kind)} is not measured on every branch: "
             f"{span_text(common.lo, common.hi, kind)} is"
         )
     told = f"the window {span_text(wanted.lo, wanted.hi, kind)} touches a reversal"
-    taken = f"the numbers hold over {span_text(inside.lo, inside.hi, kind)}, which every branch covers"
-    return inside, (Finding("window_at_reversal", f"{told}: {taken}"),)
+    taken = f"the numbers hold over {span_text(low, high, kind)}, which every branch covers"
+    return Window(low, high), (Finding("window_at_reversal", f"{told}: {taken}"),)
 
 
 def common_window(curves: Sequence[Curve]) -> Window:

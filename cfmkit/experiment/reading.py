@@ -252,13 +252,15 @@ def _content(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise UsageError(f"{path} is a folder; name a data file in it")
-        if path.stat().st_size > LARGEST:
-            raise DataError(f"{path.name}: is larger than {LARGEST // 1_000_000} MB; thin it out or split it")
-        return path.read_bytes()
+        with path.open("rb") as file:  # not by its stated size: a pipe or a device states none
+            data = file.read(LARGEST + 1)
     except FileNotFoundError:
         raise UsageError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}".lower()) from None
+    if len(data) > LARGEST:
+        raise DataError(f"{path.name}: is larger than {LARGEST // 1_000_000} MB; thin it out or split it")
+    return data
 
 
 def _values(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo], name: str) -> list[FloatArray]:

@@ -189,9 +189,15 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]
     """
     try:
         text = source.path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError):
-        raise ValueError(f"{source} cannot be read as text") from None
-    rows = list(csv.reader(text.splitlines()))
+    except OSError:
+        raise ValueError(f"{source} cannot be read") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{source} is not UTF-8; save it as UTF-8") from None
+    lines = csv.reader(text.splitlines())
+    try:
+        rows = list(lines)
+    except csv.Error as problem:
+        raise ValueError(f"{source}:{lines.line_num}: {problem}") from None
     heads = [_HEADER.fullmatch(cell) for cell in (rows[0] if rows else [])]
     units = {head["name"]: (column, head["unit"]) for column, head in enumerate(heads) if head}
     pair = next((two for two in (("displacement", "force"), ("angle", "torque")) if set(two) <= set(units)), None)

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", " ": "spaces"}
 """What may stand between cells, in the order in which it is tried, and its name."""
 
+LONGEST_LINE = 100_000
+"""Characters of a line that is read: the reader of quoted cells takes 131072 in one."""
+
 MOST_FOOT_LINES = 20
 _SAMPLE = 40
 _MARKS = (
@@ -129,6 +132,9 @@ def block_of(lines: list[str], name: str) -> TextBlock:
     filled = [index for index, line in enumerate(lines) if line.strip()]
     if not filled:
         raise DataError(f"{name}: the file is empty")
+    long = next((index for index in filled if len(lines[index]) > LONGEST_LINE), None)
+    if long is not None:
+        raise DataError(f"{name}: line {long + 1} has {len(lines[long])} characters; at most {LONGEST_LINE} are read")
     # Most lines before the last few are data, whatever stands above and below them.
     middle = filled[len(filled) // 3 : max(len(filled) - 2, 1)] or filled
     sample = [lines[index] for index in middle[:: max(len(middle) // _SAMPLE, 1)]]

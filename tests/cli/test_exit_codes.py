@@ -300,3 +300,35 @@ def test_a_safety_factor_says_of_which_stress_it_is(cli, cam):
     pressed = "mechanism.contact={material: steel-s235, width: 10 mm}"
     run = cli(*RUN, "--set", pressed, "--set", "mechanism.safety_factor=2")
     assert "of 117.5 MPa: yield strength / 2" in " ".join(run.out.split())
+
+
+def test_a_row_of_a_kept_requirement_measures_nothing_but_what_it_shows(cli, cam, monkeypatch):
+    """Each row had every metric measured over its window: a page of some hundred requirements took minutes."""
+    from cfmkit import api
+
+    asked = []
+    measured = api.evaluate
+
+    def noted(result, names=None, window=None):
+        asked.append(names)
+        return measured(result, names, window)
+
+    monkeypatch.setattr("cfmkit.api.evaluate", noted)
+    run = cli(*RUN)
+    assert "force ripple 1.24 % load, 1.27 % unload over 2 ... 240 mm <= 5 % ok" in " ".join(run.out.split())
+    rows = [names for names in asked if names is not None]
+    assert ("force_ripple", "force_ripple[load]", "force_ripple[unload]") in rows
+    assert asked.count(None) <= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("sweep", "cam.yaml", "-j", "x"), "'-j' / '--jobs': a whole number is needed; see"),
+        (("sensitivity", "cam.yaml", "--method", "nosuch"), "'--method': 'nosuch' is not one of 'oat'"),
+    ],
+)
+def test_what_a_library_says_of_an_option_is_put_in_plain_words(cli, cam, arguments, told):
+    done = cli(*arguments)
+    assert done.code in (ExitCode.USAGE, ExitCode.INVALID)
+    assert told in done.err

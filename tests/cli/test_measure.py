@@ -101,6 +101,7 @@ def test_a_target_gives_the_deviation_from_it(cli, data):
         (("rig.csv", "--units", "Weg"), 2, "--units: 'Weg' is not 'column=unit'"),
         (("rig.csv", "--target", "50 mm"), 2, "--target: '50 mm' is a length"),
         (("rig.csv", "--window", "40 mm:300 mm"), 3, "the window 40 ... 300 mm is not measured on every branch"),
+        (("rig.csv", "--window", "400 mm:500 mm"), 3, "the window 400 ... 500 mm is not measured on every branch"),
         (("rig.csv", "--filter", "20 Hz"), 3, "the cut-off 20 Hz is not below half the sampling rate"),
         (("bad.csv",), 3, "bad.csv: line 7: column 'F' [N] holds 'NaN', which is not a number"),
     ],

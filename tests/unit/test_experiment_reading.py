@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cfmkit.errors import CfmError, DataError, UsageError
+from cfmkit.experiment import reading
 from cfmkit.experiment.reading import read_recording
 from cfmkit.tables.lab_file import split_header
 
@@ -107,6 +108,8 @@ def at(index, column, text):
 
 BAD = {
     "empty": ("", "the file is empty"),
+    "endless line": ("x," * 200_000, "line 1 has 400000 characters; at most 100000 are read"),
+    "endless cell": ('"' + "1" * 200_000 + '";2;3\n' + csv_text(), "line 1 has 200006 characters"),
     "only text": ("no\nnumbers\nhere\n", "no block of lines with at least two numbers"),
     "binary": (bytes(range(256)) * 20, "is not a text file"),
     "NaN": (csv_text(change=at(5, 2, "NaN")), "line 7: column 'F' [N] holds 'NaN', which is not a number"),
@@ -209,3 +212,9 @@ def test_a_single_column_with_decimal_commas_is_not_taken_for_two(tmp_path):
         read_recording(tmp_path / "one.csv")
     (tmp_path / "title.csv").write_text("rig seven\n" + rows((MOTION, FORCE), ","))
     assert len(read_recording(tmp_path / "title.csv", "1=mm,2=N")) == len(MOTION)
+
+
+def test_a_file_that_does_not_end_is_refused_before_it_fills_the_memory(monkeypatch):
+    monkeypatch.setattr(reading, "LARGEST", 1_000_000)
+    with pytest.raises(DataError, match="zero: is larger than 1 MB"):
+        read_recording("/dev/zero")

@@ -108,7 +108,9 @@ def test_what_is_no_curve_is_refused_in_a_line(said, told):
         ("displacement [mm],force [N]\n0,1\n", "2 to 10000 points"),
         ("displacement [mm],force [N]\n3,1\n0,2\n", "0 mm comes after 3 mm"),
         ("", "needs columns"),
+        ('displacement [mm],force [N]\n0,1\n"' + "1" * 200_000 + '",1\n', "curve.txt:3: field larger than"),
     ],
+    ids=["word", "gap", "no units", "one point", "backwards", "empty", "endless cell"],
 )
 def test_a_file_that_is_no_curve_is_refused_with_its_line(tmp_path, text, told):
     (tmp_path / "curve.txt").write_text(text)

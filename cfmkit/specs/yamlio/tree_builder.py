@@ -256,6 +256,8 @@ _PLAIN_WORDS = (
     ("expected ',' or '}', but got '<stream end>'", "a '{' is never closed"),
     ("expected ',' or ']'", "in a [...] list a ',' or ']' is missing before this"),
     ("expected ',' or '}'", "in a {...} block a ',' or '}' is missing before this"),
+    ("expected the node content, but found '<stream end>'",
+     "the file ends where a value is missing, or a '[' or '{' is never closed"),
     ("expected the node content, but found '(.+)'", r"a value is missing before \1"),
     ("expected <block end>, but found '<scalar>'", "text after a closing quote; quote the whole text"),
     ("expected <block end>, but found '<block mapping start>'|expected <block end>, but found '<block sequence start>'",
