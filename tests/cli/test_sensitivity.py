@@ -63,6 +63,14 @@ def test_every_method_writes_its_tables_and_pictures(cli, study, method):
     assert "indices.csv" in str(listed)
 
 
+@pytest.mark.parametrize("change", ["sensitivity.samples=6", "cam: sensitivity.samples = 6"])
+def test_a_number_of_samples_that_is_set_counts_for_the_method_of_the_option(cli, study, change):
+    for more in (("--set", change), ("--set", change, "--samples", "5")):
+        done = cli("sensitivity", study, "-o", "out", "--method", "oat", *more, "-j", "1", "-q", "--no-plots")
+        assert done.code in (0, 5), done.err
+        assert report(cli, "out")["samples"]["evaluated"] == int(more[-1][-1])
+
+
 def test_the_force_is_proportional_to_the_springs(cli, study):
     vary = ("--vary", "mechanism.springs.stiffness.*=uniform:1 %")
     assert cli("sensitivity", study, "-o", "out", "--method", "local", *vary, *QUICK, "-j", "1").code == 0

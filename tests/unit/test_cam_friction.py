@@ -142,16 +142,25 @@ def test_a_profile_that_hangs_down_is_cut_for_the_help_of_the_weight():
     np.testing.assert_allclose(force, 40.0, rtol=1e-9)
 
 
-def test_the_life_of_a_bearing_under_a_constant_load_is_that_of_iso_281():
+def test_the_life_of_a_bearing_is_that_of_iso_281_for_its_turns_against_the_brace():
     rated = {"bore": "8 mm", "dynamic_rating": "3300 N", "static_rating": "1370 N", "per_roller": 2}
-    found = analyze(cam(bearings=rated, roller_radius="10 mm"))
-    states, contact = found.state.states, found.state.up.contact
-    turns = np.hypot(np.diff(states.x), np.diff(states.y)) / (2 * np.pi * 0.010)
-    mean = 0.5 * (contact[1:] + contact[:-1])
-    load = (np.sum(turns * mean**3) / turns.sum()) ** (1 / 3) / 2
-    expected = 1e6 * (3300 / load) ** 3 / (2 * turns.sum())
-    assert found.values["bearing_life"].value == pytest.approx(expected, rel=1e-4)
-    assert found.values["bearing_static_safety"].value == pytest.approx(2 * 1370 / contact.max(), rel=1e-12)
+    for kind, exponent in (("ball", 3), ("roller", 10 / 3)):
+        found = analyze(cam(bearings=rated | {"kind": kind}, roller_radius="10 mm"))
+        states, contact = found.state.states, found.state.up.contact
+        brace = np.arctan2(-np.sqrt(0.2**2 - states.x**2), states.x)
+        turns = (np.hypot(np.diff(states.x), np.diff(states.y)) / 0.010 - np.diff(brace)) / (2 * np.pi)
+        mean = 0.5 * (contact[1:] + contact[:-1])
+        load = (np.sum(turns * mean**exponent) / turns.sum()) ** (1 / exponent) / 2
+        expected = 1e6 * (3300 / load) ** exponent / (2 * turns.sum())
+        assert found.values["bearing_life"].value == pytest.approx(expected, rel=1e-4)
+        assert found.values["bearing_static_safety"].value == pytest.approx(2 * 1370 / contact.max(), rel=1e-12)
+
+
+def test_the_life_of_a_bearing_does_not_depend_on_the_number_of_points():
+    """Next to the start, where this mechanism jams, the load is unbounded."""
+    spec = cfmkit.load(Path(__file__).parents[2] / "configs" / "cam_friction.yaml")
+    few, many = (analyze(spec.replace({"analysis.points": n})).values["bearing_life"].value for n in (61, 721))
+    assert few == pytest.approx(many, rel=1e-3)
 
 
 def test_a_guide_too_short_for_its_offset_is_refused():
@@ -235,6 +244,22 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
     assert area(rounded) - area(sharp) == pytest.approx(2 * (1 - np.pi / 4) * 0.003**2, rel=1e-3)
     told = " ".join(outline("300 mm").notes)
     assert "room for a tool radius" in told
+
+
+def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():
+    from cfmkit.export.contours import polygons
+    from cfmkit.families.cam.clearance import BESIDE, nearest_pairs
+    from cfmkit.families.cam.outline import drawing
+
+    wide = {"base_width": "60 mm", "tool_radius": "20 mm"}
+    found = analyze(cam(roller_radius="10 mm", plate=wide, envelope={"gap": "1 mm"}))
+    assert "parts_touch" not in {one.name for one in found.warnings}
+    gap, states = nearest_pairs(found.state)[BESIDE], found.state.states
+    assert gap.min() > -1e-9
+    outline = polygons(drawing(found.spec).contours[:1], "cut", 4000)[0]
+    for at in (0, len(gap) // 8):
+        away = np.hypot(*(outline - [states.x[at], states.y[at]]).T).min() - 0.010
+        assert gap[at] >= away - 1e-6  # the whole outline has the flank, too, which the roller touches
 
 
 def test_a_roller_that_comes_to_the_end_of_its_flank_touches_nothing_else():

@@ -187,7 +187,14 @@ def spec_of(options: SensitivityOptions) -> Spec:
     changes = changes_of(options)
     if not changes or (spec.sensitivity is None and "parameters" not in changes):
         return spec
+    if spec.sensitivity is not None and any(map(_sets_samples, options.changes)):
+        changes = {"samples": spec.sensitivity.samples} | changes
     return spec.replace({"sensitivity": with_options(spec.sensitivity, changes)})
+
+
+def _sets_samples(change: str) -> bool:
+    """Whether a ``--set`` says how many samples are drawn: then this is no number of another method."""
+    return change.partition("=")[0].rpartition(":")[2].strip() in ("sensitivity", "sensitivity.samples")
 
 
 def changes_of(options: SensitivityOptions) -> dict[str, Any]:

@@ -104,10 +104,16 @@ def _to_segment(place: Place, start: Place, end: Place) -> FloatArray:
 def _to_edges(place: Place, edges: tuple[object, ...]) -> FloatArray:
     """Return the distance from the straight edges and fillets of an outline [m]."""
     gaps = [_to_segment(place, edge.start, edge.end) for edge in edges if isinstance(edge, Line)]
-    # A fillet lies within the corner of its tangents, of which the straight edges hold all but the corner itself.
-    arcs = [edge for edge in edges if isinstance(edge, Arc)]
-    gaps += [np.abs(np.hypot(place[0] - arc.center[0], place[1] - arc.center[1]) - arc.radius) for arc in arcs]
+    gaps += [_to_arc(place, edge) for edge in edges if isinstance(edge, Arc)]
     return np.asarray(np.min(gaps, axis=0))
+
+
+def _to_arc(place: Place, arc: Arc) -> FloatArray:
+    """Return the distance of points that face an arc [m]; infinite of others, to which an end is nearer."""
+    across, along = place[0] - arc.center[0], place[1] - arc.center[1]
+    turned = np.arctan2(along, across) - min(arc.start, arc.end)
+    faced = np.mod(turned, 2.0 * np.pi) <= abs(arc.end - arc.start)
+    return np.where(faced, np.abs(np.hypot(across, along) - arc.radius), np.inf)
 
 
 def _to_box(place: Place, height: FloatArray, size: tuple[float, float]) -> FloatArray:

@@ -269,23 +269,36 @@ def _integral(places: FloatArray, values: FloatArray, window: tuple[float, float
 def _bearing(solution: Solution) -> dict[str, float | None]:
     """Return largest load [N], life [strokes up and down] and static safety of the rollers' bearings."""
     mechanism, loads = solution.assembly.spec.mechanism, solution.assembly.loads
-    bearings, states = mechanism.bearings, solution.states
+    bearings = mechanism.bearings
     assert bearings is not None
-    turn = normal_turn(loads.losses or Losses(roller_radius=mechanism.roller_radius), mechanism.rolling_friction)
-    load = [state.contact * np.sqrt(1.0 + turn**2) / bearings.per_roller for state in (solution.up, solution.down)]
-    most = largest(*load)
+    mu = mechanism.rolling_friction
+    of_contact = np.sqrt(1.0 + normal_turn(loads.losses or Losses(roller_radius=mechanism.roller_radius), mu) ** 2)
+    of_contact /= bearings.per_roller
+    most = largest(*(of_contact * state.contact for state in _both(solution)))
     found: dict[str, float | None] = {"bearing_load_max": most}
     if bearings.static_rating and most:
         found["bearing_static_safety"] = bearings.static_rating / most
     if bearings.dynamic_rating:
         exponent = 3.0 if bearings.kind == "ball" else 10.0 / 3.0
-        turns = np.hypot(np.diff(states.x), np.diff(states.y)) / (2.0 * np.pi * mechanism.roller_radius)
+        turns, track = _bearing_turns(solution), solution.assembly.track
+        # In the middle of each step: at the start the load of a mechanism that jams there is unbounded.
+        middles = track.states(track.start + 0.5 * (solution.travel[1:] + solution.travel[:-1]))
         used = 0.0
-        for one in load:
-            worn = np.nan_to_num(np.maximum(one, 0.0) / bearings.dynamic_rating) ** exponent
-            used += float(turns @ (0.5 * (worn[1:] + worn[:-1])))
+        for way in (1.0, -1.0):
+            load = of_contact * np.nan_to_num(np.maximum(forces(middles, loads, way * mu, way).contact, 0.0))
+            used += float(turns @ (load / bearings.dynamic_rating) ** exponent)
         found["bearing_life"] = 1e6 / used if used > 0 else None
     return found
+
+
+def _bearing_turns(solution: Solution) -> FloatArray:
+    """Return the revolutions of a roller's bearing from point to point, (n - 1,).
+
+    Its shaft turns with the brace, in the direction in which the roller rolls: the bearing feels the difference.
+    """
+    states, mechanism = solution.states, solution.assembly.spec.mechanism
+    rolled = np.hypot(np.diff(states.x), np.diff(states.y)) / mechanism.roller_radius
+    return np.asarray(np.abs(rolled - np.diff(np.arcsin(states.x / mechanism.brace_length))) / (2.0 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
