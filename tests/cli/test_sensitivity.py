@@ -68,7 +68,7 @@ def test_a_number_of_samples_that_is_set_counts_for_the_method_of_the_option(cli
     for more in (("--set", change), ("--set", change, "--samples", "5")):
         done = cli("sensitivity", study, "-o", "out", "--method", "oat", *more, "-j", "1", "-q", "--no-plots")
         assert done.code in (0, 5), done.err
-        assert report(cli, "out")["samples"]["evaluated"] == int(more[-1][-1])
+        assert report(cli, "out")["samples"]["blocks"] == int(more[-1][-1])
 
 
 def test_the_force_is_proportional_to_the_springs(cli, study):
