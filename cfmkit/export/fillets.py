@@ -39,11 +39,12 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
     if radius <= 0 or len(contour.edges) < 2:
         return contour, ()
     side = 1.0 if (_area(contour) > 0) != contour.hole else -1.0
-    edges = [edge for edge in contour.edges if not isinstance(edge, Line) or abs(edge.ends[1] - edge.ends[0]) > 1e-12]
+    edges = [edge for edge in contour.edges if not _used_up(edge)]
+    # before any corner is rounded: an arc may use up a whole line, which has no direction then
+    turns = [float(np.angle(_direction(edges[k], 0) / _direction(edges[k - 1], -1))) for k in range(len(edges))]
     sharp, arcs = [], {}
-    for k in range(len(edges)):
+    for k, turn in enumerate(turns):
         before, after = edges[k - 1], edges[k]
-        turn = float(np.angle(_direction(after, 0) / _direction(before, -1)))
         if turn * side > -SMOOTH:
             continue
         if (found := _rounded(before, after, radius, side)) is None:
@@ -51,7 +52,12 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
         else:
             edges[k - 1], arcs[k], edges[k] = found
     rounded = [piece for k, edge in enumerate(edges) for piece in ((arcs[k], edge) if k in arcs else (edge,))]
-    return replace(contour, edges=tuple(rounded)), tuple(sharp)
+    return replace(contour, edges=tuple(edge for edge in rounded if not _used_up(edge))), tuple(sharp)
+
+
+def _used_up(edge: Edge) -> bool:
+    """Tell whether an edge is a line without a length."""
+    return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) <= 1e-12
 
 
 def _area(contour: Contour) -> float:
@@ -72,6 +78,8 @@ def _direction(edge: Edge, end: int) -> complex:
 
 def _rounded(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
     """Return two edges, shortened, and the arc between them; None where it does not fit."""
+    if _used_up(before) or _used_up(after):
+        return None
     if isinstance(before, Line) and isinstance(after, Line):
         return _between_lines(before, after, radius, side)
     if isinstance(before, Line) and isinstance(after, Smooth):
@@ -89,7 +97,8 @@ def _between_lines(before: Line, after: Line, radius: float, side: float) -> tup
     one, other = _direction(before, -1), _direction(after, 0)
     corner = after.ends[0]
     trim = radius * math.tan(0.5 * abs(float(np.angle(other / one))))
-    if trim > min(abs(before.ends[1] - before.ends[0]), abs(after.ends[1] - after.ends[0])):
+    shortest = min(abs(before.ends[1] - before.ends[0]), abs(after.ends[1] - after.ends[0]))
+    if trim > shortest * (1 + 1e-9):  # a line as long as the trim is used up, whatever its rounding
         return None
     center = corner - trim * one - 1j * side * radius * one
     arc = _arc(center, radius, corner - trim * one, corner + trim * other, side)

@@ -31,6 +31,23 @@ def test_only_the_inside_corner_is_rounded_whichever_way_the_contour_runs(turned
     assert area(contour) == pytest.approx(area(polygon(ELL, "cut")) + (1 - np.pi / 4) * 0.002**2, rel=1e-9)
 
 
+def test_arcs_may_use_up_the_lines_beside_them():
+    """In a slot as wide as two radii every arc leaves half of its ends, the second one nothing: there is no line left."""
+    slot = polygon([(0, 0), (0.01, 0), (0.01, 0.002), (0, 0.002)], "cut", hole=True)
+    contour, sharp = filleted(slot, 0.001)
+    assert sharp == ()
+    assert [type(edge) for edge in contour.edges] == [Arc, Line, Arc, Arc, Line, Arc]
+    assert area(contour) == pytest.approx(0.01 * 0.002 - (4 - np.pi) * 1e-6, rel=1e-9)
+
+
+def test_a_step_as_high_as_the_fillet_is_rounded():
+    """Its inside corner takes the whole step; the outside corner at the other end is none for a cutter."""
+    steps = [(0, 0), (0.03, 0), (0.03, 0.01), (0.02, 0.01), (0.02, 0.011), (0.01, 0.011), (0.01, 0.02), (0, 0.02)]
+    contour, sharp = filleted(polygon(steps, "cut"), 0.001)
+    assert sharp == ()
+    assert sum(isinstance(edge, Arc) for edge in contour.edges) == 2
+
+
 def test_all_corners_of_a_square_hole_are_inside_corners():
     hole = polygon([(0, 0), (0.01, 0), (0.01, 0.01), (0, 0.01)], "cut", hole=True)
     contour, _ = filleted(hole, 0.001)
