@@ -41,6 +41,14 @@ def test_a_cam_is_suggested_for_a_long_stroke_with_some_loss(tmp_path):
     assert header.startswith("number,family,variant,force_mean [N],ripple [1]")
 
 
+def test_a_wish_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):
+    code, found = suggested("unreachable-torque-of-a-coin", tmp_path / "out", "-j", "1")
+    assert (code, found["proposals"]) == (4, [])
+    assert len(found["families"]) >= 4
+    assert all(one["reason"] for one in found["families"])
+
+
+@pytest.mark.slow  # the nearest wishes are designed and analysed: some 10 s
 def test_a_wish_beyond_everybody_ends_with_4_and_the_nearest_one(tmp_path):
     code, found = suggested("unreachable-rubber", tmp_path / "out", "-j", "1")
     assert code == 4

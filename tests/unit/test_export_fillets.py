@@ -32,7 +32,7 @@ def test_only_the_inside_corner_is_rounded_whichever_way_the_contour_runs(turned
 
 
 def test_arcs_may_use_up_the_lines_beside_them():
-    """In a slot as wide as two radii every arc leaves half of its ends, the second one nothing: there is no line left."""
+    """In a slot as wide as two radii two arcs leave nothing of its ends."""
     slot = polygon([(0, 0), (0.01, 0), (0.01, 0.002), (0, 0.002)], "cut", hole=True)
     contour, sharp = filleted(slot, 0.001)
     assert sharp == ()
