@@ -181,7 +181,7 @@ class Elements:
         np.maximum.at(spread, nodes, equivalent(each - mean[:, nodes]))
         return mean, spread
 
-    def along_edges(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+    def along_edges(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.int64]]:
         """Return Cauchy's stress along the free edges.
 
         On a free edge nothing acts across, so the stress along it is all there is.

@@ -130,7 +130,7 @@ class Part:
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         unjudged = held | self._beside_clamps(grid, held)
-        return Meshed(SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles), unjudged)
+        return Meshed(self, SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles), unjudged)
 
     def _beside_clamps(self, grid: Mesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tell which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
@@ -181,22 +181,24 @@ class Meshed:
 
     Attributes
     ----------
+    part : Part
     problem : SolidProblem
     unjudged : (n,) array of bool
         Nodes whose stress is not read: they are held or driven, or at the end of a rigid piece.
     """
 
+    part: Part
     problem: SolidProblem
     unjudged: NDArray[np.bool_]
 
     def followed(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
         """Return the poses at some travels, from rest on in one direction [m or rad]."""
-        return MeshSolution(self.problem, follow(self.problem, stops, report), self.unjudged)
+        return MeshSolution(self.part, self.problem, follow(self.problem, stops, report), self.unjudged)
 
     def densely(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
         """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
         course, off = refined(self.problem, follow(self.problem, stops, report))
-        return MeshSolution(self.problem, course, self.unjudged, off)
+        return MeshSolution(self.part, self.problem, course, self.unjudged, off)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +207,7 @@ class MeshSolution:
 
     Attributes
     ----------
+    part : Part
     problem : SolidProblem
     course : PosePath
     unjudged : (n,) array of bool
@@ -213,21 +216,25 @@ class MeshSolution:
         What the curve is off between poses, in parts of the largest effort; NaN where that was not looked at.
     """
 
+    part: Part
     problem: SolidProblem
     course: PosePath
     unjudged: NDArray[np.bool_]
     between: float = float("nan")
 
     @cached_property
+    def along_edges(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        """Stress along the free edges at each pose (k, e) [Pa], and at which nodes (e,)."""
+        found = [self.problem.elements.along_edges(self.moved(pose), self.unjudged) for pose in self.course.poses]
+        return read_only([stress for stress, _ in found]), found[0][1]
+
+    @cached_property
     def peaks(self) -> tuple[FloatArray, FloatArray]:
         """Largest stress along a free edge at each pose (k,) [Pa], and where in the unloaded part (k, 2) [m]."""
-        stresses, places = [], []
-        for pose in self.course.poses:
-            stress, nodes = self.problem.elements.along_edges(self.moved(pose), self.unjudged)
-            worst = int(np.abs(stress).argmax())
-            stresses.append(abs(float(stress[worst])))
-            places.append(self.problem.elements.mesh.nodes[nodes[worst]])
-        return read_only(stresses), read_only(places)
+        stress, nodes = self.along_edges
+        worst = np.abs(stress).argmax(axis=1)
+        largest = np.abs(stress[np.arange(len(stress)), worst])
+        return read_only(largest), read_only(self.problem.elements.mesh.nodes[nodes[worst]])
 
     def differences(self, coarse: MeshSolution) -> tuple[float, float]:
         """Return by how much a coarser mesh differs at the poses of both: in force and in their largest stresses.

@@ -43,6 +43,14 @@ def test_its_stress_is_in_a_fillet_and_larger_than_the_beams(strip):
     assert "of the drawing, at" in warning.message
 
 
+def test_each_fillet_of_a_strip_has_a_row_with_the_pad_that_it_is_at(strip):
+    table = strip["solid"].tables["fillets"]()
+    assert sorted(table["place"]) == ["ground", "ground", "slider", "slider"]
+    largest = strip["solid"].curve.extra["max_stress"].values.max()
+    assert 1e6 * table["max_stress"].max() == pytest.approx(largest, rel=1e-3)
+    assert "fillets" not in strip["beam"].tables
+
+
 def test_the_stress_map_is_drawn_and_there_is_no_film(strip):
     assert list(api.figures(strip["solid"])) == ["curve", "stress_map"]
     assert api.figures(strip["solid"])["stress_map"]().axes

@@ -51,6 +51,21 @@ def test_a_preload_moves_the_spring_only(straight):
     assert forces[1] - forces[0] == pytest.approx(more, rel=1e-3)
 
 
+def test_each_fillet_of_leaf_and_spring_has_a_row_with_its_place_and_the_preload_of_its_largest_stress(straight):
+    result = straight["solid"]
+    table = result.tables["fillets"]()
+    places = table["place"]
+    assert sorted(places) == ["leaf at shuttle"] * 2 + ["leaf at wall"] * 2 + ["spring at block"] * 4
+    of = {piece: table["max_stress"][[one.startswith(piece) for one in places]] for piece in ("leaf", "spring")}
+    assert 1e6 * of["spring"].max() == pytest.approx(result.values["spring_stress_max"].value, rel=1e-9)
+    assert 1e6 * of["leaf"].max() <= result.values["bistable_stress_max"].value
+    # the spring is bent most at the larger preload, at the end of the window; the leaves do not feel the preload
+    assert table["preload"].tolist() == [0.5 if one.startswith("spring") else 0.0 for one in places]
+    ends = table["displacement"][[one.startswith("spring") for one in places]]
+    assert ends == pytest.approx(1e3 * result.state.window[1])
+    assert "fillets" not in straight["exact"].tables
+
+
 def test_the_curve_is_stable_and_its_stress_map_is_drawn(straight):
     assert straight["solid"].curve.stable.all()
     figure = api.figures(straight["solid"])["stress_map"]()

@@ -7,7 +7,7 @@ model of beams; an eye turns about its hole as one piece. No contact, no plastic
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,7 @@ from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
+from cfmkit.families.beam.fillets import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -102,15 +103,21 @@ class SolidSolution:
         """The same, by part."""
         return {"part": (self.stress, np.zeros_like(self.stress))}
 
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
+        end, window = self.spec.extent, self.spec.analysis.window
+        low, high = sorted((0.0, end) if window is None else between(window, (0.0, end)))
+        return low, high
+
     @cached_property
     def worst(self) -> tuple[float, FloatArray] | None:
         """Largest stress of the poses in the window [Pa] and its place in the unloaded part (2,) [m]; None without any.
 
         Without a window over the whole travel.
         """
-        end, window, travel = self.spec.extent, self.spec.analysis.window, self.fine.course.travel
-        low, high = sorted((0.0, end)) if window is None else between(window, (0.0, end))
-        slack = 1e-9 * abs(end)  # an end of the window is a pose, but for rounding
+        travel, (low, high) = self.fine.course.travel, self.window
+        slack = 1e-9 * abs(self.spec.extent)  # an end of the window is a pose, but for rounding
         inside = np.flatnonzero((travel >= low - slack) & (travel <= high + slack))
         if not len(inside):
             return None
@@ -167,6 +174,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         travel=(0.0, spec.extent),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
+        tables={"fillets": partial(fillets, assembly, meshes.fine, solution.window)},
         state=solution,
     )
 

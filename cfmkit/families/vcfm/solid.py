@@ -10,7 +10,7 @@ Assumes: plane stress. No contact, no plasticity.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
+from cfmkit.families.vcfm.fillets import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
@@ -232,8 +233,11 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
-    found = result_of(solve(spec, made, sampler))
-    return replace(found, warnings=(*found.warnings, *_findings(spec, sampler)))
+    found = result_of(solution := solve(spec, made, sampler))
+    tables = dict(found.tables)
+    if found.curves:
+        tables["fillets"] = partial(fillets, solution)
+    return replace(found, warnings=(*found.warnings, *_findings(spec, sampler)), tables=tables)
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ Assumes: plane stress. No contact, no plasticity.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,7 @@ from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_ang
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.slider_crank.printed.fillets import fillets
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece
@@ -148,6 +149,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=elasticity(spec.mechanism).allowable_stress,
+        tables={"fillets": partial(fillets, spec, solution.pins, meshes.fine, solution.window)},
         state=solution,
     )
 

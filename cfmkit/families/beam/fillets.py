@@ -1,0 +1,54 @@
+"""The largest stress of a beam mechanism's part in each of its fillets, with the node and the beams that it joins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica.model.layout import Layout
+from cfmkit.families.beam.build import mirror_axis
+from cfmkit.families.beam.parts.spec import PartSpec
+from cfmkit.families.beam.strips import mirrored, strips
+from cfmkit.families.fillet_table import FilletRow, fillet_table
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.beam.build import Assembly
+    from cfmkit.solid.meshed_part import MeshSolution
+    from cfmkit.tables import Table
+
+EXACT = 1e-6
+"""Lines between points of a beam are no farther from its edges than this [m]."""
+
+
+def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> Table:
+    """Return the fillets with their largest stress in a window [m or rad]; those of a mirrored half with a prime."""
+    from cfmkit.solid.fillets import stressed_fillets
+
+    spec = assembly.spec
+    beams, nodes = _named(assembly)
+    rows = []
+    for one in stressed_fillets(solved, (spec.mechanism.part or PartSpec()).fillet):
+        joined = one.arc.touched(beams)
+        node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
+        if (found := one.largest(*window)) is not None:
+            rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
+    turns = spec.mechanism.drive.kind == "rotation"
+    return fillet_table(rows, ("angle", "angle") if turns else ("displacement", "length"))
+
+
+def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
+    """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
+    network, axis = assembly.network, mirror_axis(assembly)
+    fits = Layout(network, assembly.drive()).fits
+    beams = {
+        name: [polygon for strip in strips(network, fits, name, EXACT) for polygon in strip.polygons]
+        for name in network.beams
+    }
+    nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
+    if axis is not None:
+        beams |= {f"{name}'": [mirrored(one, *axis) for one in own] for name, own in beams.items()}
+        others = {name: mirrored(place[None], *axis)[0] for name, place in nodes.items()}
+        nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > EXACT}
+    return beams, nodes

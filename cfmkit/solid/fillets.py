@@ -1,0 +1,171 @@
+"""Stress fillet by fillet: where the rounded inside corners of a solved part are, and how large the stress in each is.
+
+Fillets are read off the boundary that is meshed: arcs of the cutter's radius that turn towards the waste. Whole circles
+are holes, not fillets.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.solid.meshed_part import ON
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.solid.edge_rings import Ring
+    from cfmkit.solid.meshed_part import MeshSolution
+
+ROUND = 0.02
+"""Three neighbouring vertices stand on a fillet if their circle's radius differs from it by this share at most."""
+BEYOND = math.radians(6.0)
+"""How far beyond its outermost vertices an arc may go on: outlines may lack the vertex at which it begins."""
+
+RIGID = 1e-9
+"""Fillets with less than this share of the part's largest stress join pieces that move as one: it is rounding."""
+
+TOUCHING = 1e-5
+"""Ends of a fillet nearer to a piece than this are on its edge [m]: twice what outlines may be off."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilletArc:
+    """Where a fillet is.
+
+    Attributes
+    ----------
+    ring : int
+        Number of the ring that it is on.
+    center : (2,) array
+        Of its circle, in the waste [m].
+    radius : float
+        [m]
+    ends : (2, 2) array
+        Its first and last vertex, the material on the left [m].
+    """
+
+    ring: int
+    center: FloatArray
+    radius: float
+    ends: FloatArray
+
+    @property
+    def turn(self) -> float:
+        """Angle from its first to its last vertex, positive [rad]."""
+        first, last = self.ends - self.center
+        return float((math.atan2(first[1], first[0]) - math.atan2(last[1], last[0])) % (2 * math.pi))
+
+    @property
+    def middle(self) -> FloatArray:
+        """Point half way along it (2,) [m]."""
+        first = self.ends[0] - self.center
+        c, s = math.cos(0.5 * self.turn), math.sin(0.5 * self.turn)
+        return np.asarray(self.center + np.array([[c, s], [-s, c]]) @ first)
+
+    def covers(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Tell which points (n, 2) [m] are on it."""
+        way, middle = points - self.center, self.middle - self.center
+        off = np.abs(np.arctan2(middle[0] * way[:, 1] - middle[1] * way[:, 0], way @ middle))
+        return np.asarray((np.abs(np.hypot(*way.T) - self.radius) < ON) & (off <= 0.5 * self.turn + BEYOND))
+
+    def touched(self, pieces: Mapping[str, Sequence[FloatArray]]) -> tuple[str, ...]:
+        """Return the names of the pieces, closed polygons (n, 2) [m] each, on whose edges it begins or ends."""
+        from shapely import LinearRing, Point
+
+        ends = [Point(end) for end in self.ends]
+        return tuple(
+            name
+            for name, polygons in pieces.items()
+            if any(LinearRing(polygon).distance(end) < TOUCHING for polygon in polygons for end in ends)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FilletStress:
+    """A fillet with its largest stress at every pose.
+
+    Attributes
+    ----------
+    arc : FilletArc
+    travel : (k,) array
+        Of the poses, rising [m or rad].
+    stress : (k,) array
+        Along the edge [Pa].
+    """
+
+    arc: FilletArc
+    travel: FloatArray
+    stress: FloatArray
+
+    def largest(self, low: float, high: float) -> tuple[float, float] | None:
+        """Return the largest stress of the poses from one travel to another [Pa], and the travel of it [m or rad].
+
+        At ends that are no pose the stress is interpolated. None where the part does not come to any.
+        """
+        from scipy.interpolate import PchipInterpolator
+
+        slack = 1e-9 * float(np.ptp(self.travel))  # an end of a window is a pose, but for rounding
+        inside = (self.travel >= low - slack) & (self.travel <= high + slack)
+        ends = np.array([end for end in (low, high) if self.travel[0] <= end <= self.travel[-1]])
+        places = np.concatenate([self.travel[inside], ends])
+        if not len(places):
+            return None
+        found = np.concatenate([self.stress[inside], PchipInterpolator(self.travel, self.stress)(ends)])
+        worst = int(found.argmax())
+        return float(found[worst]), float(places[worst])
+
+
+def stressed_fillets(solved: MeshSolution, radius: float) -> tuple[FilletStress, ...]:
+    """Return the fillets of a solved part, as its boundary runs; without those of its rigid pieces.
+
+    Parameters
+    ----------
+    solved : MeshSolution
+    radius : float
+        Of its fillets [m]; 0 if it has none.
+    """
+    grid, rising = solved.problem.elements.mesh, np.argsort(solved.course.travel)
+    stress, nodes = solved.along_edges
+    ring_of = np.zeros(len(grid.nodes), int)
+    ring_of[grid.edges] = grid.rings[:, None]
+    found = []
+    for number, ring in enumerate(solved.part.rings):
+        for arc in arcs(ring, number, radius):
+            own = (ring_of[nodes] == number) & arc.covers(grid.nodes[nodes])
+            largest = np.abs(stress[:, own]).max(axis=1, initial=0.0)
+            if largest.max() > RIGID * np.abs(stress).max():
+                found.append(FilletStress(arc, solved.course.travel[rising], read_only(largest[rising])))
+    return tuple(found)
+
+
+def arcs(ring: Ring, number: int, radius: float) -> Iterator[FilletArc]:
+    """Yield the arcs of a radius that turn towards the waste on a ring."""
+    points, count = ring.points, len(ring.points)
+    centers, radii = _circles(points)
+    on = (ring.turns < 0) & (np.abs(radii - radius) <= ROUND * radius)
+    if radius <= 0 or on.all():
+        return
+    for first in np.flatnonzero(on & ~np.roll(on, 1)):
+        run = [int(first)]
+        while on[(run[-1] + 1) % count]:
+            run.append((run[-1] + 1) % count)
+        ends = points[[run[0] - 1, (run[-1] + 1) % count]]
+        yield FilletArc(number, centers[run].mean(axis=0), radius, read_only(ends))
+
+
+def _circles(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return centre (n, 2) and radius (n,) [m] of the circle through each vertex and its two neighbours."""
+    a, b = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
+    twice = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aa, bb = (a * a).sum(axis=1) / twice, (b * b).sum(axis=1) / twice
+        away = np.column_stack([b[:, 1] * aa - a[:, 1] * bb, a[:, 0] * bb - b[:, 0] * aa])
+    return points + away, np.asarray(np.hypot(*away.T))
