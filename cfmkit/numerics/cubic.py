@@ -111,13 +111,20 @@ def bisect(holds: Callable[[float], bool], low: float, high: float) -> float:
     return high
 
 
-def first_extreme(x: FloatArray, y: FloatArray, sign: int = 1, after: float = -np.inf) -> tuple[float, float] | None:
-    """Return place and value of the first inner maximum (sign 1) or minimum (-1) after a place; None without one."""
+def first_extreme(
+    x: FloatArray, y: FloatArray, sign: int = 1, after: float = -np.inf, corners: FloatArray | None = None
+) -> tuple[float, float] | None:
+    """Return place and value of the first inner maximum (sign 1) or minimum (-1) after a place; None without one.
+
+    An extreme of the samples that is one of some corners is the extreme: no cubic goes across it.
+    """
     z = sign * y
     top = (z[1:-1] > z[:-2]) & (z[1:-1] >= z[2:]) & (x[1:-1] > after)
     if not top.any():
         return None
     index = int(np.argmax(top)) + 1
+    if corners is not None and x[index] in corners:
+        return float(x[index]), float(y[index])
     low, high = float(x[index - 1]), float(x[index + 1])
     ratio = 0.5 * (np.sqrt(5.0) - 1)
     for _ in range(_HALVINGS):

@@ -3,7 +3,8 @@
 What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
 solved from the polynomial through the nearest four, on the branch that these are on: a hundredth of a millisecond. A
 stress takes ten times as long, and is solved at its extremes only; elsewhere the polynomial is taken, for each beam by
-itself, since the largest of all has a kink where it passes from one beam to another.
+itself, since the largest of all has a kink where it passes from one beam to another. At a bifurcation, where the path
+has a corner, everything is parted.
 
 Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
 an extreme there.
@@ -23,6 +24,7 @@ from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.outcome.corners import Corner, Stretch
 from cfmkit.numerics.cubic import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -42,6 +44,15 @@ NEARLY = 0.9
 STRAY, LEAST = 0.5, 1e-3
 """How far a pose may be from its first guess, as a share of the change between the two points around it, and at least
 [rad or mean beam lengths]: beyond that another branch was found."""
+
+ASIDE = 1e-6
+"""Share of the drive's range by which the knots next to a corner are beside it: no cubic goes across it but there."""
+
+NEARER = (0.1, 0.01, 0.001)
+"""Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
+
+AT_POINT = 1e-10
+"""Share of the drive's range within which a bifurcation is at a point of the path: it is not located better."""
 
 KNOWN = 1e-12
 """Share of the drive's range within which a place is that of a point."""
@@ -120,37 +131,81 @@ class BetweenPoints:
 
     @cached_property
     def peaks(self) -> FloatArray:
-        """Where the effort has an extreme between two points, (m,) [m or rad]."""
-        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()}))
+        """Where the effort has an extreme between two points, or a corner, (m,) [m or rad]."""
+        beside = {*self._beside[:, [0, 2]].ravel().tolist()}
+        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Where the path changes to another branch, so that the effort has a kink, (m,) [m or rad]."""
+        return read_only(self._scale * np.array([corner.drive for corner in self._corners.values()]))
+
+    @cached_property
+    def _beside(self) -> FloatArray:
+        """Of each corner a place just before it, the corner, and a place just behind it, (m, 3) [m or rad]."""
+        found = np.empty((len(self.corners), 3))
+        for number, corner in enumerate(self.corners):
+            points = self._points[self._points != corner]
+            after = int(np.searchsorted(points, corner))
+            room = 0.5 * min(corner - points[after - 1], points[after] - corner)
+            aside = min(ASIDE * (points[-1] - points[0]), room)
+            found[number] = corner - aside, corner, corner + aside
+        return found
 
     @cached_property
     def knots(self) -> tuple[FloatArray, FloatArray]:
-        """The points of the path and the extremes between them: places, increasing, and efforts, (n,) each."""
+        """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
         x, effort = self._points, self._efforts
+        if len(self.corners):
+            beside = np.setdiff1d(self._beside, x)
+            x, effort = _inserted(x, effort, beside, self.effort("", beside))
         for _ in range(ROUNDS):
             more = inner_extremes(x, effort)
+            for low, _, high in self._beside.tolist():
+                more = more[(more < low) | (more > high)]
             if not len(more):
                 break
             x, effort = _inserted(x, effort, more, self.effort("", more))
         return read_only(x), read_only(effort)
 
     @cached_property
-    def _stresses(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """Of each beam, places and stresses: those of the path, and extremes between them that may be the largest."""
-        x, names = self._points, list(self.path.layout.network.beams)
-        rows = [self.path.beam_stress(name, self.axial)[0][self._order] for name in names]
-        tops = [inner_extremes(x, row) for row in rows]
-        largest = np.max(rows, axis=0)
+    def _stresses(self) -> tuple[tuple[Stretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
+        """Of each stretch between corners, and there of each beam, smooth variables and stresses.
+
+        They are those of the path and its corners, and extremes between them that may be the largest.
+        """
+        corners = list(self._corners.values())
+        numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
+        names = list(self.path.layout.network.beams)
+        at_points = np.array([self.path.beam_stress(name, self.axial)[0][self._order] for name in names])
+        at_corners = np.empty((0, len(names)))
+        if corners:
+            there = self.at(self.corners)
+            at_corners = np.array([there.beam_stress(name, self.axial)[0] for name in names]).T
         found = []
-        for name, row, top in zip(names, rows, tops, strict=True):
-            beside = np.searchsorted(x, top)
+        for number in range(len(corners) + 1):
+            low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
+            stretch, own = Stretch(low, high), numbers == number
+            ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
+            x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
+            found.append((stretch, self._with_tops(stretch, x, rows.T)))
+        return tuple(found)
+
+    def _with_tops(
+        self, stretch: Stretch, x: FloatArray, rows: FloatArray
+    ) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Return smooth variables and stresses of each beam on a stretch, with the extremes that may be the largest."""
+        t, largest, found = stretch.smooth(x), rows.max(axis=0), []
+        for name, row in zip(self.path.layout.network.beams, rows, strict=True):
+            top = inner_extremes(t, row)
+            beside = np.searchsorted(t, top)
             more = top[np.maximum(row[beside - 1], row[beside]) >= NEARLY * largest[beside]]
             if len(more):
-                there = self.at(more)
-                solved = np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(x, row, more))
-                found.append(_inserted(x, row, more, solved))
+                there = self.at(self._scale * stretch.drive(more))
+                solved = np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(t, row, more))
+                found.append(_inserted(t, row, more, solved))
             else:
-                found.append((x, row))
+                found.append((t, row))
         return tuple(found)
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
@@ -172,7 +227,12 @@ class BetweenPoints:
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of all beams at places of any shape [Pa]."""
         flat = np.ravel(places)
-        largest = np.max([values_at(x, stress, flat) for x, stress in self._stresses], axis=0)
+        wanted, largest = flat / self._scale, np.full(len(flat), np.nan)
+        number = np.searchsorted([corner.drive for corner in self._corners.values()], wanted)
+        for index, (stretch, beams) in enumerate(self._stresses):
+            own = number == index
+            t = stretch.smooth(wanted[own])
+            largest[own] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
         return np.asarray(largest.reshape(np.shape(places)))
 
     def at(self, places: FloatArray) -> Path:
@@ -182,10 +242,13 @@ class BetweenPoints:
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
+        loads = self.path.points.drive[self._order][near]
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
         y[known] = self._y[near[known]]
+        for corner in self._corners.values():
+            here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
+            y[here], loads[here], known = corner.y, corner.drive, known | here
         found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
-        loads = self.path.points.drive[self._order][near]
         for number in np.flatnonzero(~known).tolist():
             spot = self._spot(y[number], float(wanted[number]), float(loads[number]))
             if spot is None or spot.unstable not in self._counts(near[number], left[number]):
@@ -249,12 +312,51 @@ class BetweenPoints:
                 near[number] = left[number] + bool(wanted[number] > here[0])
         return near
 
+    @cached_property
+    def _corners(self) -> dict[int, Corner]:
+        """The corners of the path by the number of the stretch behind each, increasing."""
+        branch, stretches, drive = self.path.branch[self._order], self._stretch, self._drive
+        names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
+        rounding = AT_POINT * (drive[-1] - drive[0])
+        for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
+            before, behind = drive[right - 1], drive[right]
+            here = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
+            if len(here) != 1:
+                continue
+            ranks = [names.index(branch[right - 1]), names.index(branch[right])]
+            below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
+            at = next((k for k in (right - 1, right) if abs(drive[k] - here[0]) <= rounding), None)
+            place = float(here[0] if at is None else drive[at])
+            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self._y[at])
+            if y is not None:
+                found[int(stretches[right])] = Corner(place, y, below, above)
+        return found
+
+    def _corner(self, place: float, point: int) -> FloatArray | None:
+        """Return the equilibrium at a bifurcation from the stretch that a point next to it is on, which goes through.
+
+        It is singular: ever nearer ones are solved for, and the polynomial taken on from there.
+        """
+        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self._drive
+        x, y = drive[own], self._y[own]
+        for share in NEARER:
+            near = place + share * (drive[point] - place)
+            spot = self._spot(values_at(x, y, np.array([near]))[0], near, near)
+            if spot is None or spot.unstable not in self._counts(point, point):
+                return None
+            at = int(np.searchsorted(x, near))
+            x, y = np.insert(x, at, near), np.insert(y, at, spot.y, axis=0)
+        return np.asarray(values_at(x, y, np.array([place]))[0])
+
     def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
         """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
         found = np.empty((len(wanted), self._y.shape[1]))
-        for stretch in distinct(self._stretch[near]).tolist():
-            own, here = np.flatnonzero(self._stretch == stretch), self._stretch[near] == stretch
-            found[here] = values_at(self._drive[own], self._y[own], wanted[here])
+        for number in distinct(self._stretch[near]).tolist():
+            own, here = self._stretch == number, self._stretch[near] == number
+            stretch = Stretch(self._corners.get(number), self._corners.get(number + 1))
+            ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
+            x, y = stretch.with_ends(self._drive[own], self._y[own], *ends)
+            found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))
         return found
 
 

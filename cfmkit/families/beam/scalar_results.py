@@ -125,10 +125,7 @@ def ranges(solution: OnCurve) -> dict[str, float | None]:
     nominal = value_at(x, force, end)
     numbers |= {"nominal_force": nominal, "stress_at_end": _stress_at(solution, end)}
     if solution.assembly.allowable_stress is not None:
-        allowable = solution.assembly.allowable_stress
-        # beam by beam: the largest of all has a kink where it passes from one beam to another
-        found = [crossing(solution.motion, value, allowable) for value, _ in solution.stresses.values()]
-        numbers["stress_limit_displacement"] = min((place for place in found if place is not None), default=None)
+        numbers["stress_limit_displacement"] = _stress_reaches(solution, solution.assembly.allowable_stress)
     start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), x, force, law) if nominal else None
     if start is not None and start <= end and end > 0:
         numbers |= {"range_start": start, "range_fraction": (end - start) / end}
@@ -140,7 +137,23 @@ def ranges(solution: OnCurve) -> dict[str, float | None]:
 
 def _stress_at(solution: OnCurve, place: float) -> float:
     """Return the largest stress at a place [Pa], beam by beam: the largest of all has kinks."""
+    if solution.everywhere is not None:
+        return float(solution.everywhere.stress("", np.array([place]))[0])
     return max(value_at(solution.motion, value, place) for value, _ in solution.stresses.values())
+
+
+def _stress_reaches(solution: OnCurve, allowable: float) -> float | None:
+    """Return where the largest stress first reaches the allowable one, beam by beam."""
+    law = solution.everywhere
+    if law is None:
+        found = [crossing(solution.motion, value, allowable) for value, _ in solution.stresses.values()]
+        return min((place for place in found if place is not None), default=None)
+    x = law.places
+    reached = np.flatnonzero(law.stress("", x) >= allowable)
+    if not len(reached) or reached[0] == 0:
+        return float(x[0]) if len(reached) else None
+    first = int(reached[0])
+    return bisect(lambda place: law.stress("", np.array([place]))[0] >= allowable, float(x[first - 1]), float(x[first]))
 
 
 _ROUNDS = 4
@@ -255,16 +268,17 @@ def _significant(values: FloatArray, error: float) -> float:
 def extremes(solution: OnCurve) -> dict[str, float | None]:
     """Return the first local maximum of the force and the minimum after it, on a curve that does not turn back."""
     names = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
-    x, force = solution.motion, solution.effort
+    x, force, corners = solution.motion, solution.effort, None
     numbers: dict[str, float | None] = dict.fromkeys(names)
     if not (np.diff(x) > 0).all() or not np.isfinite(force).all():
         return numbers
     if solution.everywhere is not None:
         x, force = solution.everywhere.knots
-    peak = first_extreme(x, force)
+        corners = solution.everywhere.corners
+    peak = first_extreme(x, force, corners=corners)
     if peak is None:
         return numbers
-    valley = first_extreme(x, force, -1, after=peak[0])
+    valley = first_extreme(x, force, -1, after=peak[0], corners=corners)
     return dict(zip(names, (*peak, *(valley or (None, None))), strict=True))
 
 
