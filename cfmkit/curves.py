@@ -143,9 +143,10 @@ class Curve:
 
     def __repr__(self) -> str:
         """Return the curve in a line: what over what, how many points, which branches."""
-        ends = f"{float(self.motion[0]):.4g} ... {float(self.motion[-1]):.4g} SI, " if len(self.motion) else ""
+        low, high = (f"{float(end(self.motion)):.4g}" for end in (np.min, np.max)) if len(self.motion) else ("", "")
+        reach = f"{low} ... {high} {'m' if self.kind == 'force' else 'rad'}, " if low else ""
         names = ", ".join(self.branches[:10])
-        return f"<Curve of {self.kind} over {self.motion_name}: {len(self.motion)} points, {ends}branches {names}>"
+        return f"<Curve of {self.kind} over {self.motion_name}: {len(self.motion)} points, {reach}branches {names}>"
 
     def take(self, keep: NDArray[Any]) -> Curve:
         """Return the curve at the points that `keep` (indices or a mask) selects."""

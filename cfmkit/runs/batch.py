@@ -20,6 +20,7 @@ from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch_entries import LEFT, Entry
 from cfmkit.studies.metric_changes import TOLERANCE, BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes import changes as changes_of
+from cfmkit.tables.html import first_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -301,6 +302,14 @@ class BatchResult:
     folder: str
     files: tuple[str, ...]
     compared: BatchComparison | None = None
+
+    def __repr__(self) -> str:
+        """Return the batch in a line."""
+        return f"<BatchResult in {self.folder!r}: exit code {int(self.exit_code)}; {self.table!r}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the first specifications with their verdicts."""
+        return f"<div>{first_rows(self.table)}</div>"
 
     @property
     def summary(self) -> Mapping[str, Any]:

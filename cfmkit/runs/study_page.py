@@ -15,6 +15,8 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cfmkit.runs.run_page import NAME, escaped_json, identifier, part, references_of, template
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.specs.spec import Spec
 
 MOST_CURVES = 500
@@ -203,9 +206,55 @@ def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequenc
             continue
         line = points.setdefault(number, {}).setdefault("" if branch is None else row[branch], [[], []])
         if row[x] and row[y]:
-            line[0].append(float(f"{float(row[x]):.5g}"))
-            line[1].append(float(f"{float(row[y]):.5g}"))
-    return {"x": head[x], "y": head[y], "points": points} if points and x is not None and y is not None else {}
+            line[0].append(float(row[x]))
+            line[1].append(float(row[y]))
+    if not points or x is None or y is None:
+        return {}
+    drawn = {number: {name: _drawn(line) for name, line in lines.items()} for number, lines in points.items()}
+    return {"x": head[x], "y": head[y], "points": drawn}
+
+
+def _drawn(line: list[list[float]]) -> list[list[float]]:
+    """Return a branch without the points that its drawing does not need: no line moves by more than a fifth of a pixel.
+
+    Of each stretch the point furthest from the line between the ends divides it, until none is further than that.
+    """
+    places = np.array(line).T
+    if len(places) < 3:
+        return _rounded(line)
+    span = np.ptp(np.vstack([places, [places[0, 0], 0.0]]), axis=0)
+    pixels = places / np.where(span > 0, span, 1.0) * _PIXELS
+    keep = np.zeros(len(places), bool)
+    keep[[0, -1]] = True
+    stretches = [(0, len(places) - 1)]
+    while stretches:
+        first, last = stretches.pop()
+        if last - first < 2:
+            continue
+        away = _distances(pixels[first + 1 : last], pixels[first], pixels[last])
+        furthest = int(np.argmax(away))
+        if away[furthest] > 0.2:
+            middle = first + 1 + furthest
+            keep[middle] = True
+            stretches += [(first, middle), (middle, last)]
+    return _rounded(places[keep].T.tolist())
+
+
+def _rounded(line: list[list[float]]) -> list[list[float]]:
+    return [[float(f"{value:.5g}") for value in along] for along in line]
+
+
+def _distances(places: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return how far points are from a straight line between two others, not from its continuation."""
+    along = end - start
+    length = float(along @ along)
+    share = np.clip((places - start) @ along / length, 0.0, 1.0) if length > 0 else np.zeros(len(places))
+    away: FloatArray = np.linalg.norm(places - start - share[:, None] * along, axis=1)
+    return away
+
+
+_PIXELS = np.array([564.0, 264.0])
+"""Width and height of the diagram that study.js draws, without its margins."""
 
 
 _AXES = (("displacement [", "angle ["), ("force [", "torque ["))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,22 @@ def test_texts_of_everything_are_short(name):
     for one in (spec, found, found.curve, found.metrics["force_mean"]):
         assert 10 < len(repr(one)) < 2000
     assert spec.name in repr(found)
+
+
+def test_a_curve_says_over_which_travel_it_goes_there_and_back(result):
+    assert "962 points, 0 ... 0.24 m, branches load, unload" in repr(result.curve)
+
+
+def test_a_batch_is_shown_with_a_row_per_specification_and_its_text_is_short(tmp_path):
+    spec = tmp_path / f"{HOSTILE.replace('/', '')}.yaml"
+    spec.write_text((CONFIGS / "slider_crank_bilancia2019.yaml").read_text())
+    found = cfmkit.batch([spec], tmp_path / "out", verb="analyze", plots=False)
+    assert "exit code 0" in repr(found)
+    assert len(repr(replace(found, entries=found.entries * 40))) < 2000
+    shown = replace(found, entries=found.entries * 12)._repr_html_()
+    assert shown.count("<tr>") == 11
+    assert "2 more rows" in shown
+    assert "<script>" not in shown
 
 
 def test_a_result_measures_itself_as_evaluate_and_check_do(result):

@@ -176,6 +176,20 @@ def swept(tmp_path, **more):
     return tmp_path / "out"
 
 
+def test_curves_of_a_page_have_the_points_that_their_drawing_needs():
+    x = np.linspace(0, 10, 2001)
+    force = np.where(x < 1, 20 * x, 20 + 0.1 * (x - 1) ** 2)
+    own = "\n".join(f"5,load,{a},{b}" for a, b in zip(x, force, strict=True))
+    back = "\n".join(f"5,unload,{a},{b}" for a, b in ((10, 3), (0, 3), (10, 3)))
+    content = f"r [mm],branch,displacement [mm],force [N]\n{own}\n{back}\n".encode()
+    drawn = study_page._curves(content, ["r [mm]"], [["5"]])["points"][0]
+    assert 5 < len(drawn["load"][0]) < 60
+    assert 1.0 in drawn["load"][0]
+    apart = np.abs(np.interp(x, *drawn["load"]) - force)
+    assert apart.max() < 0.001 * force.max()
+    assert drawn["unload"] == [[10, 0, 10], [3, 3, 3]]
+
+
 def test_a_sweep_has_a_page_with_its_points_and_curves(tmp_path):
     out = swept(tmp_path)
     text = (out / "report.html").read_text()
