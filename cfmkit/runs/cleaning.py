@@ -2,19 +2,21 @@
 
 A file is a run's if the manifest beside it lists it and its content is what was written; one that was edited since is
 somebody's work and stays, as does whatever no manifest lists. A journal proves itself: its lines carry
-their checksums; one to which somebody else wrote a line stays. Links are neither followed nor removed.
+their checksums; one to which somebody else wrote a line stays. A run that was killed leaves its lock file, which says
+whose it was, and perhaps a journal without a record beside it. Links are neither followed nor removed.
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store import Manifest, RunFolder, disk
 from cfmkit.store.disk import reporting
+from cfmkit.store.lock import LOCK, has_signed_lock
 from cfmkit.store.names import JOURNAL, MANIFEST, hash_in, mode_of
 from cfmkit.studies.journal import has_foreign_lines, is_journal
 
@@ -74,12 +76,20 @@ def remains_in(folder: Path) -> Remains:
         hashes = {name: hash_in(folder, name) for name in listed if mode_of(folder / name) is not None}
         files = [name for name, digest in hashes.items() if digest == listed[name].sha256]
         edited = [name for name in hashes if name not in files]
-        if is_journal(folder / JOURNAL):
+        locked = has_signed_lock(folder)
+        if is_journal(folder / JOURNAL) or (locked and _is_empty(folder / JOURNAL)):
             (edited if has_foreign_lines(folder / JOURNAL) else files).append(JOURNAL)
+        if locked:
+            files.append(LOCK)
         if manifest is not None:
             files.append(MANIFEST)
         size = sum((folder / name).stat().st_size for name in files)
     return Remains(folder, tuple(files), size, tuple(edited))
+
+
+def _is_empty(file: Path) -> bool:
+    """Return whether an ordinary file is there that holds nothing."""
+    return file.is_file() and not file.is_symlink() and not file.stat().st_size
 
 
 def _manifest(folder: Path) -> Manifest | None:
@@ -107,9 +117,11 @@ def remove(remains: Remains, top: str | os.PathLike[str]) -> Remains:
     # Under the lock everything is looked at again: a run may have been there while the user was asked.
     with RunFolder(root) as folder:
         found = remains_in(folder.path)
+        found = replace(found, files=tuple(name for name in found.files if name in remains.files or name != LOCK))
         for name in found.files:
-            with reporting(root / name, "remove"):
-                disk.system.unlink(root / name)
+            if name != LOCK:  # which this process holds by now, and takes away at the end of the block
+                with reporting(root / name, "remove"):
+                    disk.system.unlink(root / name)
     inner = {root / above for name in found.files for above in Path(name).parents}
     outer = {above for above in root.parents if Path(os.path.realpath(top)) in above.parents}
     disk.remove_empty((inner | outer) - {Path.cwd()})

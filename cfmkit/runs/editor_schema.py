@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.metrics import known_metrics, values_of_family
 from cfmkit.specs.keys import schema as plain_schema
+from cfmkit.store import atomic_write
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from pathlib import Path
 
     from cfmkit.families.base import Family
 
@@ -77,3 +79,10 @@ def with_line(text: str, record: Family) -> str:
 def content(record: Family) -> bytes:
     """Return the file of a family's schema."""
     return json_bytes(schema([record]))
+
+
+def write_schema(spec: Path, record: Family) -> Path:
+    """Write the schema of a family beside a specification; one of another version holds nothing of the user's."""
+    target = spec.with_name(file_name(record))
+    atomic_write(target, content(record))
+    return target

@@ -120,8 +120,10 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
         If a file is there already, or cannot be written.
     """
     from cfmkit import api
+    from cfmkit.families import family
+    from cfmkit.runs.editor_schema import write_schema
     from cfmkit.specs.data_files import named_in
-    from cfmkit.store.disk import discard, make_folders, reporting, write_new
+    from cfmkit.store.disk import discard, make_folders, remove_empty, reporting, write_new
     from cfmkit.studies.batch_entries import is_figure
 
     chosen = example(name)
@@ -137,24 +139,20 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     wanted = {target: chosen.path, **{target.parent / text: path for text, path in data}}
     _refuse_taken(wanted)
     written: list[Path] = []
+    made: list[Path] = []
     try:
         for place, source in wanted.items():
             with reporting(place):
-                make_folders(place.absolute().parent)
+                made += make_folders(place.absolute().parent)
                 write_new(place, source.read_bytes() if place != target else _text(chosen, schema))
             written.append(place)
+        if schema:
+            written.append(write_schema(target, family(chosen.family)))
     except OutputError:
         for place in written:
             discard(place)
+        remove_empty(made)
         raise
-    if schema:
-        from cfmkit.families import family
-        from cfmkit.runs.editor_schema import content, file_name
-        from cfmkit.store import atomic_write
-
-        record = family(chosen.family)
-        written.append(target.with_name(file_name(record)))
-        atomic_write(written[-1], content(record))
     return tuple(written)
 
 

@@ -20,9 +20,10 @@ from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from contextlib import AbstractContextManager
 
+    from cfmkit.errors import Problem
     from cfmkit.results import Result
     from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
@@ -157,8 +158,7 @@ def carry_out(
         Is told how far the run is.
     """
     start = time.perf_counter()
-    document = _document(wanted)
-    spec = _bound(document, wanted)
+    document, spec = read(wanted)
     with RunFolder(wanted.out) as folder:
         folder.check(*FIRST, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
@@ -175,7 +175,31 @@ def carry_out(
 
 def spec_of(wanted: RunRequest) -> Spec:
     """Return the checked specification that is meant, with what is changed in it."""
-    return _bound(_document(wanted), wanted)
+    return read(wanted)[1]
+
+
+def read(wanted: RunRequest) -> tuple[Document, Spec]:
+    """Return the document that is meant, with what is changed in it, and the checked specification."""
+    document = _document(wanted)
+    return document, _bound(document, wanted)
+
+
+@contextmanager
+def placing(document: Document, options: Collection[str] = ()) -> Iterator[None]:
+    """Give what is refused inside the block its place in the file: a model knows the path alone.
+
+    `options` are paths that options of the command have set: what is wrong there has no place in the file.
+    """
+    try:
+        yield
+    except SpecError as error:
+        raise SpecError([_placed(document, one, options) for one in error.problems]) from None
+
+
+def _placed(document: Document, one: Problem, options: Collection[str]) -> Problem:
+    if one.source or any(f"{one.path}.".startswith(f"{path}.") for path in options):
+        return one
+    return document.problem(one.path, one.message)
 
 
 def _document(wanted: RunRequest) -> Document:
@@ -195,12 +219,8 @@ def _bound(document: Document, wanted: RunRequest) -> Spec:
 
 
 def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
-    try:
+    with placing(document):
         found = verb.compute(spec, run)
-    except SpecError as error:  # what a model refuses has a path, and the file knows its place
-        raise SpecError(
-            [one if one.source else document.problem(one.path, one.message) for one in error.problems]
-        ) from None
     if found.result.status is Status.INVALID:
         raise SpecError([placed(document, verb.name, found.result.message)])
     return found

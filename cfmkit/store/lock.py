@@ -16,6 +16,8 @@ import contextlib
 import errno
 import os
 import platform
+import re
+import stat
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -95,6 +97,16 @@ class FolderLock:
             if self._key is not None:
                 _held.pop(self._key, None)
         self._key = None
+
+
+def has_signed_lock(folder: Path) -> bool:
+    """Return whether a run has left its lock file in a folder, or has it there now: a file that says whose it is."""
+    status, file = os.stat(folder), folder / LOCK
+    if _held.get((status.st_dev, status.st_ino)) == os.getpid():
+        return True  # to open and close it would drop the lock
+    if not os.path.lexists(file) or not stat.S_ISREG(os.lstat(file).st_mode):
+        return False
+    return re.fullmatch(rb"[0-9]+ \S*\n", file.read_bytes()[:300]) is not None
 
 
 def _lock(file: Path, folder: Path) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, OutputError
 from cfmkit.store import RunFolder
 
 RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots")
@@ -293,7 +293,38 @@ def test_what_a_model_refuses_is_told_with_its_place_in_the_file(cli, cam):
     line = text[: text.index("  left: ")].count("\n") + 1
     run = cli(*RUN)
     assert run.code == ExitCode.INVALID
-    assert run.err.startswith(f"cam.yaml:{line}:9: mechanism.left: the quasi-static model is symmetric")
+    told = f"cam.yaml:{line}:9: mechanism.left: the quasi-static model is symmetric"
+    assert run.err.startswith(told)
+    for command in (
+        ("sweep", "--vary", "mechanism.brace_length=[200 mm, 201 mm]", "-j", "1"),
+        ("sensitivity", "--vary", "mechanism.brace_length=normal:0.1 mm", "--samples", "4"),
+    ):
+        run = cli(command[0], "cam.yaml", "-o", command[0], "--no-plots", "-q", *command[1:])
+        assert (run.code, run.err.count("\n")) == (ExitCode.INVALID, 1)
+        assert run.err.startswith(told)
+
+
+def test_what_an_option_of_sensitivity_says_has_no_place_in_the_file(cli, cam):
+    vary = ("--vary", "mechanism.brace_length=normal:0.1 mm")
+    run = cli("sensitivity", "cam.yaml", "-o", "out", *vary, "--method", "oat", "--on-failure", "resample")
+    assert run.code == ExitCode.INVALID
+    assert run.err.startswith("sensitivity.on_failure: 'oat' draws no samples")
+
+
+@pytest.mark.parametrize("command", [("new", "cam"), ("examples", "cam")])
+def test_where_the_schema_cannot_be_written_beside_it_a_spec_is_not_written_either(cli, monkeypatch, command):
+    def full(path, _data):
+        raise OutputError(f"cannot write {path}: the disk is full")
+
+    monkeypatch.setattr("cfmkit.runs.editor_schema.atomic_write", full)
+    folder = cli.folder / "mine"
+    out = str(folder / "cam.yaml") if command[0] == "new" else str(folder)
+    if command[0] == "new":
+        folder.mkdir()
+    run = cli(*command, "-o", out)
+    assert (run.code, run.err.count("\n")) == (ExitCode.IO, 1)
+    assert "the disk is full" in run.err
+    assert not folder.exists() or not list(folder.iterdir())
 
 
 def test_a_safety_factor_says_of_which_stress_it_is(cli, cam):

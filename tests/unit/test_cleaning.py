@@ -8,6 +8,7 @@ import pytest
 from cfmkit.errors import FolderInUse
 from cfmkit.runs.cleaning import remains_below, remains_in, remove
 from cfmkit.store import RunFolder
+from cfmkit.store.lock import LOCK
 from cfmkit.store.names import JOURNAL
 from cfmkit.studies.journal import Journal
 
@@ -137,3 +138,31 @@ def test_a_kill_while_cleaning_leaves_a_manifest_that_lists_what_is_left(tmp_pat
     monkeypatch.undo()
     clean(tmp_path)
     assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize("names", [(LOCK,), (LOCK, JOURNAL)])
+def test_what_a_run_leaves_that_is_killed_before_its_first_record_goes(tmp_path, names):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in names:
+        (folder / name).write_bytes(b"4711 host\n" if name == LOCK else b"")
+    assert set(remains_in(folder).files) == set(names)
+    assert set(remove(remains_in(folder), tmp_path).files) == set(names)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", [b"", b"mine\n", b"4711 host\nand more\n"])
+def test_a_lock_file_that_no_run_has_signed_proves_nothing(tmp_path, content):
+    (tmp_path / LOCK).write_bytes(content)
+    (tmp_path / JOURNAL).write_bytes(b"")
+    assert remains_in(tmp_path).files == ()
+
+
+def test_to_look_at_a_folder_leaves_the_lock_of_this_process_alone(tmp_path):
+    a_run(tmp_path)
+    before = remains_in(tmp_path)
+    with RunFolder(tmp_path) as folder:
+        assert LOCK in remains_in(tmp_path).files
+        folder.write("curve.csv", b"again")
+        folder.commit({})
+    assert LOCK not in remove(before, tmp_path).files

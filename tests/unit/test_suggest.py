@@ -363,3 +363,21 @@ def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
     asked = wish_of(None, keys | {"process": "laser"}).wish()
     offered = function_named(family("beam").propose)(asked, Run()).candidates
     assert any(made(ProposalJob("beam", one, asked, 0)).good for one in offered)
+
+
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [
+        ("[nosuch]", "wish.material.0: there is no material 'nosuch'"),
+        ("[pla, pmo]", "wish.material.1: there is no material 'pmo'; did you mean 'pom'?"),
+        ("[{youngs_modulus: 0 GPa}]", "wish.material.0.youngs_modulus: 0 GPa is not allowed: must be > 0"),
+        ("5", "5 is no material: give a name from `show materials`"),
+        ("[5]", "wish.material.0: 5 is no material: give a name from `show materials`"),
+        ("[]", "the list has 0 items"),
+    ],
+)
+def test_of_a_list_of_materials_the_one_that_is_wrong_is_told(material, words):
+    with pytest.raises(SpecError) as caught:
+        wish_of(None, POM | {"material": material})
+    (problem,) = caught.value.problems
+    assert str(problem).startswith("--material: " + words)

@@ -10,7 +10,7 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, argument, flag, option
 from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
-from cfmkit.errors import UsageError, visible
+from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
@@ -39,7 +39,8 @@ class NewOptions(Common):
 def run(options: NewOptions, terminal: Terminal) -> Answer:
     """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
-    from cfmkit.runs.editor_schema import content, file_name, with_line
+    from cfmkit.runs.editor_schema import with_line, write_schema
+    from cfmkit.store.disk import discard
 
     record = family(options.family)
     text = template(options.family)
@@ -49,10 +50,11 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     _write(Path(name), with_line(text, record) if options.schema else text)
     names = [name]
     if options.schema:
-        from cfmkit.store import atomic_write
-
-        names.append(str(Path(name).with_name(file_name(record))))
-        atomic_write(names[-1], content(record))  # it holds nothing of the user's: that of another version is replaced
+        try:
+            names.append(str(write_schema(Path(name), record)))
+        except OutputError:
+            discard(Path(name))  # both or none: a second try would find it in its way
+            raise
     verb = "design" if record.design else "analyze"
     page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
     follow = Paragraph("next", command_line("cfmkit", verb, name))

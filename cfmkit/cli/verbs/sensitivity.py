@@ -125,13 +125,16 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
     from cfmkit.runs import study_page
+    from cfmkit.runs.run import placing, read
     from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import exit_code, outputs
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = study_verbs.now()
     out, form, in_parquet = folder_of(options, "sensitivity"), options.form, study_verbs.wants_parquet(options.table)
-    setup = prepare(spec_of(options), options.seed, options.max_points)
+    document, spec = read(options)
+    with placing(document, [f"sensitivity.{key}" for key in changes_of(options)]):
+        setup = prepare(changed_by(options, spec), options.seed, options.max_points)
     with study_verbs.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
         found = replace(carry_out(setup, lambda work: study_verbs.compute(work, options, place)), fresh=options.fresh)
@@ -170,8 +173,8 @@ def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
     return {} if found.interrupted else figures(found)
 
 
-def spec_of(options: SensitivityOptions) -> Spec:
-    """Return the spec with what the options say about its block `sensitivity`.
+def changed_by(options: SensitivityOptions, spec: Spec) -> Spec:
+    """Return a spec with what the options say about its block `sensitivity`.
 
     Raises
     ------
@@ -180,10 +183,8 @@ def spec_of(options: SensitivityOptions) -> Spec:
     cfmkit.errors.SpecError
         If the block is not valid with it.
     """
-    from cfmkit.runs.run import spec_of as plain
     from cfmkit.studies.sensitivity.parameters import with_options
 
-    spec = plain(options)
     changes = changes_of(options)
     if not changes or (spec.sensitivity is None and "parameters" not in changes):
         return spec

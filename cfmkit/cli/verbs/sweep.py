@@ -24,7 +24,7 @@ from cfmkit.cli.page_blocks import (
     title,
     within,
 )
-from cfmkit.errors import ExitCode, UsageError
+from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
+    from cfmkit.specs.yamlio import Document
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep import SweepRequest
@@ -83,13 +84,15 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
-    from cfmkit.runs.run import spec_of
+    from cfmkit.runs.run import placing, read
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
     start = study_verbs.now()
     out, form, in_parquet = folder_of(options, "sweep"), options.form, study_verbs.wants_parquet(options.table)
-    spec, asked = spec_of(options), request(options)
-    work = prepare(spec, asked)
+    document, spec = read(options)
+    asked = request(options)
+    with placing(document):
+        work = prepare(spec, asked)
     with study_verbs.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "metrics.json", "resolved.yaml")
         records = study_verbs.compute(work, options, place)
@@ -125,7 +128,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     written = Written(out, (*manifest.files, "manifest.json"), study_verbs.now() - start)
     about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     page = _page(records, told, code, written, terminal.verbose > 0)
-    return Answer(told | about, page, code, tuple(_complaints(records, code, options)))
+    return Answer(told | about, page, code, tuple(_complaints(records, code, options, document)))
 
 
 def request(options: SweepOptions) -> SweepRequest:
@@ -172,14 +175,30 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     return summary.exit_code(records.bugs)
 
 
-def _complaints(records: Records, code: ExitCode, options: SweepOptions) -> Iterator[str]:
+def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: Document) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
+
+    if code is ExitCode.INVALID:
+        yield from _refusal(records, document)
 
     if code is ExitCode.INTERRUPTED:
         missing = len(records) - records.finished
         yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(options.fresh)}"
     if records.bugs:
         yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
+
+
+def _refusal(records: Records, document: Document) -> tuple[str, ...]:
+    """Return why the first point is invalid: the table has the message, and the file knows its place."""
+    from cfmkit.runs.run import placing
+
+    study = records.work.study
+    try:
+        with placing(document):
+            told = study.solve(study.variant(records.work.plan.point(0))).message
+    except CfmError as error:
+        return lines_of(error)
+    return (f"error    {told}",)
 
 
 def _page(
