@@ -120,7 +120,7 @@ class SpecError(InputError):
 
 
 class QuantityError(InputError, ValueError):
-    """Text that is not the number or quantity that is wanted there."""
+    """Text that is not the number or quantity that is wanted there, or a value of another kind where a name is."""
 
 
 class GeometryError(InputError):

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
+from cfmkit.errors import QuantityError
 from cfmkit.metrics.fatigue_and_relaxation import Durability, FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
@@ -247,14 +247,11 @@ def _as_block(value: Any) -> Any:
     if isinstance(value, str):
         return {"name": material(value).name}
     if isinstance(value, bool | int | float | tuple | list):
-        told = (
+        # As with quantities, a list is a misfit where lists are allowed, too: what is wrong in it is told then.
+        raise QuantityError(
             f"{described(value)} is no material: give a name from `show materials`, or values such as "
             "{youngs_modulus: 2 GPa, yield_strength: 50 MPa}"
         )
-        if isinstance(value, bool | int | float):
-            raise ValueError(told)
-        # A kind that ends in _type says that only the shape is wrong: where lists are allowed, too, one was meant.
-        raise PydanticCustomError("material_type", "{told}", {"told": told})
     return value
 
 

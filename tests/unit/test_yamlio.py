@@ -349,7 +349,8 @@ def test_the_json_schema_speaks_in_units() -> None:
 def test_reading_common_units_needs_no(heavy: str) -> None:
     code = (
         "import sys; from cfmkit.specs.spec import Spec; from cfmkit.specs.yamlio import read_document;"
-        "text = 'cfmkit: 1\\nfamily: x\\nrequirements: [{metric: a, max: 5 %, over: [1 mm, 2 mm]}, {metric: b, max: 2 deg}]';"
+        "text = 'cfmkit: 1\\nfamily: x\\nrequirements: [{metric: a, max: 5 %, over: [1 mm, 2 mm]},"
+        " {metric: b, max: 2 deg}]';"
         "read_document(text, 'x').bind(Spec);"
         f"assert {heavy!r} not in sys.modules"
     )
