@@ -67,7 +67,7 @@ def gallery(folder: Path) -> str:
 
 def _family(record: Any) -> str:
 
-    from cfmkit.specs.keys import keys
+    from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
 
     blocks: dict[str, list[Any]] = {}

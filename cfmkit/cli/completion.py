@@ -41,7 +41,7 @@ def changes(ctx: Any, incomplete: str) -> list[str]:
 
 
 def _keys(record: Any) -> Any:
-    from cfmkit.specs.keys import keys
+    from cfmkit.specs.keys_and_schema import keys
 
     return keys(record.spec_type)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.specs.keys import Key
+    from cfmkit.specs.keys_and_schema import Key
 
     Record = Mapping[str, Any]
     Section = tuple[str, Sequence[Record], tuple[Field, ...]]
@@ -185,7 +185,7 @@ def references_page() -> Answer:
 
 def family_page(name: str) -> Answer:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
-    from cfmkit.specs.keys import keys
+    from cfmkit.specs.keys_and_schema import keys
     from cfmkit.specs.units import border_unit
 
     record = families.family(name)
@@ -348,7 +348,7 @@ def _values() -> Records:
 
 def _spec_keys() -> Records:
     """Return the keys of all specifications by path and by last name; equal ones of several families once."""
-    from cfmkit.specs.keys import keys
+    from cfmkit.specs.keys_and_schema import keys
 
     every = families.records()
     known: dict[Key, list[str]] = {}

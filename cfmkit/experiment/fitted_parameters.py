@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.yamlio.allowed_keys import Slot
-from cfmkit.studies.spec_values import CannotVary, leaf
+from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_data import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.study_figure_inputs import DrawnScale, StudyCurve, StudyMarks
 
 
 MOST_PANELS = 8

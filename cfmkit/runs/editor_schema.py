@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.metrics import known_metrics, values_of_family
-from cfmkit.specs.keys import schema as plain_schema
+from cfmkit.specs.keys_and_schema import schema as plain_schema
 from cfmkit.store import atomic_write
 from cfmkit.tables.jsontext import json_bytes
 

@@ -136,7 +136,7 @@ class Explorer:
 
     def sliders(self) -> tuple[Slider, ...]:
         """Return a slider for every number of the specification, those that it leaves to their defaults included."""
-        from cfmkit.specs.keys import keys
+        from cfmkit.specs.keys_and_schema import keys
         from cfmkit.specs.yamlio import read_document
 
         spec = self.spec()

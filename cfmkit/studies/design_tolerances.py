@@ -123,7 +123,7 @@ def _renamed(path: str) -> str:
 
 def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Yield what is wrong with a block's keys on made parts as far as that can be seen before anything is designed."""
-    from cfmkit.studies.spec_values import CannotVary, leaf
+    from cfmkit.studies.variable_paths import CannotVary, leaf
 
     for path in design.tolerances or ():
         try:

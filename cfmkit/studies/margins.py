@@ -35,7 +35,7 @@ from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.requirement_rows import RequirementRows, numbers_in, numbers_of, places_of, rows_of, sampled_of
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.sensitivity.inverse import LimitsAlong
-from cfmkit.studies.spec_values import CannotVary, leaf
+from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

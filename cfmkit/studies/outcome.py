@@ -12,7 +12,7 @@ from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.units import format_quantity
 from cfmkit.studies.executors import serial
 from cfmkit.studies.plan import MOST_POINTS
-from cfmkit.studies.spec_values import CannotVary, leaf
+from cfmkit.studies.variable_paths import CannotVary, leaf
 from cfmkit.tables import read_csv
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import numpy as np
 
 from cfmkit.errors import UsageError, visible
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_data import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
+from cfmkit.plots.study_figure_inputs import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.results import Status
-from cfmkit.specs.keys import keys
+from cfmkit.specs.keys_and_schema import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from cfmkit.families import family
 from cfmkit.studies.engine import Work
 from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
-from cfmkit.studies.spec_values import length_to_vary
 from cfmkit.studies.study import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
+from cfmkit.studies.variable_paths import length_to_vary
 from cfmkit.studies.varied_axes import WantedVariation, axes, wishes
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, SpecError, UsageError
 from cfmkit.specs.units import Place, format_quantity
-from cfmkit.studies.spec_values import CannotVary, Leaf, leaf
+from cfmkit.studies.variable_paths import CannotVary, Leaf, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.spec_values import Value
+    from cfmkit.studies.variable_paths import Value
 
 EXAMPLE = "write e.g. --vary 'mechanism.roller_radius=8 mm:16 mm:5' or --vary 'a.b=[1 mm, 2 mm]'"
 LARGEST = 10**18

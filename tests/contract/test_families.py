@@ -21,7 +21,7 @@ from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
 from cfmkit.runs import run_findings
 from cfmkit.runs.files import files
-from cfmkit.specs.keys import keys
+from cfmkit.specs.keys_and_schema import keys
 from cfmkit.specs.units import DIMENSIONS
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]

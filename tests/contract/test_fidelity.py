@@ -26,7 +26,7 @@ from cfmkit.studies.fidelity import (
     fidelity_of,
     lines_of,
 )
-from cfmkit.studies.spec_values import CannotVary, leaf
+from cfmkit.studies.variable_paths import CannotVary, leaf
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 CAM = CONFIGS[0].parent / "cam.yaml"

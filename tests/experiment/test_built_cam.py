@@ -12,8 +12,8 @@ from flanks import Errors, flanks, measured, parameters
 
 import cfmkit
 from cfmkit.errors import DataError, SpecError
-from cfmkit.families.cam.as_built import built_flank, built_track, flanks_of
 from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.measured_cam import built_flank, built_track, flanks_of
 from cfmkit.studies.study import Study
 
 CONFIG = (Path(__file__).parents[2] / "configs/cam.yaml").read_text()

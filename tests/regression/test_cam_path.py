@@ -10,7 +10,7 @@ from cam_support import MM, at, cam
 
 from cfmkit.families.cam.geometry.cut import cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 X0, BRACE, A, ROLLER = 68 * MM, 200 * MM, 9.058 * MM, 16 * MM
 DIGITS = 0.51e-8 * MM

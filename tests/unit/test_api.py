@@ -15,7 +15,7 @@ from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.runs import run_findings, specfile
 from cfmkit.runs.files import files
-from cfmkit.specs import keys
+from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document
 
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"

@@ -10,8 +10,8 @@ from beam_support import CANTILEVER, CONFIGS, cantilever, config
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.specs.keys import keys
-from cfmkit.studies.spec_values import leaf, paths
+from cfmkit.specs.keys_and_schema import keys
+from cfmkit.studies.variable_paths import leaf, paths
 
 
 def faults(*pairs, text=CANTILEVER):

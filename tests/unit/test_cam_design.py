@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.design import two_way_gap
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.results import Status
 
 NOMINAL = {"springs": {"stiffness": "0.69 N/mm", "count": 2}}

@@ -15,9 +15,9 @@ from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.many_tracks import ManyTracks
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Track
-from cfmkit.families.cam.geometry.track_records import NoTrack
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)

@@ -11,7 +11,7 @@ from cam_motion import moving
 from cam_support import analyze
 
 from cfmkit.families.cam.dynamics.build import build
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 
 @dataclass(frozen=True)

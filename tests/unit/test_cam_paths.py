@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from cfmkit.families.cam.geometry.path import RollerPath, ideal_position, reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent, drop
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent, drop
 
 SLOW = settings(deadline=None, max_examples=30)
 FAST = settings(deadline=None, max_examples=150)

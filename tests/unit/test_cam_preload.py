@@ -8,7 +8,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

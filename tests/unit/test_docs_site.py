@@ -13,7 +13,7 @@ from cfmkit import families
 from cfmkit.cli.verbs import docs
 from cfmkit.errors import UsageError
 from cfmkit.runs.examples import example
-from cfmkit.specs.keys import keys
+from cfmkit.specs.keys_and_schema import keys
 
 DOCS = Path(__file__).parents[2] / "docs"
 

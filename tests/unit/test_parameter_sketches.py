@@ -10,7 +10,7 @@ import pytest
 from cfmkit import families
 from cfmkit.cli.main import main
 from cfmkit.runs.family_drawing import drawn, scheme
-from cfmkit.specs.keys import keys
+from cfmkit.specs.keys_and_schema import keys
 
 DRAWN = [record.name for record in families.records() if record.scheme]
 every_drawing = pytest.mark.parametrize("name", DRAWN)

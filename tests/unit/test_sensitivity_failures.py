@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.studies.sensitivity import failures, local, morris, oat, sobol, tolerance
-from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
+from cfmkit.studies.sensitivity import failed_sample_policy as failures
+from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
 
 SLOPES = np.array([5.0, 1.0])
 

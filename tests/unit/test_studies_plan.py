@@ -7,7 +7,7 @@ import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
 from cfmkit.studies.plan import Draw, grid, sampled, zipped
-from cfmkit.studies.spec_values import leaf, paths
+from cfmkit.studies.variable_paths import leaf, paths
 from cfmkit.studies.varied_axes import axes, wish, wishes
 
 SPEC = cfmkit.load("configs/cam.yaml")

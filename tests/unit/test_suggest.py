@@ -22,7 +22,7 @@ from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.studies.suggest import figures, good_parts, search
-from cfmkit.studies.suggest.nearest import nearest
+from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
 

@@ -17,9 +17,9 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.track import Track
-from cfmkit.families.cam.geometry.track_records import NoTrack
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
@@ -28,7 +28,7 @@ from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.profile import Real
+    from cfmkit.families.cam.geometry.slope_law import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
 

@@ -31,8 +31,8 @@ from cfmkit.families.cam.build import (
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw
-from cfmkit.families.cam.geometry.track_records import TrackStates
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve

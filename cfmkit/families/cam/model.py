@@ -37,7 +37,7 @@ from cfmkit.stock.parts_list import listed
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.geometry.track_records import TrackStates
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
@@ -69,7 +69,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         If the two sides differ and nobody has said that the symmetric model will do.
     """
     if spec.mechanism.profile.file is not None:
-        from cfmkit.families.cam.as_built import analyze_built
+        from cfmkit.families.cam.measured_cam import analyze_built
 
         return analyze_built(spec)
     left = spec.mechanism.left

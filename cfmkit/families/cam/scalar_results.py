@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
-from cfmkit.families.cam.geometry.track_records import TrackStates
+from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.continuous_curves import extremes

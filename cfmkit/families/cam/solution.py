@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.statics import Forces, Loads, jams, levers
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.cut import CamProfile
     from cfmkit.families.cam.geometry.track import Track
-    from cfmkit.families.cam.geometry.track_records import TrackStates
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.numerics.registration import Registration
     from cfmkit.results import Finding

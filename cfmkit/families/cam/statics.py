@@ -33,14 +33,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.profile import Real
+    from cfmkit.families.cam.geometry.slope_law import Real
     from cfmkit.families.cam.geometry.track import Track
-    from cfmkit.families.cam.geometry.track_records import TrackStates, TrackStretch
+    from cfmkit.families.cam.geometry.track_states import TrackStates, TrackStretch
 
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""

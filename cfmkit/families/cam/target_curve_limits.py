@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
-from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.findings import at_most, mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 

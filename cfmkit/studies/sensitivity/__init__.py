@@ -3,7 +3,7 @@
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
 `oat`, `local`, `morris`, `sobol` and `tolerance`, with `distributions` (of the
-parameters), `intervals` (confidence) and `failures` (what a sample without a value
+parameters), `intervals` (confidence) and `failed_sample_policy` (what a sample without a value
 means for an index: never "no influence").
 
 `parameters` reads the block `sensitivity:` against a specification, `study` joins

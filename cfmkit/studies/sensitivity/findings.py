@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.evaluation import Evaluator
-    from cfmkit.studies.sensitivity.failures import Analysis
+    from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
     from cfmkit.studies.sensitivity.setup import Setup
     from cfmkit.studies.sensitivity.tolerance import Yield
     from cfmkit.studies.study import Metric

@@ -12,7 +12,7 @@ from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity import inverse, local, morris, oat, sobol, tolerance
 from cfmkit.studies.sensitivity.distributions import draw, values_across, values_at
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
-from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
+from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
 from cfmkit.studies.sensitivity.findings import Findings, IndexLine, lines_of
 from cfmkit.studies.sensitivity.findings import stated as told
 from cfmkit.studies.study import Metric
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records, Work
-    from cfmkit.studies.sensitivity.failures import Analysis
+    from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.setup import Setup
 DEFAULT_YIELD, ESTIMATED = 0.95, 4000

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failures import Analysis, Index
+from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.studies.sensitivity.failures import Policy
+    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
 
 LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
 NAMES = (LOW, HIGH, SWING, SLOPE)

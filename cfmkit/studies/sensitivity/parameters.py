@@ -11,7 +11,7 @@ from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
 from cfmkit.specs.units import read_number, read_quantity
 from cfmkit.studies.sensitivity.distributions import Incompatible, ParameterSpread, correlation_matrix
-from cfmkit.studies.spec_values import CannotVary, Leaf, leaf
+from cfmkit.studies.variable_paths import CannotVary, Leaf, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -17,8 +17,8 @@ from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
-from cfmkit.studies.spec_values import length_to_vary
 from cfmkit.studies.study import Study
+from cfmkit.studies.variable_paths import length_to_vary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Sensitivity, Spec
     from cfmkit.specs.units import Ends
-    from cfmkit.studies.sensitivity.failures import Policy
+    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Metric
 

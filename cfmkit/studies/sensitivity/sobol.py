@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failures import Analysis, Index, nothing
+from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index, nothing
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

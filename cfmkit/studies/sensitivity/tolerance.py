@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.studies.sensitivity.failures import Analysis, Index
+from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
 from cfmkit.studies.sensitivity.intervals import LEVEL, clopper_pearson, paired_difference, wilson
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, varies_not
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.distributions import ParameterSpread
-    from cfmkit.studies.sensitivity.failures import Policy
+    from cfmkit.studies.sensitivity.failed_sample_policy import Policy
     from cfmkit.studies.sensitivity.intervals import Interval
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"

@@ -26,7 +26,7 @@ from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.identity import code_stamp, stable_hash
 from cfmkit.studies.pool import until
-from cfmkit.studies.suggest.nearest import nearest
+from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class _Times:
 class Answered:
     """What one family had to say: how many candidates it named and how many were made, or why there are none.
 
-    Where no family has a mechanism, `nearest` says with which values of a key it would have one.
+    Where no family has a mechanism, `eased_wish` says with which values of a key it would have one.
     """
 
     family: str

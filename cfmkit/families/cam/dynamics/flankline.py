@@ -20,7 +20,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.path import RollerPath
-    from cfmkit.families.cam.geometry.profile import Real, SlopeLaw
+    from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw
 
 KNOTS = 65
 NEWTON_STEPS = 30

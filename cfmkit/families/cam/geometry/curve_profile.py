@@ -10,10 +10,10 @@ that slider and roller are apart less that at the start. So s(x) is the root of 
 
     dy/dx = p = (D/A + gamma tan a) / (phi(s) - gamma) + tan a,
 
-the constant-force slope of `profile` where phi = 1. Cut for a friction mu the slope is (p + mu)/(1 - mu p) as there,
+the constant-force slope of `slope_law` where phi = 1. Cut for a friction mu the slope is (p + mu)/(1 - mu p) as there,
 and s(x) follows from ds/dx = dy/dx - tan a, integrated once.
 
-Assumes: what `profile` assumes. phi is above 0 but at the very start, where it may begin at zero with springs at rest.
+Assumes: what `slope_law` assumes. phi is above 0 but at the very start, where it may begin at zero (springs at rest).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.profile import Real, SlopeLaw, brace_tangent, drop
+from cfmkit.families.cam.geometry.slope_law import Real, SlopeLaw, brace_tangent, drop
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.families.cam.geometry.path import RollerPath
-    from cfmkit.families.cam.geometry.profile import Real
+    from cfmkit.families.cam.geometry.slope_law import Real
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.geometry.track import KNOTS, Pivot, pivot_angle
 from cfmkit.numerics.roots import invert_increasing
 

@@ -1,7 +1,7 @@
 """Roller-centre path of a constant-force cam: its slope, integrated.
 
 With x as the independent variable the height is one integral of the slope
-(`cfmkit.families.cam.geometry.profile`); without friction it has a closed form,
+(`cfmkit.families.cam.geometry.slope_law`); without friction it has a closed form,
 
     y = c ((D^2 - d0^2) / 2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2)),      D = x - x0 + d0,
 
@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
-from cfmkit.families.cam.geometry.profile import Real, brace_tangent, drop
+from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent, drop
 from cfmkit.numerics.quadrature import RunningIntegral
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.profile import SlopeLaw
+    from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 Method = Literal["quadrature", "ode"]
 

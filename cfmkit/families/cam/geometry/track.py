@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.profile import Real, brace_tangent
-from cfmkit.families.cam.geometry.track_records import NoTrack, TrackStates, TrackStretch
+from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
+from cfmkit.families.cam.geometry.track_states import NoTrack, TrackStates, TrackStretch
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:

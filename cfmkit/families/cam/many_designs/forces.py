@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.profile import brace_tangent, drop, rise_rate
+from cfmkit.families.cam.geometry.slope_law import brace_tangent, drop, rise_rate
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER

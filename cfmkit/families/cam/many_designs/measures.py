@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import metric_of, metrics_of

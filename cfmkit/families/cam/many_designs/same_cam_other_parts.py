@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
 from cfmkit.families.cam.geometry.many_tracks import Poses, sign_changes
-from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes

@@ -15,9 +15,9 @@ import numpy as np
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
-from cfmkit.families.cam.geometry.track_records import NoTrack
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
 from cfmkit.families.cam.statics import jams, levers
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.track_records import TrackStates
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.many_designs.forces import Designs
 
 SHAPE = ("constant", "x0", "brace", "radius", "stroke")

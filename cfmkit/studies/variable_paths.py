@@ -11,7 +11,7 @@ from cfmkit.errors import QuantityError
 from cfmkit.specs.units import BareFloat, UnitField, place_of
 from cfmkit.specs.units.fields import described
 from cfmkit.specs.yamlio.allowed_keys import Slot, expected, required
-from cfmkit.specs.yamlio.explain_errors import not_among
+from cfmkit.specs.yamlio.explain_validation_errors import not_among
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
