@@ -163,10 +163,14 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
 
 def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
     """Return what a trim needs to know of each part: the mean force, then each requirement's metric and its ends."""
+    from cfmkit.metrics import window_of
+
     curve = nominal.curve
     prefix = "torque" if curve.kind == "torque" else "force"
     # of one branch, always the same: the worse of two changes from part to part
-    wanted: list[tuple[str, Any]] = [(f"{prefix}_mean{_first_branch(curve)}", None)]
+    # and without a window over that of a requirement: at the ends of the travel a part may have no force
+    over = None if window_of(nominal) else next((one.over for one in spec.part_requirements if one.over), None)
+    wanted: list[tuple[str, Any]] = [(f"{prefix}_mean{_first_branch(curve)}", over)]
     for one in spec.part_requirements:
         wanted.append((one.metric, one.over))
         if split_name(one.metric)[0] == "deviation_from_target":

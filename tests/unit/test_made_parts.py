@@ -66,6 +66,19 @@ def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
     assert judged.share(judged.trimmed).good == still.share().good > judged.share().good
 
 
+def test_a_trim_without_a_window_is_to_the_mean_force_over_that_of_a_requirement():
+    """At the very start rollers that are too large have no force on the way up."""
+    limits = {"metric": "force_mean[load]", "min": "49.6 N", "max": "51.8 N", "over": ["5 mm", "235 mm"]}
+    built = {"mechanism.roller_radius": "8 mm", "analysis.window": None, "analysis.travel": "236 mm"}
+    scatter = {"mechanism.roller_radius": {"normal": "0.1 mm"}}
+    spec = cam(tolerances=scatter, samples=30).replace({**built, "analysis.points": 31, "requirements": (limits,)})
+    spec = designed(spec, Run()).design.spec
+    result = cfmkit.analyze(spec)
+    made = tolerances_of(spec, spec.design, 0)
+    judged = judge(made, made.drawn(), result, Run())
+    assert judged.share(judged.trimmed).good == judged.share().good == 30
+
+
 def test_a_trim_of_springs_that_are_solved_as_arrays_brings_their_mean_force_to_that_of_the_design():
     tolerances = {f"mechanism.springs.{name}": {"normal": "5 %"} for name in ("pivot", "crank_pin", "slider_pin")}
     spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.tolerances": tolerances})
