@@ -71,8 +71,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     force = solution.constant_force
     span = solution.window[1] - solution.window[0]
     end = solution.window[1]
-    leaves, spring = np.max([solution.largest_stress(push, end) for push in solution.pushes], axis=0).tolist()
-    over_travel = max(max(solution.largest_stress(push)) for push in solution.pushes)
+    stresses = solution.largest_stresses(solution.pushes, (end, np.inf))
+    (leaves, spring), over_travel = stresses[:, 0].max(axis=0).tolist(), float(stresses[:, 1].max())
     allowed = solution.spec.mechanism.allowable_stress
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,

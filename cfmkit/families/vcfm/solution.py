@@ -214,15 +214,24 @@ class Solution:
 
     def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
         """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
-        travel = push.travel[push.travel <= end]
-        if push.travel[0] < end < push.travel[-1]:
-            travel = np.append(travel, end)
-        laws = (
-            lambda places: self.sampler.leaves(places).stress,
-            lambda places: self.sampler.spring(places + push.preload)[1],
-        )
-        leaves, spring = (_largest(law, travel) for law in laws)
+        leaves, spring = self.largest_stresses((push,), (end,))[0, 0].tolist()
         return leaves, spring
+
+    def largest_stresses(self, pushes: tuple[Push, ...], ends: tuple[float, ...]) -> FloatArray:
+        """Return the same of some curves up to some travels, (curves, travels, 2): together, as calls take the time."""
+        owners = [push for push in pushes for _ in ends]
+        travels = [_up_to(push.travel, end) for push in pushes for end in ends]
+        preload = np.array([[push.preload] for push in owners])
+        laws: tuple[Callable[[FloatArray], FloatArray], ...] = (
+            lambda places: self.sampler.leaves(places.ravel()).stress.reshape(places.shape),
+            lambda places: self.sampler.spring((places + preload).ravel())[1].reshape(places.shape),
+        )
+        some = np.array([bool(len(travel)) for travel in travels])
+        filled = [travel if len(travel) else push.travel[:1] for travel, push in zip(travels, owners, strict=True)]
+        most = max(map(len, filled))
+        motion = np.stack([np.pad(travel, (0, most - len(travel)), "edge") for travel in filled])
+        found = [np.maximum(some * extremes(law, motion, law(motion), uneven=True)[0], 0.0) for law in laws]
+        return np.stack(found, axis=-1).reshape(len(pushes), len(ends), 2)
 
     @property
     def window_force(self) -> float | None:
@@ -265,12 +274,7 @@ def force_of(sampler: PartSampler, travel: FloatArray, preload: float) -> FloatA
     return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
 
 
-def _largest(law: Callable[[FloatArray], FloatArray], travel: FloatArray) -> float:
-    """Return the largest value of a law at some travels and between them; zero where there is no travel."""
-    if not len(travel):
-        return 0.0
-    samples = np.asarray(law(travel))
-    most, _ = extremes(
-        lambda at: np.asarray(law(at.ravel())).reshape(at.shape), travel[None], samples[None], uneven=True
-    )
-    return max(float(most[0]), 0.0)
+def _up_to(travel: FloatArray, end: float) -> FloatArray:
+    """Return the places of a curve up to a travel, that one included where the curve goes beyond it."""
+    within = travel[travel <= end]
+    return np.append(within, end) if travel[0] < end < travel[-1] else within
