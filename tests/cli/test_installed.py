@@ -71,6 +71,9 @@ def test_the_program_says_and_writes_what_the_same_command_does_here(cli, comman
         files = {str(path.relative_to(configs)): path for path in configs.rglob("*") if path.is_file()}
         written = {name: path.name in OWN or path.read_bytes() for name, path in files.items()}
         shutil.rmtree(configs)
-        found.append((done.code, SECONDS.sub("", done.out), done.err, written))
+        page = SECONDS.sub("", done.out)
+        if command == ("doctor",):  # the size of a cache that other tests fill also sets how wide its column is
+            page = re.sub(r" +", " ", page)
+        found.append((done.code, page, done.err, written))
     assert found[0][0] in (0, 5)
     assert found[0] == found[1]
