@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.options import Common
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 _STYLE: dict[str, Any] = {
     "rich_markup_mode": "rich",

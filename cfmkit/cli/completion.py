@@ -15,7 +15,7 @@ def families(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """Return what `cfmkit show` explains and begins so: topics, families, and everything else that has a name."""
-    from cfmkit.cli.topics import TOPICS, names
+    from cfmkit.cli.show_topics import TOPICS, names
 
     known = [*TOPICS, *families("")]
     # names by the hundred only once somebody has begun one

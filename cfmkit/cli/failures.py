@@ -17,7 +17,7 @@ from cfmkit.errors import ExitCode, OutputError, SpecError, shortened
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the option parser raises; typer does not name it itself."""

@@ -19,7 +19,7 @@ from cfmkit.cli import streams
 from cfmkit.cli.answer import document
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
-from cfmkit.cli.terminal import Terminal
+from cfmkit.cli.output import Terminal
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:

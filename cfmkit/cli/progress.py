@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli import streams
 from cfmkit.cli.failures import Stopped
-from cfmkit.cli.terminal import Bar
+from cfmkit.cli.output import Bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 LINE_EVERY = 10.0
 """Seconds between two lines where nobody watches: a study of an hour leaves 360 lines in a log."""

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.options import Studying
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.progress import StudyProgress
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.errors import ExitCode
     from cfmkit.specs.spec import Spec
     from cfmkit.store import Manifest, RunFolder

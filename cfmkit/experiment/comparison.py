@@ -15,7 +15,7 @@ from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.evaluation import MeasuredCurves
-    from cfmkit.metrics.differences import Measure
+    from cfmkit.metrics.curve_differences import Measure
     from cfmkit.results import Quantity, Result
 
 PLACES = 257

@@ -303,7 +303,7 @@ def _in_si(values: FloatArray, column: ColumnInfo) -> FloatArray:
         return converted
     if (dimension, unit) in COMMON:
         return values * float(COMMON[dimension, unit])
-    from cfmkit.specs.units.registry import unit_size
+    from cfmkit.specs.units.unit_size import unit_size
 
     return values * float(unit_size(unit).factor)
 

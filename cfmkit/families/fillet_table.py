@@ -12,7 +12,7 @@ from cfmkit.tables import Table, TableColumn, border_column
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.solid.fillets import FilletArc
+    from cfmkit.solid.fillet_stress import FilletArc
 
 
 @dataclass(frozen=True, eq=False)

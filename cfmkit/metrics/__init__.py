@@ -1,11 +1,12 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
-`table` lists what there is, `known` what a name may mean, `flatness` and `ranges` compute it, `traces` cuts
-windows, `branch_views` is what a metric looks at, `evaluation` runs the table over a
+`metric_definitions` lists what there is and what a name may mean, `window_metrics` and `ranges` compute it,
+`branch_windows` cuts windows, `branch_views` is what a metric looks at, `evaluation` runs the definitions over a
 curve, `requirements` compares with bounds, `metrics_json` writes border units.
 """
 
 from cfmkit.metrics.branch_views import Branch, Cycle, MeasuringFrame
+from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window, restrict, traces
 from cfmkit.metrics.evaluation import (
     Survey,
     evaluate,
@@ -18,9 +19,7 @@ from cfmkit.metrics.evaluation import (
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.metrics_json import as_json, metrics_json, search_json
-from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
-from cfmkit.metrics.table import (
+from cfmkit.metrics.metric_definitions import (
     TABLE,
     Definition,
     definition_of,
@@ -32,7 +31,8 @@ from cfmkit.metrics.table import (
     unknown_metric,
     values_of_family,
 )
-from cfmkit.metrics.traces import BranchTrace, Undefined, Window, restrict, traces
+from cfmkit.metrics.metrics_json import as_json, metrics_json, search_json
+from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 
 __all__ = [
     "TABLE",

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.metrics import continuous_curves, ranges_many
+from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
-from cfmkit.metrics.traces import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

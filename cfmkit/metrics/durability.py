@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.flatness import stress_range
-from cfmkit.metrics.traces import Undefined
+from cfmkit.metrics.branch_windows import Undefined
+from cfmkit.metrics.window_metrics import stress_range
 
 if TYPE_CHECKING:
     from cfmkit.metrics.branch_views import Branch

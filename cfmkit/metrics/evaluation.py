@@ -14,9 +14,16 @@ import numpy as np
 
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import Cycle, MeasuringFrame, cycle, span_text
+from cfmkit.metrics.branch_windows import Undefined, Window, covers, traces
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
-from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, time_of, unknown_metric
-from cfmkit.metrics.traces import Undefined, Window, covers, traces
+from cfmkit.metrics.metric_definitions import (
+    Definition,
+    definitions,
+    metrics_by_name,
+    split_name,
+    time_of,
+    unknown_metric,
+)
 from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import Share, between
 

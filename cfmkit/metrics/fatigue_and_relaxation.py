@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfmkit.metrics.traces import Undefined
+from cfmkit.metrics.branch_windows import Undefined
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import ranges_many
-from cfmkit.metrics.traces import Undefined
+from cfmkit.metrics.branch_windows import Undefined
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.traces import ROUNDING
+from cfmkit.metrics.branch_windows import ROUNDING
 from cfmkit.numerics.bracketing import last_places
 
 if TYPE_CHECKING:

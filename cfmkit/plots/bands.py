@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
 from cfmkit.metrics.branch_views import Branch, cycle
-from cfmkit.plots.line_diagram import Limit
+from cfmkit.plots.line_chart import Limit
 from cfmkit.plots.text import value_text
 
 if TYPE_CHECKING:

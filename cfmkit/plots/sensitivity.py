@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.rounding import is_level, levelled
+from cfmkit.plots.rounding_noise import is_level, levelled
 from cfmkit.plots.style import (
     BAND,
     BLUE,

@@ -16,7 +16,7 @@ from cfmkit.results import Status
 from cfmkit.runs import batch_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
-from cfmkit.runs.run_findings import worst
+from cfmkit.runs.run_outcome import worst
 from cfmkit.studies.batch_entries import LEFT, Entry
 from cfmkit.studies.metric_changes import TOLERANCE, BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes import changes as changes_of

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.plots.composed import DrawnPanel
+    from cfmkit.plots.composed_figure import DrawnPanel
     from cfmkit.specs.composed_figure import ComposedFigure, Panel
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.executors import Executor
@@ -56,7 +56,7 @@ def panels(name: str, found: ComposedFigure, executor: Executor) -> list[DrawnPa
     cfmkit.errors.CfmError
         If a run cannot be read or has no such picture; the place of the panel in the file is said.
     """
-    from cfmkit.plots.composed import DrawnPanel
+    from cfmkit.plots.composed_figure import DrawnPanel
 
     document = read_spec(name)
     known: dict[tuple[str, str | None], Makers] = {}

@@ -248,7 +248,7 @@ def number(text: str) -> Number:
     """
     from cfmkit.errors import QuantityError
     from cfmkit.specs.units.number_text import read_number
-    from cfmkit.specs.units.registry import unit_size
+    from cfmkit.specs.units.unit_size import unit_size
 
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)
     digits, _, unit = rest.partition(" ")

@@ -14,8 +14,8 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
-from cfmkit.runs import run_findings
-from cfmkit.runs.files import files
+from cfmkit.runs import run_outcome
+from cfmkit.runs.run_files import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.errors import Problem
     from cfmkit.results import Result
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import Document
     from cfmkit.store import Manifest
@@ -249,16 +249,16 @@ def _ending(found: Report) -> dict[str, Any]:
 
 def analysed(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
-    return run_findings.report_on(api.analyze(spec, run))
+    return run_outcome.report_on(api.analyze(spec, run))
 
 
 def designed(spec: Spec, run: Run) -> Report:
     """Return the report on the designed mechanism, with the yield of its parts, or on why there is none."""
     design = api.design(spec, run)
-    result = api.analyze(design.spec, run) if design.spec is not None else run_findings.undesigned(spec, design)
+    result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
-    found = run_findings.report_on(result, design)
-    found = found.beside({}, run_findings.Supplement(files=tables, lines=design.notes))
+    found = run_outcome.report_on(result, design)
+    found = found.beside({}, run_outcome.Supplement(files=tables, lines=design.notes))
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part
@@ -271,7 +271,7 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
 
     found = _with_yield(found, nominal, given, run)
     told = bench(nominal, run)
-    return found.beside({}, run_findings.Supplement(lines=(("bench", told),))) if told else found
+    return found.beside({}, run_outcome.Supplement(lines=(("bench", told),))) if told else found
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
@@ -283,8 +283,8 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
         from cfmkit.studies.expected_yield import expected
 
         told = expected(nominal, run)
-        return found.beside({}, run_findings.Supplement(lines=(("made", told),))) if told else found
-    more = run_findings.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
+        return found.beside({}, run_outcome.Supplement(lines=(("made", told),))) if told else found
+    more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.results import Quantity, Result
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
 
 NAME = "report.html"
 

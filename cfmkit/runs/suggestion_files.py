@@ -203,8 +203,8 @@ def _made(
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
     from cfmkit.results import Design, Status
-    from cfmkit.runs.files import files
-    from cfmkit.runs.run_findings import report_on
+    from cfmkit.runs.run_files import files
+    from cfmkit.runs.run_outcome import report_on
 
     proposal = proposals[index]
     if deadlines.files.late():

@@ -136,7 +136,9 @@ class Target(Model):
 
     def curve(self, level: float | None = None) -> TargetCurve:
         """Return it as a function; a line without `start` has a level at zero [N or N m]."""
-        from cfmkit.numerics.through_points import ThroughPoints  # numpy, which reading a specification does not need
+        from cfmkit.numerics.monotone_interpolation import (
+            ThroughPoints,  # numpy, which reading a specification does not need
+        )
         from cfmkit.specs.target_function import TargetCurve
 
         points = self.all_points

@@ -24,13 +24,13 @@ are gone after it, and after a kill both are cleared by the next run.
 
 `disk` makes changes and turns their errors into sentences, `names` says what may
 be written, `lock` keeps other runs out, `transaction` changes many files as one,
-`manifest` is the list of what a run wrote, `folder` is the face of it all, and
+`manifest` is the list of what a run wrote, `run_folder` is what a run works with, and
 `identity` gives content its name.
 """
 
 from cfmkit.store.disk import FileRecord, atomic_write
-from cfmkit.store.folder import RunFolder
 from cfmkit.store.identity import code_stamp, file_hash, origin, stable_hash
 from cfmkit.store.manifest import Manifest
+from cfmkit.store.run_folder import RunFolder
 
 __all__ = ["FileRecord", "Manifest", "RunFolder", "atomic_write", "code_stamp", "file_hash", "origin", "stable_hash"]

@@ -2,9 +2,9 @@
 
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 
-`leaves` and `variation` say what may vary and how, `plan` enumerates the points,
-`study` evaluates one of them, `blocks` many at once where the model is vectorised,
-`executors`, `pool` and `cluster` are ways to get that done, `journal` and `rows`
+`variable_paths` and `varied_axes` say what may vary and how, `plan` enumerates the points,
+`study` evaluates one of them, `vectorised_blocks` many at once where the model is vectorised,
+`executors` and `pool` are ways to get that done, `journal` and `rows`
 remember what is finished, `engine` puts these together, `noted_metrics` names what is
 noted, `tables` writes it, `summary` sums it up, and `sweep` is the study that
 varies a specification.

@@ -16,9 +16,9 @@ from cfmkit.families import family
 from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
+from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.design_tolerances import assumed, tolerances, tolerances_of
-from cfmkit.studies.near_design import exact_slopes, most_parts, slopes, step_of
-from cfmkit.studies.requirement_rows import sampled_of
+from cfmkit.studies.requirement_constraints import sampled_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

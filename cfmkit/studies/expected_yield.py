@@ -13,9 +13,9 @@ from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
+from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.design_tolerances import MODULUS, assumed
-from cfmkit.studies.near_design import exact_slopes, most_parts, slopes, step_of
-from cfmkit.studies.requirement_rows import (
+from cfmkit.studies.requirement_constraints import (
     metrics_in,
     metrics_of_part,
     numbers_in,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.design_tolerances import Assumed
-    from cfmkit.studies.requirement_rows import RequirementRows
+    from cfmkit.studies.requirement_constraints import RequirementRows
 
 PARTS = 4000
 

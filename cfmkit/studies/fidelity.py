@@ -17,7 +17,7 @@ from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import Undefined, Window, window_of, windows_judged
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 from cfmkit.results import Finding, Status
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.families.base import Run
-    from cfmkit.metrics.differences import Measure
+    from cfmkit.metrics.curve_differences import Measure
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Spec
 

@@ -32,7 +32,14 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Design, Status
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.requirement_rows import RequirementRows, numbers_in, numbers_of, places_of, rows_of, sampled_of
+from cfmkit.studies.requirement_constraints import (
+    RequirementRows,
+    numbers_in,
+    numbers_of,
+    places_of,
+    rows_of,
+    sampled_of,
+)
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.sensitivity.inverse import LimitsAlong
 from cfmkit.studies.variable_paths import CannotVary, leaf

@@ -402,7 +402,7 @@ def _spelt(unit: str) -> str:
 
 def _size(unit: str) -> bool | None:
     """Return True for a unit that there is, None otherwise."""
-    from cfmkit.specs.units.registry import is_unit
+    from cfmkit.specs.units.unit_size import is_unit
 
     spelt = _spelt(unit)
     return True if spelt == "1" or is_unit(spelt) else None
@@ -410,8 +410,8 @@ def _size(unit: str) -> bool | None:
 
 def _dimension(unit: str) -> str | None:
     """Return which of the dimensions of interest a unit has."""
-    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
     from cfmkit.specs.units.table import COMMON
+    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
     spelt = _spelt(unit)
     common = next((name for name in ROLES if (name, spelt) in COMMON), None)

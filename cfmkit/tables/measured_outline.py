@@ -94,7 +94,7 @@ def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[
 
 def _columns(lines: list[str], block: TextBlock, name: str) -> dict[str, tuple[int, float]]:
     """Return index and unit of x and y, and the index of the side."""
-    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
+    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
     above = [index for index in range(block.first) if lines[index].strip()][-5:]
     cells = next(

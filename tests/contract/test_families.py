@@ -19,8 +19,8 @@ from cfmkit.cli.main import main
 from cfmkit.cli.verbs.new import template
 from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
-from cfmkit.runs import run_findings
-from cfmkit.runs.files import files
+from cfmkit.runs import run_outcome
+from cfmkit.runs.run_files import files
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.specs.units import DIMENSIONS
 
@@ -77,7 +77,7 @@ def test_a_family_has_a_config_and_the_config_of_its_template(name):
 def test_a_template_runs_and_is_designed_without_a_warning(name):
     spec = cfmkit.loads(template(name))
     for found in (spec, cfmkit.design(spec).spec):
-        done = run_findings.report_on(cfmkit.analyze(found))
+        done = run_outcome.report_on(cfmkit.analyze(found))
         assert [item.name for item in done.warnings] == []
         assert (done.status, not done.missed) == (Status.COMPLETE, True)
 
@@ -113,7 +113,7 @@ def test_what_a_family_says_about_itself_is_complete(name):
 
 @every_config
 def test_a_config_solves_and_meets_its_requirements(path):
-    found = run_findings.report_on(analysed(path))
+    found = run_outcome.report_on(analysed(path))
     assert found.result.status is Status.COMPLETE, found.result.message
     assert found.requirements
     assert [outcome.sentence for outcome in found.missed] == []
@@ -212,8 +212,8 @@ def test_a_design_is_judged_like_any_other_spec(path):
     written = cfmkit.loads(cfmkit.dumps(design.spec))
     assert written == design.spec
     direct, again = (
-        run_findings.report_on(api.analyze(design.spec), design),
-        run_findings.report_on(api.analyze(written)),
+        run_outcome.report_on(api.analyze(design.spec), design),
+        run_outcome.report_on(api.analyze(written)),
     )
     assert [outcome.sentence for outcome in direct.missed] == []
     assert numbers(again.metrics) == numbers(direct.metrics)
@@ -239,7 +239,7 @@ def test_the_parts_of_a_config_can_be_drawn(path):
 
 @every_config
 def test_the_files_of_a_run_are_the_same_every_time(path):
-    found = run_findings.report_on(analysed(path))
+    found = run_outcome.report_on(analysed(path))
     one, other = (dict(files(found, plots=False)) for _ in range(2))
     assert {"metrics.json", "resolved.yaml", "curve.csv"} <= set(one)
     assert one == other

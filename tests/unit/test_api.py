@@ -13,8 +13,8 @@ import cfmkit
 from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
-from cfmkit.runs import run_findings, specfile
-from cfmkit.runs.files import files
+from cfmkit.runs import run_outcome, specfile
+from cfmkit.runs.run_files import files
 from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document
 
@@ -125,12 +125,12 @@ def test_progress_and_seed_reach_the_family(monkeypatch, spec):
     ],
 )
 def test_of_several_exit_codes_the_gravest_counts(codes, first):
-    assert run_findings.worst(codes) is first
-    assert run_findings.worst(codes[::-1]) is first
+    assert run_outcome.worst(codes) is first
+    assert run_outcome.worst(codes[::-1]) is first
 
 
 def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spec):
-    found = run_findings.report_on(Result(spec, Status.INFEASIBLE, "too much"))
+    found = run_outcome.report_on(Result(spec, Status.INFEASIBLE, "too much"))
     assert found.metrics == {}
     assert len(found.missed) == len(spec.requirements)
     assert found.exit_code is ExitCode.NO_SOLUTION
@@ -141,14 +141,14 @@ def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spe
 def test_warnings_of_design_and_analysis_are_told_once(spec):
     one, other = Finding("a", "first"), Finding("b", "second")
     result = Result(spec, Status.COMPLETE, warnings=(other, one))
-    found = run_findings.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
+    found = run_outcome.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
     assert found.warnings == (one, other)
     assert found.as_json()["warnings"] == [{"name": "a", "message": "first"}, {"name": "b", "message": "second"}]
 
 
 def test_not_a_number_never_reaches_a_file():
     with pytest.raises(ValueError, match="Out of range float values"):
-        run_findings.json_bytes({"value": np.nan})
+        run_outcome.json_bytes({"value": np.nan})
 
 
 def test_the_schema_of_several_families_keeps_their_blocks_apart():

@@ -152,7 +152,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
             "answer",
             "failures",
             "page_blocks",
-            "terminal",
+            "output",
         )
     ]
     heavy = (

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from cfmkit.cli.output import Terminal
 from cfmkit.cli.page_blocks import (
     BLANK,
     CellGrid,
@@ -21,7 +22,6 @@ from cfmkit.cli.page_blocks import (
     title,
     whole_line,
 )
-from cfmkit.cli.terminal import Terminal
 
 
 @pytest.fixture

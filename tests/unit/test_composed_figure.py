@@ -9,7 +9,7 @@ import pytest
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.plots.composed import composed
+from cfmkit.plots.composed_figure import composed
 from cfmkit.plots.figure_options import FigureForm
 from cfmkit.plots.style import MM, size_mm
 from cfmkit.plots.vector_formats import svg

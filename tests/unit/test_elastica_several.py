@@ -23,7 +23,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation.singular import Curvature, eigenvalues
+from cfmkit.elastica.continuation.critical_points import Curvature, eigenvalues
 from cfmkit.elastica.continuation.switching import descend
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver

@@ -10,7 +10,7 @@ import pytest
 from cfmkit import families
 from cfmkit.cli.commands import names, parse, program
 from cfmkit.cli.main import EPILOG, TEXT, _before_the_verb, main
-from cfmkit.cli.topics import READ_FIRST, explain
+from cfmkit.cli.show_topics import READ_FIRST, explain
 
 EXAMPLES = {
     name: module.EXAMPLE
@@ -54,7 +54,7 @@ def test_a_family_is_explained_in_the_order_in_which_a_file_is_written(name, cap
 
 
 def test_what_the_overview_names_is_explained():
-    from cfmkit.cli.topics import BY_NAME
+    from cfmkit.cli.show_topics import BY_NAME
 
     for name in BY_NAME:
         assert explain(name).data

@@ -16,7 +16,7 @@ from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.studies import margins
 from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.margins import with_design_margins
-from cfmkit.studies.requirement_rows import places_of, rows_of, sampled_of
+from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.metrics.branch_windows import Undefined
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
-from cfmkit.metrics.traces import Undefined
-from cfmkit.runs.run_findings import report_on
+from cfmkit.runs.run_outcome import report_on
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POINTS = ((1e3, 25e6), (1e6, 8e6))

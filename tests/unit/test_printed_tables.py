@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from cfmkit.cli.output import Terminal
 from cfmkit.cli.page_blocks import CellGrid, GridColumn
-from cfmkit.cli.terminal import Terminal
 
 
 @pytest.mark.parametrize("width", [40, 60, 108])

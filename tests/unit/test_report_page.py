@@ -22,7 +22,7 @@ from cfmkit.plots.moving_svg import poses
 from cfmkit.plots.style import axes_mm, new_figure
 from cfmkit.plots.vector_formats import inline, svg
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_files, run_findings, run_page, study_page, suggestion_files
+from cfmkit.runs import batch_files, run_outcome, run_page, study_page, suggestion_files
 from cfmkit.studies.batch_entries import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -71,7 +71,7 @@ class Outline(HTMLParser):
 def reports():
     """Return the report on each example, by its name; a few points are enough for a page."""
     specs = {name: cfmkit.load(CONFIGS / file) for name, file in EXAMPLES.items()}
-    return {name: run_findings.report_on(cfmkit.analyze(spec)) for name, spec in specs.items()}
+    return {name: run_outcome.report_on(cfmkit.analyze(spec)) for name, spec in specs.items()}
 
 
 def made(found, command="cfmkit analyze x.yaml"):
@@ -137,7 +137,7 @@ def test_the_same_report_gives_the_same_bytes(reports):
 def test_hostile_names_messages_and_commands_are_text(reports):
     spec = reports["strip"].result.spec.replace({"name": HOSTILE})
     result = replace(reports["strip"].result, spec=spec, warnings=(Finding("odd", HOSTILE, (f"design.x={HOSTILE}",)),))
-    text = made(run_findings.report_on(result), command=f"cfmkit analyze '{HOSTILE}'")
+    text = made(run_outcome.report_on(result), command=f"cfmkit analyze '{HOSTILE}'")
     outline = Outline(text)
     assert outline.unbalanced == []
     assert not any("onerror" in attributes for _, attributes in outline.tags)
@@ -160,7 +160,7 @@ def test_the_cursor_stands_at_the_motion_of_each_pose(reports):
 
 def test_a_mechanism_without_a_curve_has_a_page_that_says_why(reports):
     spec = reports["cam"].result.spec
-    text = made(run_findings.report_on(Result(spec, Status.NO_EQUILIBRIUM, "the roller holds nothing")))
+    text = made(run_outcome.report_on(Result(spec, Status.NO_EQUILIBRIUM, "the roller holds nothing")))
     assert "there is no solution" in text
     assert "the roller holds nothing" in text
     assert "No figure was drawn" in text

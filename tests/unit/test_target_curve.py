@@ -9,7 +9,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.build import assemble
 from cfmkit.metrics import check, evaluate
-from cfmkit.numerics.through_points import ThroughPoints
+from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.specs.target_curve import Target
 
 CAM = """

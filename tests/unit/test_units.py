@@ -27,8 +27,8 @@ from cfmkit.specs.units import (
     to_border,
     unit_table,
 )
-from cfmkit.specs.units.registry import border_size, unit_size
 from cfmkit.specs.units.table import COMMON
+from cfmkit.specs.units.unit_size import border_size, unit_size
 
 READABLE = [name for name in DIMENSIONS if name != "text"]
 JSON_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]*|(?=\.[0-9]))(\.[0-9]*)?([eE][-+]?[0-9]+)?")

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.answer import Answer
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
     from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.families.base import Run
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.fidelity import FidelityComparison
 
@@ -52,7 +52,7 @@ class AnalyzeOptions(Computing, Measuring):
 
 def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; with --data also a measured curve."""
-    from cfmkit.cli.run_answer import execute
+    from cfmkit.cli.run_verbs import execute
     from cfmkit.runs.run import Verb, analysed
 
     work, inputs = analysed, {}
@@ -77,7 +77,7 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     )
     from cfmkit.experiment.comparison import compare
     from cfmkit.runs.run import analysed
-    from cfmkit.runs.run_findings import Supplement
+    from cfmkit.runs.run_outcome import Supplement
 
     found = analysed(spec, run)
     if not found.result.curves:
@@ -98,7 +98,7 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
 
 def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside the curves of its other models."""
-    from cfmkit.runs.run_findings import Supplement
+    from cfmkit.runs.run_outcome import Supplement
     from cfmkit.studies.fidelity import choices_of, compare, data_of, lines_of
 
     choices = choices_of(spec)

@@ -28,8 +28,8 @@ from cfmkit.errors import CfmError, ExitCode, visible
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_entries import Entry
     from cfmkit.studies.metric_changes import BatchComparison, MetricChange

@@ -11,11 +11,11 @@ from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_
 
 if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.families.base import Run
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
 
 PLACE = 34
@@ -50,7 +50,7 @@ class CalibrateOptions(Computing, Measuring):
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
-    from cfmkit.cli.run_answer import execute
+    from cfmkit.cli.run_verbs import execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.run import Verb
@@ -79,7 +79,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
 
     from cfmkit import api
     from cfmkit.experiment import additions_to_run as add
-    from cfmkit.runs.run_findings import Supplement, report_on
+    from cfmkit.runs.run_outcome import Supplement, report_on
     from cfmkit.tables import to_csv
 
     found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name

@@ -16,8 +16,8 @@ from cfmkit.errors import CfmError, ExitCode, visible
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import TextLine
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
 
 PLACE = 40

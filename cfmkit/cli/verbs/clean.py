@@ -14,8 +14,8 @@ from cfmkit.errors import ExitCode, FolderInUse, UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import TextLine
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.cleaning import Remains
 
 PLACE = 80

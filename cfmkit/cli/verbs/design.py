@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from cfmkit.cli.answer import Answer
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
     from cfmkit.families.base import Run
     from cfmkit.store import RunFolder
 
@@ -32,7 +32,7 @@ class DesignOptions(Computing):
 
 def run(options: DesignOptions, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
-    from cfmkit.cli.run_answer import execute
+    from cfmkit.cli.run_verbs import execute
     from cfmkit.runs.run import Verb, designed
     from cfmkit.studies.executors import cores
 

@@ -15,7 +15,7 @@ from cfmkit.runs.shipped import shipped_folder
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 
 PLACE = 62

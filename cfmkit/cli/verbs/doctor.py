@@ -18,8 +18,8 @@ from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
 
     Record = dict[str, Any]
 

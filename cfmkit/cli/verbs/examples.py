@@ -11,7 +11,7 @@ from cfmkit.cli.page_blocks import BAD, GOOD, Paragraph, command_line, field, li
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
     from cfmkit.studies.batch_entries import Entry
 
 PLACE = 52

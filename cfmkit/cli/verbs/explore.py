@@ -13,7 +13,7 @@ from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.cli.page_blocks import line, whole_line
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 23
 EXAMPLE = "cfmkit explore cam.yaml"

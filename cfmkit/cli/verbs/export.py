@@ -10,7 +10,7 @@ from cfmkit.cli.options import OneSpec, Quiet, option
 from cfmkit.cli.page_blocks import Paragraph, Written
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 30
 EXAMPLE = "cfmkit export cam.yaml --kerf 0.2mm"
@@ -38,7 +38,7 @@ class ExportOptions(OneSpec):
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
     from cfmkit import api
-    from cfmkit.cli.run_answer import folder_of
+    from cfmkit.cli.run_verbs import folder_of
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder

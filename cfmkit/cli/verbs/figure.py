@@ -12,7 +12,7 @@ from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, op
 from cfmkit.cli.page_blocks import Written
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 36
 EXAMPLE = "cfmkit figure figure.yaml --figures pdf"
@@ -49,7 +49,7 @@ def run(options: FigureOptions, terminal: Terminal) -> Answer:
     out, stem = options.out or str(Path("cfm-out") / f"{Path(options.file).stem}-figure"), Path(options.file).stem
     jobs = options.jobs or cores()
     with RunFolder(out) as folder:
-        from cfmkit.plots.composed import composed
+        from cfmkit.plots.composed_figure import composed
 
         drawn = panels(options.file, asked, serial if jobs == 1 else Pool(jobs))
         for name, content in form.write(composed(drawn, asked.columns, form), stem):

@@ -14,8 +14,8 @@ from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Para
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.report import MeasureReport
 
 PLACE = 32
@@ -124,7 +124,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
 
 def _numbers(report: MeasureReport) -> CellGrid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from cfmkit.cli.run_answer import words
+    from cfmkit.cli.run_verbs import words
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []

@@ -13,7 +13,7 @@ from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 50
 EXAMPLE = "cfmkit new cam -o mine.yaml"

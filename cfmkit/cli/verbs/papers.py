@@ -14,8 +14,8 @@ from cfmkit.runs.papers import VERDICTS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
 
     Record = Mapping[str, Any]
 
@@ -71,7 +71,7 @@ def _complaint(record: Record) -> str:
 
 
 def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbose: bool) -> Iterator[Block]:
-    from cfmkit.cli.topics import references
+    from cfmkit.cli.show_topics import references
 
     titles = {one["name"]: one["reference"] for one in references()}
     yield TextLine((Span("cfmkit papers", LABEL), Span("  numbers of the papers, and the results here")))

@@ -11,7 +11,7 @@ from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_blocks import JsonText
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 70
 EXAMPLE = "cfmkit schema cam > cam.schema.json"

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.sensitivity.tolerance import Yield
@@ -123,7 +123,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     interruption, run the same command again to continue.
     """
     from cfmkit.cli import study_verbs
-    from cfmkit.cli.run_answer import folder_of
+    from cfmkit.cli.run_verbs import folder_of
     from cfmkit.runs import study_page
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sensitivity.methods import carry_out

@@ -12,7 +12,7 @@ from cfmkit.cli.page_blocks import BLANK, GOOD, Paragraph, field, listed
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 60
 EXAMPLE = "cfmkit show cam --figure"
@@ -42,7 +42,7 @@ class ShowOptions(Common):
 
 def run(options: ShowOptions, terminal: Terminal) -> Answer:
     """Explain a family with every key of its spec, list units, metrics, materials or papers, or explain one by name."""
-    from cfmkit.cli.topics import explain, skipped
+    from cfmkit.cli.show_topics import explain, skipped
 
     if options.figure is not None:
         return _drawn(options.topic, options.figure)

@@ -18,8 +18,8 @@ from cfmkit.errors import ExitCode, UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
 
 PLACE = 5
 EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"

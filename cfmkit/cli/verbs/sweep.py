@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.yamlio import Document
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
@@ -83,7 +83,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
     from cfmkit.cli import study_verbs
-    from cfmkit.cli.run_answer import folder_of
+    from cfmkit.cli.run_verbs import folder_of
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 

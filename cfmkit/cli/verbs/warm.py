@@ -10,7 +10,7 @@ from cfmkit.cli.options import Common, Quiet
 from cfmkit.cli.page_blocks import Verbatim
 
 if TYPE_CHECKING:
-    from cfmkit.cli.terminal import Terminal
+    from cfmkit.cli.output import Terminal
 
 PLACE = 85
 

@@ -15,7 +15,7 @@ from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 

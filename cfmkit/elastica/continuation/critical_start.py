@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.singular import Curvature, Singular, entered
+from cfmkit.elastica.continuation.critical_points import Curvature, Singular, entered
 from cfmkit.elastica.continuation.state import PRIMARY, Resume
 from cfmkit.elastica.equilibrium.mesh import LOADS
 from cfmkit.elastica.equilibrium.meshed_network import Spot

@@ -21,7 +21,7 @@ from cfmkit.elastica.model.shapes import Bent
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import PathProblem
     from cfmkit.elastica.model.beam import Fit
 

@@ -14,7 +14,7 @@ from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import BranchEnd, Move, PathProblem
     from cfmkit.elastica.equilibrium.meshed_network import Spot
 

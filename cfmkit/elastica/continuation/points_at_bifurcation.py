@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.singular import locate
+from cfmkit.elastica.continuation.critical_points import locate
 from cfmkit.elastica.continuation.state import fine_spot
 from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import BranchEnd, PathProblem, Trail
 
 NEAR_BIFURCATION = 1e-5  # share of the drive's range

@@ -23,7 +23,7 @@ from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
 
 _ROOM = 400  # points on the way to the constant loads
 _SOFTER = (3.0, 1.0, 0.3, 0.1)  # times as thick, with the same bending stiffness

@@ -1,6 +1,7 @@
 """Branch switching: from a bifurcation to a stable equilibrium on a branch that opens there.
 
-Where one mode is critical the branch is entered along its null vector (`cfmkit.elastica.continuation.singular.leave`).
+Where one mode is critical the branch is entered along its null vector
+(`cfmkit.elastica.continuation.critical_points.leave`).
 Where several are critical at once, or nearly so, many branches cross and most of them are unstable. Which one is stable
 need not be known to get there: the path a little beyond is a saddle of the energy, and the way down from it, at a fixed
 drive, ends on a stable branch.
@@ -13,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.singular import Curvature, leave
+from cfmkit.elastica.continuation.critical_points import Curvature, leave
 from cfmkit.elastica.continuation.state import fine_spot
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Spot
     from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver

@@ -18,7 +18,7 @@ from cfmkit.elastica.model.layout import Layout
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.critical_points import Singular
     from cfmkit.elastica.continuation.state import PathProblem, Trail
     from cfmkit.elastica.equilibrium.meshed_network import Solver
     from cfmkit.elastica.model.network import Network

@@ -25,7 +25,7 @@ from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.outcome.corners import Corner, Stretch
-from cfmkit.numerics.cubic import inner_extremes, values_at
+from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

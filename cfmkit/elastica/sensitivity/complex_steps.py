@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.elastica.equilibrium.mesh import assemble_model, table
 from cfmkit.elastica.kernels.model import DesignSlopes, in_order
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.elastica.sensitivity.plain_slopes import plain_slopes
+from cfmkit.elastica.sensitivity.plain_beam_slopes import plain_slopes
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from cfmkit.families.beam.build import thickest
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.scalar_results import ranges, window_of
-from cfmkit.numerics.cubic import value_at
+from cfmkit.numerics.cubic_interpolation import value_at
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, Share, format_short
 from cfmkit.stock.spec import sheet_of

@@ -18,10 +18,10 @@ from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
+from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
-from cfmkit.plots.rounding import vanishing
+from cfmkit.plots.rounding_noise import vanishing
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, color_key, value_text, write_heading

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
-from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
+from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import between
 

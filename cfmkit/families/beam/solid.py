@@ -16,7 +16,7 @@ from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
-from cfmkit.families.beam.fillets import fillets
+from cfmkit.families.beam.fillet_stress import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.parts.spec import PartSpec

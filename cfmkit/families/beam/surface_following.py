@@ -22,7 +22,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
-from cfmkit.numerics.cubic import bisect, values_at
+from cfmkit.numerics.cubic_interpolation import bisect, values_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 

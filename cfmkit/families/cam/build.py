@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.geometry.track import Track
 from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.solution import Assembly

@@ -29,9 +29,9 @@ from cfmkit.families.cam.build import (
     weights_of,
 )
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
@@ -40,8 +40,8 @@ from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.catalogue import Miss, nearest
-from cfmkit.stock.springs.in_use import SpringInUse
 from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,7 +15,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
+from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled

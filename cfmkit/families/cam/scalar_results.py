@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import flank_pressure
-from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
@@ -17,7 +17,7 @@ from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.target_function import TargetCurve
 from cfmkit.specs.units import between
-from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
+from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.findings import at_most, mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.cut import CamProfile
     from cfmkit.families.cam.spec import CamDesign
-    from cfmkit.numerics.through_points import ThroughPoints
+    from cfmkit.numerics.monotone_interpolation import ThroughPoints
     from cfmkit.specs.target_function import TargetCurve
 
 

@@ -17,7 +17,7 @@ from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
+from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.stress_map import StressView, stress_map_figure

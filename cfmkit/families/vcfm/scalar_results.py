@@ -12,7 +12,7 @@ from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.results import Quantity
-from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
+from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
-from cfmkit.families.vcfm.fillets import fillets
+from cfmkit.families.vcfm.fillet_stress import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring

@@ -32,8 +32,8 @@ from cfmkit.families.vcfm.sheet_sizing import NEAR, PASSES, leaf_of_sheet, next_
 from cfmkit.results import Design, Status
 from cfmkit.stock.spec import sheet_of
 from cfmkit.stock.springs.catalogue import Miss, nearest
-from cfmkit.stock.springs.in_use import SpringInUse
 from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.number_text import NUMBER, number_complaint, odd_character, read_number, shown
-from cfmkit.specs.units.registry import Size, border_size, is_unit, unit_size
 from cfmkit.specs.units.table import COMMON, DIMENSIONS, SYMBOLS, UNITLESS, UNITS, border_unit, dimension_of, to_border
+from cfmkit.specs.units.unit_size import Size, border_size, is_unit, unit_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

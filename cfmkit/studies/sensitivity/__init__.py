@@ -6,6 +6,6 @@ method reads the outcome. The statistics work on plain arrays and know no mechan
 parameters), `intervals` (confidence) and `failed_sample_policy` (what a sample without a value
 means for an index: never "no influence").
 
-`parameters` reads the block `sensitivity:` against a specification, `study` joins
-method, engine and specification, `findings` and `tables` say what came out.
+`parameters` reads the block `sensitivity:` against a specification, `setup` says what is to be done, `methods` joins
+method and engine, `findings` and `output` say what came out.
 """

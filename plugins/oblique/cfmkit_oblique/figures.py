@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook
-from cfmkit.plots.line_diagram import Limit
+from cfmkit.plots.line_chart import Limit
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.style import styled
 from cfmkit.plots.text import Heading, value_text

@@ -11,7 +11,7 @@ from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
+from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
 from cfmkit.plots.text import Heading, value_text

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.flankline import FlankLine
+from cfmkit.families.cam.dynamics.flank_by_height import FlankLine
 from cfmkit.families.cam.dynamics.moving_parts import Flank
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.flankline import FlankPoint
+    from cfmkit.families.cam.dynamics.flank_by_height import FlankPoint
     from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine, Side, SideParts
 
     ComplexArray = NDArray[np.complex128]

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent, drop
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.numerics.quadrature import RunningIntegral
 from cfmkit.numerics.roots import bracketed_root
 

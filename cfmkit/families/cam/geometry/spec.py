@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.numerics.through_points import ThroughPoints
+from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.target_curve import MOST_POINTS, Interpolation

@@ -20,8 +20,8 @@ from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
+from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE
 from cfmkit.metrics.continuous_curves import extremes
-from cfmkit.metrics.traces import ROUNDING, TOLERANCE
 from cfmkit.results import WINDOW_OUTSIDE
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families.slider_crank.printed.chain import STRIP
 from cfmkit.plots import parts
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_diagram import Diagram, Limit, Scale, Series, diagram_figure
+from cfmkit.plots.line_chart import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.stress_map import StressView, stress_map_figure

@@ -23,7 +23,7 @@ from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_ang
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.chain import kink
-from cfmkit.families.slider_crank.printed.fillets import fillets
+from cfmkit.families.slider_crank.printed.fillet_stress import fillets
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece

@@ -19,8 +19,8 @@ from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.catalogue import Miss, Offer, nearest
-from cfmkit.stock.springs.in_use import SpringInUse
 from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

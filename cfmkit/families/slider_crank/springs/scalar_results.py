@@ -10,7 +10,7 @@ from cfmkit.families.slider_crank.springs.assembly import mean_effort_per_angle
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, scale_factors, small_angle_number
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
-from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
+from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -42,7 +42,7 @@ from cfmkit.metrics.ranges_many import (
 )
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
-from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS
+from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

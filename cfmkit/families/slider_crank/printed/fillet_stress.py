@@ -22,7 +22,7 @@ def fillets(spec: SliderCrankSpec, pins: FloatArray, solved: MeshSolution, windo
 
     pins: places of the flexures, unloaded, (3, 2) [m].
     """
-    from cfmkit.solid.fillets import stressed_fillets
+    from cfmkit.solid.fillet_stress import stressed_fillets
 
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []

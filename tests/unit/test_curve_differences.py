@@ -7,7 +7,7 @@ import pytest
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import Undefined, Window
-from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.style import new_figure
 from cfmkit.tables import curve_table, read_csv, to_csv

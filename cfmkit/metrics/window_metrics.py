@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import ranges_many, spread
+from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
-from cfmkit.metrics.traces import BranchTrace, Undefined, Window
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

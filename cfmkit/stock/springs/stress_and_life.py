@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.metrics.traces import Undefined
+from cfmkit.metrics.branch_windows import Undefined
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

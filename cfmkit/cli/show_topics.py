@@ -305,7 +305,7 @@ def _keys(kind: str, name: str) -> list[str]:
 def _measured_in(unit: str) -> list[str]:
     """Return the dimensions that a unit such as ``N/mm`` measures; none if it is not a unit."""
     from cfmkit.specs.units import DIMENSIONS
-    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
+    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
 
     if not is_unit(unit):
         return []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.cli.answer import Answer
+from cfmkit.cli.output import MARGIN
 from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
@@ -22,7 +23,6 @@ from cfmkit.cli.page_blocks import (
     verdict,
     whole_line,
 )
-from cfmkit.cli.terminal import MARGIN
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.cli.options import Computing, OneSpec
+    from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
-    from cfmkit.cli.terminal import Terminal
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Searched
     from cfmkit.runs.run import FinishedRun, Verb
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Requirement, Spec
 
 

@@ -29,7 +29,7 @@ from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.through_points import ThroughPoints
+    from cfmkit.numerics.monotone_interpolation import ThroughPoints
 
 NEAR_START = 1e-7
 """Share of the travel next to a start at zero force within which 0/0 is taken from a place beside it."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.export.contours import Drawing
-    from cfmkit.runs.run_findings import Report
+    from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
 
 

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from cfmkit.cli.terminal import Terminal
+from cfmkit.cli.output import Terminal
 
 ESCAPE = "\x1b["
 RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots", "--set", "requirements.0.max=1 %")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.families.vcfm.solution import Solution
-    from cfmkit.solid.fillets import FilletStress
+    from cfmkit.solid.fillet_stress import FilletStress
     from cfmkit.solid.meshed_part import MeshSolution
     from cfmkit.tables import Table
 
@@ -39,7 +39,7 @@ def fillets(solution: Solution) -> Table:
 
 def _both_ways(pushed: MeshSolution, pulled: MeshSolution, radius: float) -> Iterator[FilletStress]:
     """Yield the fillets of a part with the poses of both ways: they are of one mesh, and begin with the same pose."""
-    from cfmkit.solid.fillets import FilletStress, stressed_fillets
+    from cfmkit.solid.fillet_stress import FilletStress, stressed_fillets
 
     back = {tuple(one.arc.middle.tolist()): one for one in stressed_fillets(pulled, radius)}
     for one in stressed_fillets(pushed, radius):

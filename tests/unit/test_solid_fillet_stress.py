@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.solid.edge_rings import Ring
-from cfmkit.solid.fillets import FilletStress, arcs
+from cfmkit.solid.fillet_stress import FilletStress, arcs
 
 VEE = """
 cfmkit: 1

@@ -22,7 +22,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics import durability, flatness, ranges
+from cfmkit.metrics import durability, ranges, window_metrics
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
@@ -97,59 +97,61 @@ _TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
 _DING = "[Ding 2022, sec. 6.2]"
 _LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
 
-_FLATNESS = (
+_IN_WINDOW = (
     Definition(
         "force_mean",
         "effort",
         f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
-        flatness.mean,
+        window_metrics.mean,
         "farthest-from-target",
     ),
     Definition(
         "force_sd",
         "effort",
         f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
-        flatness.standard_deviation,
+        window_metrics.standard_deviation,
     ),
-    Definition("force_max", "effort", f"largest {{effort}} in the window {_TABLE_3}", flatness.largest),
-    Definition("force_min", "effort", f"smallest {{effort}} in the window {_TABLE_3}", flatness.smallest, "smallest"),
+    Definition("force_max", "effort", f"largest {{effort}} in the window {_TABLE_3}", window_metrics.largest),
+    Definition(
+        "force_min", "effort", f"smallest {{effort}} in the window {_TABLE_3}", window_metrics.smallest, "smallest"
+    ),
     Definition(
         "force_ripple",
         "ratio",
         f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
-        flatness.ripple,
+        window_metrics.ripple,
     ),
     Definition(
         "half_band",
         "ratio",
         "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
-        flatness.half_band,
+        window_metrics.half_band,
     ),
     Definition(
         "deviation_from_mean",
         "ratio",
         f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
-        flatness.deviation_from_mean,
+        window_metrics.deviation_from_mean,
     ),
     Definition(
         "deviation_from_target",
         "ratio",
         "largest |F - target|/target of the {effort} in the window",
-        flatness.deviation_from_target,
+        window_metrics.deviation_from_target,
     ),
     Definition(
         "rms_to_target",
         "effort",
         "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
         "the start of the window excluded [Bilancia 2019, eq. 8]",
-        flatness.rms_to_target,
+        window_metrics.rms_to_target,
     ),
     Definition(
         "deviation_from_curve",
         "ratio",
         "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
         "`analysis.target`",
-        flatness.deviation_from_curve,
+        window_metrics.deviation_from_curve,
         of_curve=True,
     ),
     Definition(
@@ -157,7 +159,7 @@ _FLATNESS = (
         "effort",
         "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
         "excluded, F* the curve of `design.target` or `analysis.target`",
-        flatness.rms_to_curve,
+        window_metrics.rms_to_curve,
         of_curve=True,
     ),
 )
@@ -209,15 +211,15 @@ _LOADS = (
         "work",
         "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
         "[Sanchez-Salinas 2022, sec. 3]",
-        flatness.hysteresis_area,
+        window_metrics.hysteresis_area,
         scope="loop",
     ),
-    Definition("stress_max", "stress", "largest stress in the window, of all load cases", flatness.stress_max),
+    Definition("stress_max", "stress", "largest stress in the window, of all load cases", window_metrics.stress_max),
     Definition(
         "safety_factor",
         "factor",
         "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
-        flatness.safety_factor,
+        window_metrics.safety_factor,
         "smallest",
     ),
 )
@@ -244,7 +246,7 @@ _LONG_TERM = (
     ),
 )
 
-TABLE = (*_FLATNESS, *_RANGES, *_LOADS, *_LONG_TERM)
+TABLE = (*_IN_WINDOW, *_RANGES, *_LOADS, *_LONG_TERM)
 """Every metric of the contract, in the order in which they are shown."""
 
 
