@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
     from cfmkit.runs.examples import Example, examples
-    from cfmkit.runs.recordings import calibrate, measure
+    from cfmkit.runs.measure_and_calibrate import calibrate, measure
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
 
@@ -96,7 +96,7 @@ _HOMES = {
     "cfmkit.experiment.reading": ("Recording",),
     "cfmkit.experiment.report": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
-    "cfmkit.runs.recordings": ("calibrate", "measure"),
+    "cfmkit.runs.measure_and_calibrate": ("calibrate", "measure"),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
     "cfmkit.studies.outcome": ("StudyResult",),

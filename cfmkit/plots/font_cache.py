@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from cfmkit.store.disk import private_folder
+from cfmkit.store.private_folder import private_folder
 
 VARIABLE = "MPLCONFIGDIR"
 

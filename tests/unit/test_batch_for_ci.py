@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 import cfmkit
+from cfmkit.cli.github_annotations import workflow_commands
 from cfmkit.cli.main import main
-from cfmkit.cli.verbs.batch import github
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs.batch_files import summary
 from cfmkit.studies.batch_entries import Entry
@@ -116,11 +116,11 @@ def test_annotations_name_file_and_line_and_let_no_name_through(folder):
     broken = SPEC.replace("family: vcfm", "family: vcfm\nmechansim: 3")
     (folder / "a.yaml").write_text(broken)
     found = cfmkit.batch("a.yaml", "out", plots=False)
-    lines = list(github(found.entries))
+    lines = list(workflow_commands(found.entries))
     number = broken.splitlines().index("mechansim: 3") + 1
     assert any(re.fullmatch(rf"::error file=a\.yaml,line={number},col=\d+::.*mechansim.*", line) for line in lines)
     hostile = one(spec=HOSTILE, warnings=({"name": "x,y", "message": "50 %\r\n::stop"},))
-    (line,) = github([hostile])
+    (line,) = workflow_commands([hostile])
     assert "\n" not in line
     assert line.count("::") == 3
     assert line.startswith("::warning file=a|b<script>%250A%3A%3Aerror%3A%3A%2C%3A%0A*x*.yaml,title=x%2Cy::50 %25%0D")

@@ -26,7 +26,7 @@ from cfmkit.elastica.kernels.compiled import reported
 from cfmkit.elastica.kernels.packing import HEAD, objects
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
-from cfmkit.store.disk import trusted
+from cfmkit.store.private_folder import trusted
 
 _count, _solve, _predict = dense.positive_count, dense.lu_solve, march._predict
 

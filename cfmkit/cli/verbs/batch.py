@@ -1,10 +1,9 @@
-"""``cfmkit batch``: many specifications at once, for continuous integration, with annotations for GitHub."""
+"""``cfmkit batch``: many specifications at once, for continuous integration."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
@@ -23,16 +22,16 @@ from cfmkit.cli.options import (
     option,
 )
 from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, CellGrid, Paragraph, Span, TextLine, Written, columns
-from cfmkit.errors import CfmError, ExitCode, visible
+from cfmkit.errors import ExitCode, visible
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_blocks import Block
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.metric_changes import BatchComparison, MetricChange
+    from cfmkit.studies.metric_changes import BatchComparison
 
 
 PLACE = 26
@@ -153,8 +152,9 @@ def _tolerance(options: BatchOptions) -> float | None:
 
 
 def _annotations(found: BatchResult) -> Iterator[str]:
+    from cfmkit.cli.github_annotations import workflow_commands
 
-    yield from github(found.entries, found.compared.changes if found.compared else ())
+    return workflow_commands(found.entries, found.compared.changes if found.compared else ())
 
 
 def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
@@ -233,73 +233,3 @@ def _detail(one: Entry) -> str:
     told = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
     count = len(one.warnings)
     return told + (f", {count} warning{'s' * (count != 1)}" if count else "")
-
-
-PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)
-"""How the fault of a file begins."""
-
-
-def github(entries: Sequence[Entry], changes: Sequence[MetricChange] = ()) -> Iterator[str]:
-    """Yield one workflow command per fault, missed requirement, warning and changed value, with its place.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Every specification of a batch.
-    changes : sequence of MetricChange
-        Since an earlier batch; those beyond the tolerance are errors.
-    """
-    for one in entries:
-        if one.skipped:
-            continue
-        for line in one.errors:
-            found = PLACED.fullmatch(line)
-            place = {"file": found["file"], "line": found["line"], "col": found["col"]} if found else {"file": one.spec}
-            yield command("error", place, found["told"] if found else line.removeprefix("error    "))
-        if one.code and not one.errors and not one.missed:
-            yield command("error", {"file": one.spec}, one.message)
-        yield from _missed(one)
-        for item in one.warnings:
-            yield command("warning", {"file": one.spec, "title": item["name"]}, item["message"])
-    for change in changes:
-        if change.beyond:
-            yield command("error", {"file": change.spec, "title": "changed"}, change.sentence)
-
-
-def _missed(one: Entry) -> Iterator[str]:
-    if one.errors:
-        return
-    for number, requirement in enumerate(one.requirements):
-        if not requirement["ok"]:
-            place = {"file": one.spec, **_line_of(one.spec, number), "title": "requirement missed"}
-            yield command("error", place, requirement["sentence"])
-
-
-def _line_of(name: str, number: int) -> Mapping[str, str]:
-    """Return line and column of a requirement; nothing if the file cannot be read any more."""
-    from cfmkit.runs.specfile import read_spec
-
-    try:
-        line, column = read_spec(name).place(f"requirements.{number}")
-    except CfmError:
-        return {}
-    return {"line": str(line), "col": str(column)} if line else {}
-
-
-def command(kind: str, properties: Mapping[str, Any], message: str) -> str:
-    """Return a workflow command; no name or message in it can end it or begin another.
-
-    Examples
-    --------
-    >>> command("error", {"file": "a,b.yaml", "line": "3"}, "100 % wrong")
-    '::error file=a%2Cb.yaml,line=3::100 %25 wrong'
-    """
-    told = ",".join(f"{key}={_escaped(str(value), ':,')}" for key, value in properties.items())
-    return f"::{kind} {told}::{_escaped(message)}"
-
-
-def _escaped(text: str, more: str = "") -> str:
-    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    for char in more:
-        text = text.replace(char, f"%{ord(char):02X}")
-    return text

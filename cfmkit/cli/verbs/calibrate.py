@@ -66,7 +66,7 @@ def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: 
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.fitted_parameters import split_bounds
     from cfmkit.numerics.least_squares import LOSSES
-    from cfmkit.runs.recordings import calibrate
+    from cfmkit.runs.measure_and_calibrate import calibrate
 
     loss = next(name for name in LOSSES if name == options.loss)
     bounds = split_bounds(options.bounds or ())

@@ -88,7 +88,7 @@ def _folder(options: MeasureOptions) -> str:
 
 
 def _report(options: MeasureOptions) -> MeasureReport:
-    from cfmkit.runs.recordings import measure
+    from cfmkit.runs.measure_and_calibrate import measure
 
     return measure(
         options.data,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing import sqp_program
+from cfmkit.designing import limits as design_limits
 from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.designing.variables import at_bounds
 from cfmkit.families.beam.build import assemble, thickest_of
@@ -93,9 +93,9 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
     mean = 0.0 if curve is None else mean_of(curve, wanted.window)
-    sqp_program = _limits(wanted, assembly.allowable_stress)
+    limits = _limits(wanted, assembly.allowable_stress)
     if curve is not None:
-        sqp_program = replace(sqp_program, force_target=mean)
+        limits = replace(limits, force_target=mean)
     return Task(
         network=assembly.network,
         driven=assembly.driven,
@@ -106,7 +106,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
         orders=wanted.orders,
         coefficient_limit=wanted.coefficient_limit,
-        limits=sqp_program,
+        limits=limits,
         objective=wanted.objective,
         half_band=wanted.half_band,
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
@@ -138,17 +138,17 @@ def _coordinates(wanted: Optimise) -> list[Coordinate]:
 
 
 def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
-    sqp_program, force = wanted.limits, wanted.force
-    box, deformed = sqp_program.envelope, sqp_program.deformed_envelope
+    stated, force = wanted.limits, wanted.force
+    box, deformed = stated.envelope, stated.deformed_envelope
     return TaskLimits(
-        stress=allowable_stress * (1 - MARGIN) if sqp_program.stress and allowable_stress else None,
+        stress=allowable_stress * (1 - MARGIN) if stated.stress and allowable_stress else None,
         envelope=None if box is None else (*box.x, *box.y),
         deformed_envelope=None if deformed is None else (*deformed.x, *deformed.y),
-        length_ratio=sqp_program.max_length_ratio,
-        slenderness=sqp_program.min_slenderness * (1 + MARGIN) if sqp_program.min_slenderness else None,
-        clearance=sqp_program.clearance,
-        opening=sqp_program.joint_opening,
-        radius=sqp_program.min_radius,
+        length_ratio=stated.max_length_ratio,
+        slenderness=stated.min_slenderness * (1 + MARGIN) if stated.min_slenderness else None,
+        clearance=stated.clearance,
+        opening=stated.joint_opening,
+        radius=stated.min_radius,
         force_min=None if force.min is None else force.min * (1 + MARGIN),
         force_target=force.target,
         force_tolerance=force.tolerance,
@@ -318,7 +318,7 @@ def missed_by(task: Task, found: Found) -> dict[str, str]:
     view = program.view(found.x)
     if view is None:
         return {}
-    rows = sqp_program.missed(program.limits(view), VIOLATION)
+    rows = design_limits.missed(program.limits(view), VIOLATION)
     return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
 
 
@@ -329,7 +329,7 @@ def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
     view = program.view(found.x, sloped=True)
     at_bound = at_bounds(found.x, variables.bounds, AT_BOUND)
     held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
-    return tuple(held) if view is None else (*held, *sqp_program.held(program.limits(view), close))
+    return tuple(held) if view is None else (*held, *design_limits.held(program.limits(view), close))
 
 
 def _stress(task: Task, slack: float) -> dict[str, str]:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.sqp_program import worst
+from cfmkit.designing.limits import worst
 from cfmkit.designing.starts import Clock
 from cfmkit.designing.variables import rounded as rounded_within
 from cfmkit.elastica import Control, Displacement, PathStatus, trace

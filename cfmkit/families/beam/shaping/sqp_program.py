@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from cfmkit.designing import sqp_program
-from cfmkit.designing.sqp_program import LimitRows, SeenPoint, worst
+from cfmkit.designing.limits import LimitRows, worst
+from cfmkit.designing.sqp_program import SeenPoint
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 

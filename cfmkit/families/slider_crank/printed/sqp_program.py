@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.designing import sqp_program
-from cfmkit.designing.sqp_program import LimitRows, SeenPoint
+from cfmkit.designing.limits import LimitRows
+from cfmkit.designing.sqp_program import SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
