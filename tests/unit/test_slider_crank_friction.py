@@ -55,6 +55,32 @@ def test_the_area_of_the_loop_is_shared_by_pins_and_guide(branch):
     assert total == pytest.approx(area, rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["bilancia2019", "li2019"])
+def test_a_coupler_that_is_pressed_has_a_negative_force_with_friction_as_without(name):
+    free, rubbed = analyze(spec(name)), analyze(spec(name, pins=PINS | {"friction": 1e-6}, guide=None))
+    points = len(free.curve.motion)
+    with_friction = rubbed.curve.extra["coupler_force"].values[:points]
+    known = np.isfinite(with_friction)
+    alone = free.curve.extra["coupler_force"].values
+    np.testing.assert_allclose(with_friction[known], alone[known], atol=1e-4 * np.abs(alone).max())
+    assert (alone < 0).any()
+
+
+def test_the_largest_forces_inside_are_with_friction():
+    found = analyze(spec("li2019", pins=PINS, guide=GUIDE))
+    coupler, guide = (found.curve.extra[key].values for key in ("coupler_force", "guide_force"))
+    assert found.values["coupler_compression_max"].value == pytest.approx(-np.nanmin(coupler), rel=1e-3)
+    assert found.values["guide_force_max"].value == pytest.approx(np.nanmax(np.abs(guide)), rel=1e-3)
+    plain = analyze(spec("li2019")).values["guide_force_max"].value
+    assert abs(found.values["guide_force_max"].value / plain - 1.0) > 1e-3
+
+
+def test_no_largest_force_is_stated_where_pins_hold_the_mechanism_next_to_its_stretched_position():
+    found = analyze(spec("bilancia2019", pins=PINS)).values["coupler_compression_max"]
+    assert found.value is None
+    assert "unbounded" in found.reason
+
+
 def test_a_mirrored_pair_has_twice_the_force_and_a_free_guide():
     one, pair = analyze(spec("bilancia2019")), analyze(spec("bilancia2019", copies="mirrored"))
     np.testing.assert_allclose(pair.curve.force, 2.0 * one.curve.force, rtol=1e-12)

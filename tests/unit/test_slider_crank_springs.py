@@ -434,6 +434,25 @@ def test_places_do_not_depend_on_the_points_of_the_curve(name):
     assert any(value for value in found[0])
 
 
+EXTREMES = ("energy_max", "pivot_rotation_max", "crank_pin_rotation_max", "slider_pin_rotation_max",
+            "slider_travel_max", "coupler_compression_max", "guide_force_max")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["bilancia2019", "li2019_bistable", "li2019_full_turn", "friction"])
+def test_extremes_do_not_depend_on_the_points_of_the_curve(name):
+    few, many = (cfmkit.analyze(config(name, analysis__points=points, requirements=())) for points in (31, 20001))
+    assert {key: few.values[key].value for key in EXTREMES} == {key: many.values[key].value for key in EXTREMES}
+    curve = many.curve.extra
+    seen = {
+        "energy_max": curve["energy"].values.max(),
+        "coupler_compression_max": -curve["coupler_force"].values.min(),
+        "guide_force_max": np.abs(curve["guide_force"].values).max(),
+        "pivot_rotation_max": np.abs(curve["pivot_rotation"].values).max(),
+    }
+    for key, value in seen.items():
+        assert value * (1 - 1e-12) <= few.values[key].value <= value * (1 + 1e-6), key
+
+
 def test_the_ends_of_a_band_are_where_the_force_leaves_it():
     result = cfmkit.analyze(config("bilancia2019", analysis__points=41))
     width = cfmkit.evaluate(result, ["band_range_05pct"])["band_range_05pct"].value

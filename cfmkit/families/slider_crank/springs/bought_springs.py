@@ -7,7 +7,7 @@ target (`best_sets`). Springs that the window would overwind, or that do not fit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.best_sets import best_sets
+from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
@@ -141,7 +142,7 @@ def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption
     """Return what can be used at each joint, and what is refused because it does not fit or is moved too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])
-    turns = assembly.units(np.linspace(*ends, 401)).turn
+    moved = MotionExtremes(assembly, *ends).largest_turns
     usable: list[SpringOption] = []
     refused: list[Miss] = []
     for joint, name in enumerate(JOINTS):
@@ -151,7 +152,7 @@ def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         for offer in offers(wanted.catalogue or (), *kinds):
             label = f"{offer.name} at the {name.replace('_', ' ')}"
-            reason = _why_not(offer, turns[joint], wanted)
+            reason = _why_not(offer, float(moved[joint]), wanted)
             if reason is not None:
                 refused.append(Miss(label, *reason))
                 continue
@@ -164,12 +165,12 @@ def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption
     return usable, refused
 
 
-def _why_not(offer: Offer, turns: FloatArray, wanted: CrankDesign) -> tuple[float, str] | None:
+def _why_not(offer: Offer, moved: float, wanted: CrankDesign) -> tuple[float, str] | None:
     """Return by what share a spring misses, and why; None where it can be used.
 
-    `turns`: how far its joint is moved from the unloaded position, over the travel [rad or m].
+    `moved`: how far its joint is moved from the unloaded position at most, over the travel [rad or m].
     """
-    moved, kind = float(np.abs(turns).max()), "angle" if offer.kind == "torsion" else "length"
+    kind: Literal["angle", "length"] = "angle" if offer.kind == "torsion" else "length"
     if offer.initial_tension:
         return 1.0, "its initial tension would load it in the unloaded position"
     room = wanted.spring_room

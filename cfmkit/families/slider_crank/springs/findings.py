@@ -194,8 +194,7 @@ def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     limits = spec.mechanism.limits
     if limits is None:
         return
-    largest = np.abs(solution.units.turn).max(axis=1)
-    for name, value in zip(JOINTS, largest.tolist(), strict=True):
+    for name, value in zip(JOINTS, solution.extremes.largest_turns.tolist(), strict=True):
         limit = getattr(limits, name)
         if limit is not None and value > limit * (1 + 1e-9):
             dimension = "length" if name == "slider" else "angle"

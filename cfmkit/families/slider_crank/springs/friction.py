@@ -37,7 +37,7 @@ class FrictionBranch:
     effort : (n,) array
         Torque [N m] or force [N]; NaN where the mechanism holds itself.
     coupler : (n,) array
-        Force in the coupler, of all legs [N].
+        Tension in the coupler, of all legs [N].
     guide : (n,) array
         Force on the guide, of all legs, positive upwards [N]; zero for a mirrored pair.
     lost : mapping of str to (n,) array
@@ -99,7 +99,7 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
             dragged = np.abs(effort - free)
         swept = sum(np.abs(rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate))
         lost = {"pins": couple * swept, "guide": dragged}
-    return FrictionBranch(effort, np.hypot(pull[0], pull[1]), across, lost)
+    return FrictionBranch(effort, pull[0] * cosine + pull[1] * sine, across, lost)
 
 
 def _rates(assembly: Assembly, angle: FloatArray, beta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -106,14 +106,14 @@ def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
     """Yield the springs that are bought between their smallest and their largest load over the motion."""
     for one in springs.bought:
         joint = JOINTS.index(one.at)
-        turn = solution.units.turn[joint]
-        sizes = np.abs(turn)
-        least = 0.0 if turn.min() < 0 < turn.max() else float(sizes.min())
+        high, low = (float(ends[joint]) for ends in solution.extremes.turns)
+        largest = max(abs(high), abs(low))
+        least = 0.0 if low < 0 < high else min(abs(high), abs(low))
         # springs of a joint turn alike: each bears its rate's share
         wound = None if one.wound is None else one.wound.wound(one.kind)
         each = wound.rate if wound is not None else 0.0
         fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
-        yield SpringInUse(wound, each * least, each * float(sizes.max()), fatigue, one.life)
+        yield SpringInUse(wound, each * least, each * largest, fatigue, one.life)
 
 
 def _loop(solution: Solution) -> Iterator[tuple[str, float | None]]:
@@ -173,6 +173,9 @@ _WHY = {
     "positive_factor": "it needs torsion springs and a spring at the slider",
     "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
     "folded_angle": "the coupler cannot fold over the crank",
+    "coupler_compression_max": "friction holds the mechanism in a part of its motion, next to which forces are "
+    "unbounded",
+    "guide_force_max": "friction holds the mechanism in a part of its motion, next to which forces are unbounded",
 }
 
 Pairs = tuple[tuple[str, float | None], ...]
@@ -229,20 +232,20 @@ def _pose(solution: Solution) -> Pairs:
 
 
 def _extremes(solution: Solution) -> Pairs:
-    """Return the largest loads and motions along the curve."""
-    turn = np.abs(solution.units.turn).max(axis=1)
-    coupler, guide = solution.reactions
+    """Return the largest loads and motions, wherever they are."""
+    found = solution.extremes
+    turn = found.largest_turns
+    coupler, guide = solution.reaction_extremes
     return (
-        ("energy_max", float(solution.energy.max())),
+        ("energy_max", float(found.energy(solution.assembly.rates[None, :])[0])),
         ("pivot_rotation_max", float(turn[0])),
         ("crank_pin_rotation_max", float(turn[1])),
         ("slider_pin_rotation_max", float(turn[2])),
         ("slider_travel_max", float(turn[3])),
-        ("coupler_compression_max", _largest(-coupler)),
-        ("guide_force_max", _largest(np.abs(guide))),
+        ("coupler_compression_max", _known(-coupler[1])),
+        ("guide_force_max", _known(max(abs(guide[0]), abs(guide[1])))),
     )
 
 
-def _largest(values: np.ndarray) -> float | None:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if len(finite) else None
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None

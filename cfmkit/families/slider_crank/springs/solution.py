@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.assembly import reactions
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
+from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, Classified, classify, signs
+from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.numerics.turning_points import Monotone, monotone
 
@@ -35,6 +37,9 @@ GRID = 1025
 
 SAME = 1e-9
 """An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
+
+NEXT_TO_START = 1e-9
+"""Share of the motion at which forces with friction are asked for at its start: a stretched start itself is 0/0."""
 
 EDGE = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""
@@ -286,6 +291,42 @@ class Solution:
         if self.assembly.rubbing.mirrored:
             guide = np.zeros_like(guide)
         return coupler / self.legs, guide / self.legs
+
+    @cached_property
+    def extremes(self) -> MotionExtremes:
+        """Largest turns and energies, and the forces inside without friction, wherever they are."""
+        return MotionExtremes(self.assembly, self.character.low, self.character.high)
+
+    @cached_property
+    def reaction_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Largest and smallest tension in the coupler of one leg, and of its slider's force on the guide [N].
+
+        NaN where none is known. With friction of both ways.
+        """
+        if self.ways is None:
+            rates = self.assembly.rates[None, :] / self.legs
+            (most, least), (up, down) = self.extremes.coupler(rates), self.extremes.guide(rates)
+            size = 0.0 if self.assembly.rubbing.mirrored else 1.0
+            return (float(most[0]), float(least[0])), (size * float(up[0]), size * float(down[0]))
+        return self._rubbed_extremes("coupler"), self._rubbed_extremes("guide")
+
+    def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> tuple[float, float]:
+        """Return extremes of both ways; NaN where friction holds the mechanism somewhere."""
+        places, highs, lows = self.extremes.nodes[0].copy(), [], []
+        places[0] += NEXT_TO_START * (places[-1] - places[0])
+        for way in (1.0, -1.0):
+
+            def force(at: FloatArray, way: float = way) -> FloatArray:
+                values: FloatArray = getattr(branch(self.assembly, at.ravel(), way), part) / self.legs
+                return values.reshape(at.shape)
+
+            values = force(places)
+            if not np.isfinite(values).all():
+                return np.nan, np.nan
+            high, low = extremes(force, places[None, :], values[None, :], uneven=True)
+            highs.append(float(high[0]))
+            lows.append(float(low[0]))
+        return max(highs), min(lows)
 
     @cached_property
     def band(self) -> tuple[float, float] | None:

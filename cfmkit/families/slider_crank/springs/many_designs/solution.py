@@ -23,6 +23,7 @@ from cfmkit.families.slider_crank.springs.model import (
     target_of,
     window_of,
 )
+from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.stiffness_classes import (
@@ -58,9 +59,6 @@ if TYPE_CHECKING:
 
 BALANCED = 1e-12
 """A mean so small, as a share of the largest effort, is rounding: such a design is left to the model of one."""
-
-NODES, TURN_NODES = 129, 385
-"""Places of the grid for less and for more than a quarter turn."""
 
 
 @dataclass(frozen=True)
@@ -98,16 +96,14 @@ class Base:
         return self.assembly.units(self.motion)
 
     @cached_property
+    def extremes(self) -> MotionExtremes:
+        """Largest turns, energies and forces inside, wherever they are."""
+        return MotionExtremes(self.assembly, self.low, self.high)
+
+    @property
     def nodes(self) -> tuple[FloatArray, UnitCurves]:
         """The grid of the class, the unloaded position one of its places, and the unit springs there."""
-        wide = self.assembly.drive == "torque" and self.high - self.low > 0.5 * np.pi
-        share = np.linspace(0.0, 1.0, TURN_NODES if wide else NODES)
-        if self.assembly.drive == "force":
-            share = share**2
-        places = self.low + (self.high - self.low) * share
-        if self.low < self.assembly.start < self.high:
-            places = np.union1d(places, [self.assembly.start])
-        return places, self.assembly.units(places)
+        return self.extremes.nodes
 
     @cached_property
     def grid(self) -> tuple[FloatArray, UnitCurves]:
@@ -356,12 +352,6 @@ class Slab:
         return {}
 
     @cached_property
-    def turns(self) -> FloatArray:
-        """Largest turn of each spring, of the slider's its largest travel, (4,): the same for all designs."""
-        turns: FloatArray = np.abs(self.base.units.turn).max(axis=1)
-        return turns
-
-    @cached_property
     def start_effort(self) -> FloatArray:
         """Effort where the motion is zero."""
         unit = self.base.assembly.forces(np.zeros(1))[:, 0]
@@ -385,11 +375,6 @@ def _finite(value: float | None) -> float:
     return np.nan if value is None or not np.isfinite(value) else value
 
 
-def _largest(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if len(finite) else np.nan
-
-
 def _nearest(stable: bool, what: str) -> Callable[[Solution], float | None]:
     return lambda one: getattr(one.nearest(stable), what, None)
 
@@ -398,8 +383,6 @@ EACH: dict[str, Callable[[Solution], float | None]] = {
     **{f"snap_through_{place}": _nearest(False, "motion") for place in ("angle", "travel")},
     **{f"second_stable_{place}": _nearest(True, "motion") for place in ("angle", "travel")},
     "energy_barrier": _nearest(False, "energy"),
-    "coupler_compression_max": lambda one: _largest(-one.reactions[0]),
-    "guide_force_max": lambda one: _largest(np.abs(one.reactions[1])),
 }
 """Values that are found design by design, on the curves that are known of all."""
 
@@ -462,7 +445,9 @@ VALUES: dict[str, Callable[[Slab], Any]] = {
     "reference_force": lambda slab: _within(slab, slab.base.reference),
     "stretched_torque": lambda slab: slab.at(slab.base.assembly.stretched),
     "stretched_stiffness": lambda slab: slab.at(slab.base.assembly.stretched, "stiffness"),
-    "energy_max": lambda slab: (slab.rates @ (0.5 * slab.base.units.turn**2)).max(axis=1),
+    "energy_max": lambda slab: slab.base.extremes.energy(slab.rates),
+    "coupler_compression_max": lambda slab: -slab.base.extremes.coupler(slab.rates)[1] / slab.legs,
+    "guide_force_max": lambda slab: np.abs(slab.base.extremes.guide(slab.rates)).max(axis=0) / slab.legs,
     "start_force": lambda slab: slab.start_effort,
     "force_per_degree": lambda slab: np.where(slab.rates > 0.0, slab.rates * slab.base.per_degree, 0.0).sum(axis=1),
     "bistable_factor": lambda slab: slab.factors[:, 0],
@@ -471,9 +456,9 @@ VALUES: dict[str, Callable[[Slab], Any]] = {
     "stretched_angle": lambda slab: slab.base.assembly.linkage.stretched_angle,
     "folded_angle": lambda slab: _finite(slab.base.assembly.linkage.folded_angle),
     "unloaded_angle": lambda slab: slab.base.assembly.unloaded,
-    "pivot_rotation_max": lambda slab: slab.turns[0],
-    "crank_pin_rotation_max": lambda slab: slab.turns[1],
-    "slider_pin_rotation_max": lambda slab: slab.turns[2],
-    "slider_travel_max": lambda slab: slab.turns[3],
+    "pivot_rotation_max": lambda slab: slab.base.extremes.largest_turns[0],
+    "crank_pin_rotation_max": lambda slab: slab.base.extremes.largest_turns[1],
+    "slider_pin_rotation_max": lambda slab: slab.base.extremes.largest_turns[2],
+    "slider_travel_max": lambda slab: slab.base.extremes.largest_turns[3],
 }
 """The family's own values that this model has."""
