@@ -343,6 +343,15 @@ def test_the_nearest_wish_gets_a_proposal_when_it_is_asked():
         assert any(made(job).good for job in jobs), key
 
 
+@pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
+def test_what_takes_long_to_design_is_offered_behind_everything_else(materials):
+    keys = {"force": "1.8 N", "travel": "12.8 mm", "room": "[99.5 mm, 155 mm, 5.91 mm]", "material": materials}
+    offer = function_named(family("slider-crank").propose)(wish_of(None, keys).wish(), Run())
+    kinds = [one.variant.partition(",")[0] for one in offer.candidates]
+    assert {"strip", "flexures", "tapered strip"} <= set(kinds)
+    assert "tapered strip" not in kinds[: -kinds.count("tapered strip")]
+
+
 def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
     keys = {"torque": "5 N*m", "angle": "10 deg", "ripple": "2 %"}
     small, large = (wish_of(None, keys | {"room": room}).wish() for room in ("[5 mm, 5 mm]", "[50 mm, 250 mm]"))

@@ -179,7 +179,7 @@ def _of_force(wish: Wish) -> FamilyOffer:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
     found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
     if found:
-        return FamilyOffer(tuple(_varied(found)[:OFFERED]))
+        return FamilyOffer(tuple(_varied(found)))
     fits = [printed_size(wish, lengths) for lengths in PUSHED]
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
@@ -273,12 +273,13 @@ def strip_width(wish: Wish, block: dict[str, Any], crank: float) -> float:
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
-    """Return candidates, those of different kinds by turns; what takes long to design comes last."""
+    """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
     longest = max(map(len, rows))
     by_turns = [row[k] for k in range(longest) for row in rows if k < len(row)]
-    return sorted(by_turns, key=lambda one: one.promise >= LATER)
+    # cut before what takes long goes to the end, or none of that would be left
+    return sorted(by_turns[:OFFERED], key=lambda one: one.promise >= LATER)
 
 
 def _materials(wish: Wish) -> list[dict[str, Any]]:
