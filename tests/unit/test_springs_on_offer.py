@@ -27,6 +27,11 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
 
 
+@pytest.mark.parametrize("kind", ["extension", "compression", "torsion"])
+def test_the_generic_series_written_as_a_list_is_the_same_series(kind):
+    assert offers(tuple(map(CatalogueSpring.of, generic(kind))), kind) == generic(kind)
+
+
 def chosen(catalogue, **changes):
     parts = {"roller_radius": "8 mm", "rolling_friction": 0.002} | changes
     return design(cam(**parts).replace({"design": WANTED | {"catalogue": catalogue}}))

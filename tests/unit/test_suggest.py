@@ -159,6 +159,21 @@ def test_other_springs_and_leaves_do_what_is_wished(variant):
     assert kinds == {"2 Vs, folded spring": ("folded", "v-beam"), "2 cosine arches": ("diamond", "cosine")}[variant]
 
 
+@pytest.mark.parametrize("adjustable", [None, "[11.14 N, 15.4 N]"])
+def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
+    """The shipped V-beam on compression springs, read off its analysis, with 15 % more room."""
+    block = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
+    keys = {"force": "11.14 N", "travel": "3.23 mm", "ripple": "0.6 %", "room": "[92.2 mm, 71.4 mm, 4.1 mm]"}
+    more = {} if adjustable is None else {"adjustable": adjustable}
+    asked, candidates = offered("vcfm", **keys, material=block, **more)
+    one = made(ProposalJob("vcfm", candidates[0], asked, 0))
+    assert one.good, one.missed or one.message
+    springs = one.spec.mechanism.springs
+    assert springs.name.startswith("generic-")
+    assert one.numbers["parts"] == 2 + springs.count
+    assert one.numbers["depth"] >= springs.outer_diameter
+
+
 @pytest.mark.slow
 def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
     asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]", ripple="9 %")

@@ -29,4 +29,6 @@ def room(result: Result) -> Room | None:
     mechanism = result.spec.at("mechanism")
     coil = mechanism.springs.outer_diameter or 0.0 if mechanism.springs else mechanism.flexures.width
     depth = max(coil, mechanism.bistable.width)
-    return Room(float(right - left), float(top - bottom), depth, 2, corner=(float(left), float(bottom)))
+    # leaves and a spring of leaves; or leaves, bought springs and the plate at their far ends
+    parts = 2 + (mechanism.springs.count if mechanism.springs else 0)
+    return Room(float(right - left), float(top - bottom), depth, parts, corner=(float(left), float(bottom)))

@@ -7,12 +7,14 @@ closed form; what it refuses is not offered.
 Other springs and leaves in the place of a designed diamond and its Vs: folded springs, cosine arches, hybrid leaves.
 The force is linear in both widths. So a structure needs no design of its own: of all windows as long as the travel
 that is taken in which the widths that fit the force best leave the least of it; what is stressed too much gets
-longer.
+longer. Helical springs come from the generic series: those for which there is a place are the catalogue of the
+family's own design.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import chain
 from math import asin, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +23,13 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.vcfm.build import coils
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
+from cfmkit.stock.springs.catalogue import generic
+from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,8 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.design import DesignSizes
     from cfmkit.families.vcfm.exact_model import ExactSampler
-    from cfmkit.families.vcfm.spec import VcfmDesign
-    from cfmkit.families.wishes import Wish
+    from cfmkit.families.wishes import MaterialBlock, Wish
 
 
 SLENDERNESS = (3.7, 4.0, 4.5, 5.5, 7.0)
@@ -66,10 +70,19 @@ SAFETY = 1.03
 LITTLE = 0.02
 """Adjustment, over the force, where none is wished: every such mechanism has one."""
 
-TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid")
+TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid", "2 Vs, catalogue")
 """Variants in the order in which they are tried, behind two Vs with a diamond."""
 
-OFFERED = 24
+SOFTEST = 0.9
+"""Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
+
+APART = 1.2
+"""Room across that a helical spring takes, over its diameter: as they are drawn."""
+
+OFFERED = 28
+
+FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
+"""What finishes what the family's design has made."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -88,9 +101,9 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                 pairs = spec.mechanism.bistable.half_beams // 2
                 variant = called(f"{pairs} V{'s' if pairs > 1 else ', guided'}", wish, block)
                 promise = over["across"] * over["along"]
-                found.append(
-                    Candidate(variant, spec, True, "cfmkit.families.vcfm.proposals_for_wish:finish", float(promise))
-                )
+                found.append(Candidate(variant, spec, True, FINISH, float(promise)))
+            if (coiled := _coiled(wish, block, spec, sizes)) is not None:
+                found.append(coiled)
     if found:
         plain = sorted(found, key=lambda one: one.promise)
         return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
@@ -204,6 +217,41 @@ def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, floa
     return over
 
 
+def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes) -> Candidate | None:
+    """Return two Vs with helical springs in place of the diamond; None where none of the series fits beside them."""
+    frame, parts, leaf = spec.mechanism.frame, spec.mechanism, sizes.leaf
+    if parts.bistable.half_beams != 4 or parts.flexures.thickness > parts.bistable.thickness:
+        return None  # other numbers of Vs, and the same leaves with a thicker diamond
+    across = 2.0 * float(leaf.reach) + frame.shuttle_width + 2.0 * frame.block
+    stands = frame.spacing + 2.0 * frame.clearance + frame.block
+    if across > wish.room[0] or (wish.depth is not None and leaf.width > wish.depth):
+        return None
+    springs = list(_springs_beside(wish, spec, float(sizes.linear[1]), wish.room[1] - stands))
+    if not springs:
+        return None
+    promise = across * (stands + min(one.free_length or 0.0 for one in springs))
+    listed = spec.replace({"design.catalogue": tuple(springs)})
+    return Candidate(called("2 Vs, catalogue springs", wish, block), listed, True, FINISH, float(promise))
+
+
+def _springs_beside(wish: Wish, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:
+    """Yield springs of the generic series, in numbers that have about the rate wanted, for a place as long [m]."""
+    target = spec.design
+    assert target is not None
+    softest, preload = target.level / target.height, target.preload_stroke
+    for one in chain(generic("compression"), generic("extension")):
+        wide = one.outer_diameter or 0.0
+        # a pulled spring stands above a shuttle that goes down, and the preload moves its other end up
+        long = (one.free_length or 0.0) + (target.stroke + preload if one.kind == "extension" else 0.0)
+        stretched = (one.largest or 0.0) > SOFTEST * (travel + preload)
+        if long > place or wide > (wish.depth or np.inf) or not stretched:
+            continue
+        most = wish.room[0] / (APART * wide)
+        counts = tuple(n for n in one.counts if softest <= n * one.rate <= softest / SOFTEST and n <= most)
+        if counts:
+            yield CatalogueSpring.of(replace(one, counts=counts))
+
+
 def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> FamilyOffer:
     """Return which side of the room is too small for the design that comes nearest."""
     sides = dict(zip(("across", "along", "depth"), wish.room, strict=False))
@@ -214,7 +262,7 @@ def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> FamilyOf
 
 def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:
     """Yield the same with other springs and leaves: of two Vs, a small, a larger and a large one of each structure."""
-    plain = [one for one in found if one.variant.startswith("2 Vs")]
+    plain = [one for one in found if _turn(one.variant) == 0]
     chosen = [plain[k] for k in dict.fromkeys(len(plain) * part // 8 for part in (0, 3, 6))] if plain else []
     for name in STRUCTURES:
         function = "finish_" + name.replace(" ", "_")
@@ -241,23 +289,24 @@ def finish_hybrid_leaves(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
 def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
     strength = wish.strength_used * (spec.mechanism.material.allowable(SAFETY) or 0.0)
     made, end = with_structure(spec, name, wish.target, wish.travel, strength)
-    return _over_flattest(made, wish, _preloads(spec.design, wish), end)
+    return _over_flattest(made, wish, _preloads(spec, wish), end)
 
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
-    return _over_flattest(spec, wish, _preloads(spec.design, wish), float(_window(spec, wish)[1]))
+    return _over_flattest(spec, wish, _preloads(spec, wish), float(_window(spec, wish)[1]))
 
 
 def _window(spec: VcfmSpec, wish: Wish) -> tuple[Any, Any]:
     return spec.analysis.window or (Place(0.0, "length"), Place(wish.travel, "length"))
 
 
-def _preloads(design: VcfmDesign | None, wish: Wish) -> tuple[float, ...]:
+def _preloads(spec: VcfmSpec, wish: Wish) -> tuple[float, ...]:
     """Return the preloads with which the force is that of the middle and both ends of the adjustment [m]."""
+    design, bought = spec.design, spec.mechanism.springs
     if wish.adjustable is None or design is None or not design.adjustment:
         return (0.0,)
-    per_force = design.preload_stroke / design.adjustment
+    per_force = design.preload_stroke / design.adjustment if bought is None else 1.0 / coils(bought).stiffness
     low, high = wish.adjustable
     return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
 

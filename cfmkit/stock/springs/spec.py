@@ -141,6 +141,26 @@ class CatalogueSpring(WireLimits):
             raise ValueError(_disagree(self.wound.rate / stated))
         return self
 
+    @classmethod
+    def of(cls, offer: Offer) -> Self:
+        """Return a spring on offer of which wire, coil and turns are known, as a list has it."""
+        wire = wire_of(offer)
+        angular = offer.kind == "torsion"
+        about = {
+            "name": offer.name,
+            "kind": offer.kind,
+            "rate" if angular else "stiffness": offer.rate,
+            "free_length": offer.free_length,
+            "body_length": offer.body_length,
+            "outer_diameter": offer.outer_diameter,
+            "initial_tension": offer.initial_tension,
+            "max_angle" if angular else "max_elongation": offer.largest,
+            "life": offer.life,
+            "counts": offer.counts,
+        }
+        known = {key: value for key, value in about.items() if value is not None}
+        return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | known)
+
     @property
     def wound(self) -> Wound | None:
         """Its wire, coil and turns; None where they are not stated."""
