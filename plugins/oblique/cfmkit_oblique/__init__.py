@@ -1,17 +1,17 @@
 """Two oblique springs beside a vertical one: quasi-zero stiffness [Carrella, Brennan, Waters 2007]."""
 
-from __future__ import annotations
+from functools import partial
 
 from cfmkit.families.base import Family
 from cfmkit_oblique.design import design
-from cfmkit_oblique.model import DEFINITIONS, FINDINGS, analyze, analyze_cubic, resolve
+from cfmkit_oblique.model import DEFINITIONS, FINDINGS, Solution, analyze, resolve
 from cfmkit_oblique.spec import ObliqueSpec
 
 FAMILY = Family(
     name="oblique",
     summary="a slider on a vertical spring between two oblique springs: quasi-zero stiffness",
     spec_type=ObliqueSpec,
-    models={"cubic": analyze_cubic, "exact": analyze},
+    models={"cubic": partial(analyze, Solution.cubic), "exact": partial(analyze, Solution.exact)},
     design=design,
     values=DEFINITIONS,
     resolve=resolve,

@@ -7,8 +7,6 @@ Zero stiffness makes the force's departure at d from the middle, over the force 
 It grows with g: the largest g within the tolerance has the shortest springs. g then gives h0, and h0 the stiffnesses.
 """
 
-from __future__ import annotations
-
 from math import hypot, sqrt
 
 from cfmkit.families.base import Run
@@ -60,10 +58,8 @@ def _ratio(wish: ObliqueDesign, half_span: float) -> float:
     if wish.height_max is not None and height > wish.height_max:
         told = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(wish.height_max)}"
         flattest = half_span / hypot(half_span, wish.height_max)
-        nearest = {"design.height_max": at_least(height)}
-        if flattest <= MOST:
-            nearest["design.range"] = _range(flattest, wish, half_span)
-        raise Infeasible(finding("no_room", told), nearest)
+        nearer = {"design.range": _range(flattest, wish, half_span)} if flattest <= MOST else {}
+        raise Infeasible(finding("no_room", told), {"design.height_max": at_least(height)} | nearer)
     return ratio
 
 

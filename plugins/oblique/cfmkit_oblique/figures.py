@@ -1,7 +1,5 @@
 """Pictures of oblique springs: the force with its plateau, and the mechanism to scale."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -33,8 +31,7 @@ def loop(result: Result) -> Figure:
 def mechanism(result: Result) -> Figure:
     """Return the mechanism to scale: relaxed, with the oblique springs flat, and at the end."""
     solution: Solution = result.state
-    part = solution.spec.mechanism
-    span, base = part.half_span, solution.height - part.vertical.free_length
+    span, base = solution.part.half_span, solution.height - solution.part.vertical.free_length
     end = float(result.curve.motion[-1])
     places = {"relaxed": 0.0, "flat": min(solution.height, end), "end": end}
     box = (-1.3 * span, min(base, solution.height - end) - 0.2 * span, 1.3 * span, solution.height + 0.6 * span)

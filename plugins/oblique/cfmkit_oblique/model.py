@@ -13,8 +13,6 @@ Reference
 A. Carrella, M.J. Brennan, T.P. Waters, J. Sound Vib. 301 (2007) 678-689; its displacements and forces are relative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,8 +23,8 @@ from cfmkit.arrays import FloatArray
 from cfmkit.curves import Column, Curve
 from cfmkit.families.base import Run
 from cfmkit.families.findings import finder, mm, newton, rate
-from cfmkit.results import Finding, Quantity, Result, Status, quantities
-from cfmkit_oblique.spec import ObliqueSpec
+from cfmkit.results import Finding, Result, Status, quantities
+from cfmkit_oblique.spec import Mechanism, ObliqueSpec
 
 DEFINITIONS = {
     "plateau_position": ("length", "displacement at which the oblique springs lie flat"),
@@ -55,27 +53,28 @@ class Solution:
 
     spec: ObliqueSpec
 
+    @property
+    def part(self) -> Mechanism:
+        """What is solved."""
+        return self.spec.mechanism
+
     @cached_property
     def height(self) -> float:
         """Of the relaxed slider above the anchors, h0 [m]."""
-        part = self.spec.mechanism
-        # not sqrt(L0^2 - a^2): springs that are nearly as short as the half span would lose their digits
-        return float(np.sqrt((part.oblique.free_length - part.half_span) * (part.oblique.free_length + part.half_span)))
+        return self._height_at(self.part.oblique.free_length)
 
     @property
     def stiffness(self) -> float:
         """Slope of the force in the flat position [N/m]."""
-        part = self.spec.mechanism
-        excess = (part.oblique.free_length - part.half_span) / part.half_span
-        slope = part.vertical.stiffness - 2.0 * part.oblique.stiffness * excess
+        excess = (self.part.oblique.free_length - self.part.half_span) / self.part.half_span
+        slope = self.part.vertical.stiffness - 2.0 * self.part.oblique.stiffness * excess
         # what is left of a difference of equal numbers is rounding
-        return 0.0 if abs(slope) < 1e-14 * part.vertical.stiffness else slope
+        return 0.0 if abs(slope) < 1e-14 * self.part.vertical.stiffness else slope
 
     @property
     def zero_ratio(self) -> float:
         """The ratio of stiffnesses with which that slope is zero."""
-        part = self.spec.mechanism
-        return 0.5 * part.half_span / (part.oblique.free_length - part.half_span)
+        return 0.5 * self.part.half_span / (self.part.oblique.free_length - self.part.half_span)
 
     @property
     def travel(self) -> float:
@@ -85,28 +84,29 @@ class Solution:
     @property
     def contact(self) -> tuple[float, str]:
         """Where the slider is when the first coils touch [m], and those of what."""
-        one, other, span = self.spec.mechanism.oblique, self.spec.mechanism.vertical, self.spec.mechanism.half_span
-        places = [(other.free_length - other.solid_length, "vertical spring")]
-        if one.solid_length > span:
-            up = float(np.sqrt((one.solid_length - span) * (one.solid_length + span)))
-            places.append((self.height - up, "oblique springs"))
-        return min(places)
+        vertical = self.part.vertical.free_length - self.part.vertical.solid_length, "vertical spring"
+        if self.part.oblique.solid_length <= self.part.half_span:
+            return vertical
+        return min(vertical, (self.height - self._height_at(self.part.oblique.solid_length), "oblique springs"))
+
+    def _height_at(self, length: float) -> float:
+        """Return the slider's height above the anchors where the oblique springs have a length [m]."""
+        # not sqrt(L^2 - a^2): springs that are nearly as short as the half span would lose their digits
+        return float(np.sqrt((length - self.part.half_span) * (length + self.part.half_span)))
 
     def oblique_length(self, x: FloatArray) -> FloatArray:
         """Return the length of an oblique spring at displacements [m]."""
-        return np.hypot(self.spec.mechanism.half_span, x - self.height)
+        return np.hypot(self.part.half_span, x - self.height)
 
     def exact(self, x: FloatArray) -> FloatArray:
         """Return the force at displacements [N]."""
-        part, z = self.spec.mechanism, x - self.height
-        oblique = 2.0 * part.oblique.stiffness * z * (1.0 - part.oblique.free_length / self.oblique_length(x))
-        return part.vertical.stiffness * x + oblique
+        push = 1.0 - self.part.oblique.free_length / self.oblique_length(x)
+        return self.part.vertical.stiffness * x + 2.0 * self.part.oblique.stiffness * (x - self.height) * push
 
     def cubic(self, x: FloatArray) -> FloatArray:
         """Return the force at displacements to the third order about the flat position [N]."""
-        part, z = self.spec.mechanism, x - self.height
-        third = part.oblique.stiffness * part.oblique.free_length / part.half_span**3
-        return part.vertical.stiffness * self.height + self.stiffness * z + third * z**3
+        z, third = x - self.height, self.part.oblique.stiffness * self.part.oblique.free_length / self.part.half_span**3
+        return self.part.vertical.stiffness * self.height + self.stiffness * z + third * z**3
 
 
 def resolve(spec: ObliqueSpec) -> ObliqueSpec:
@@ -114,28 +114,20 @@ def resolve(spec: ObliqueSpec) -> ObliqueSpec:
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update={"travel": Solution(spec).travel})})
 
 
-def analyze(spec: ObliqueSpec, run: Run) -> Result:
+def analyze(force: Callable[[Solution, FloatArray], FloatArray], spec: ObliqueSpec, run: Run) -> Result:
     """Return the force over the displacement, with everything that is wrong with the mechanism."""
-    return _result(spec, Solution(spec).exact)
-
-
-def analyze_cubic(spec: ObliqueSpec, run: Run) -> Result:
-    """Return the same by the cubic about the flat position."""
-    return _result(spec, Solution(spec).cubic)
-
-
-def _result(spec: ObliqueSpec, force: Callable[[FloatArray], FloatArray]) -> Result:
     solution = Solution(resolve(spec))
-    short = tuple(_touching(solution))
-    x = np.linspace(0.0, min(solution.travel, solution.contact[0]), spec.analysis.points)
+    place, short = solution.contact[0], solution.contact[0] < solution.travel
+    x = np.linspace(0.0, min(solution.travel, place), spec.analysis.points)
     extra = {"oblique_length": Column(solution.oblique_length(x), "length")}
+    warnings = tuple(_findings(solution))
     return Result(
         spec=solution.spec,
         status=Status.PARTIAL if short else Status.COMPLETE,
-        message=short[0].message if short else "",
-        curves=(Curve(x, force(x), np.full(len(x), "load"), np.ones(len(x), dtype=bool), extra),),
-        values=_values(solution),
-        warnings=(*short, *_slope(solution)),
+        message=warnings[0].message if short else "",
+        curves=(Curve(x, force(solution, x), np.full(len(x), "load"), np.ones(len(x), dtype=bool), extra),),
+        values=quantities(DEFINITIONS, _numbers(solution)),
+        warnings=warnings,
         travel=(0.0, solution.travel),
         target=spec.design.force if spec.design else None,
         reference=solution.height,
@@ -143,11 +135,11 @@ def _result(spec: ObliqueSpec, force: Callable[[FloatArray], FloatArray]) -> Res
     )
 
 
-def _values(solution: Solution) -> dict[str, Quantity]:
-    part = solution.spec.mechanism
+def _numbers(solution: Solution) -> dict[str, float]:
+    part = solution.part
     # the slope is that of the vertical spring where L^3 = L0 a^2
     soft = np.sqrt(max((part.oblique.free_length * part.half_span**2) ** (2 / 3) - part.half_span**2, 0.0))
-    numbers = {
+    return {
         "plateau_position": solution.height,
         "plateau_force": part.vertical.stiffness * solution.height,
         "plateau_stiffness": solution.stiffness,
@@ -156,23 +148,17 @@ def _values(solution: Solution) -> dict[str, Quantity]:
         "geometry_ratio": part.half_span / part.oblique.free_length,
         "soft_range": 2.0 * float(soft),
     }
-    return quantities(DEFINITIONS, numbers)
 
 
-def _touching(solution: Solution) -> Iterator[Finding]:
-    place, which = solution.contact
+def _findings(solution: Solution) -> Iterator[Finding]:
+    (place, which), slope, vertical = solution.contact, solution.stiffness, solution.part.vertical.stiffness
     if place < solution.travel:
         told = f"the coils of the {which} touch at {mm(place)}, within the travel of {mm(solution.travel)}"
         yield finding("coils_touch", told)
-
-
-def _slope(solution: Solution) -> Iterator[Finding]:
-    part, slope = solution.spec.mechanism, solution.stiffness
-    if abs(slope) > QUASI_ZERO * part.vertical.stiffness:
-        right = solution.zero_ratio * part.vertical.stiffness
-        yield finding(
-            "stiff" if slope > 0 else "falling",
+    if abs(slope) > QUASI_ZERO * vertical:
+        right = solution.zero_ratio * vertical
+        told = (
             f"the slope at {mm(solution.height)} is {rate(slope)}; oblique springs of {rate(right)} make it zero at "
-            f"{newton(part.vertical.stiffness * solution.height)}",
-            f"mechanism.oblique.stiffness={right / 1e3!r} N/mm",
+            f"{newton(vertical * solution.height)}"
         )
+        yield finding("stiff" if slope > 0 else "falling", told, f"mechanism.oblique.stiffness={right / 1e3!r} N/mm")

@@ -1,7 +1,5 @@
 """A plate with the anchors' holes and the slider's slot, and the lines of the springs with the slider in the middle."""
 
-from __future__ import annotations
-
 from cfmkit.export.contours import TOLERANCE, Contour, Drawing, Line, circle, polygon
 from cfmkit_oblique.model import Solution
 from cfmkit_oblique.spec import ObliqueSpec

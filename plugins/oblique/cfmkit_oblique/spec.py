@@ -1,7 +1,5 @@
 """What a specification of oblique springs may say."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
