@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.mesh import Mesh
+    from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.plane_stress_law import Law
 
 # Three points inside [Strang, Fix, 1973]: exact to degree two, which is that of the strain energy of a straight-sided
@@ -43,13 +43,13 @@ class Elements:
 
     Attributes
     ----------
-    mesh : Mesh
+    mesh : TriangleMesh
     law : Law
     width : (m,) array
         Out of the plane, by element [m].
     """
 
-    mesh: Mesh
+    mesh: TriangleMesh
     law: Law
     width: FloatArray
 

@@ -47,7 +47,7 @@ MOST_NODES = 400_000
 
 
 @dataclass(frozen=True)
-class Mesh:
+class TriangleMesh:
     """A part in six-node triangles.
 
     Attributes
@@ -87,7 +87,7 @@ def mesh(
     seams: Sequence[FloatArray] = (),
     near: float = 0.0,
     seed: int = 0,
-) -> Mesh:
+) -> TriangleMesh:
     """Return a mesh of the part within some rings.
 
     Parameters
@@ -384,7 +384,7 @@ def _halved(ring: Ring, arc: FloatArray, pieces: IntArray) -> FloatArray:
     return np.sort(np.concatenate([arc, 0.5 * (arc[pieces] + ends[pieces])]))
 
 
-def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], laid: list[FloatArray]) -> Mesh:
+def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], laid: list[FloatArray]) -> TriangleMesh:
     """Return the mesh with nodes on the sides; those of the boundary stand on the true edge."""
     used, flat = np.unique(corners, return_inverse=True)
     place = np.full(len(points), -1)
@@ -403,4 +403,6 @@ def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], l
         edges.append(np.column_stack([a, b, len(points) + side]))
         owners.append(np.full(len(arc), number))
     triangles = np.column_stack([corners, len(points) + which.reshape(-1, 3)])
-    return Mesh(read_only(np.concatenate([points, middles])), triangles, np.concatenate(edges), np.concatenate(owners))
+    return TriangleMesh(
+        read_only(np.concatenate([points, middles])), triangles, np.concatenate(edges), np.concatenate(owners)
+    )

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
-    from cfmkit.solid.mesh import Mesh
+    from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.path_following import PosePath
     from cfmkit.solid.plane_stress_law import Law
 
@@ -132,7 +132,7 @@ class Part:
         unjudged = held | self._beside_clamps(grid, held)
         return Meshed(self, SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles), unjudged)
 
-    def _beside_clamps(self, grid: Mesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tell which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
         from scipy.spatial import cKDTree
         from shapely import LineString, Point
@@ -150,7 +150,7 @@ class Part:
                     near[tree.query_ball_point(around.coords[0], BESIDE * self.thinnest)] = True
         return near
 
-    def _widths(self, grid: Mesh) -> FloatArray:
+    def _widths(self, grid: TriangleMesh) -> FloatArray:
         """Return the width of every element [m], by where its middle is."""
         widths = np.full(len(grid.triangles), self.width)
         if self.regions:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from vee_leaf import VEE
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -47,25 +48,6 @@ def test_rubber_like_material_carries_a_little_more():
     assert other.curve.effort[at] / one.curve.effort[at] - 1 == pytest.approx(0.003, abs=0.0015)
     stress = [result.curve.extra["max_stress"].values[at] for result in (one, other)]
     assert stress[1] / stress[0] - 1 == pytest.approx(0.056, abs=0.015)
-
-
-VEE = """
-cfmkit: 1
-family: beam
-name: vee
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
-  thickness: 0.5 mm
-  width: 10 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
-  beams:
-    leaf: {start: root, end: shuttle}
-  drive: {kind: displacement, node: shuttle, direction: -90 deg}
-  part: {fillet: 0.05 mm}
-analysis: {travel: 5 mm, points: 51, fidelity: solid, solid: {poses: 11, mesh: 0.25 mm}}
-"""
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from cfmkit.export import contours
 from cfmkit.solid.edge_rings import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
-from cfmkit.solid.mesh import Mesh, mesh
+from cfmkit.solid.mesh import TriangleMesh, mesh
 from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
@@ -35,15 +35,15 @@ def circle(radius: float, count: int = 400) -> np.ndarray:
 
 
 @cache
-def bar(length: float, height: float, size: float) -> Mesh:
+def bar(length: float, height: float, size: float) -> TriangleMesh:
     return mesh((Ring.of(box(0, 0, length, height), False),), size)
 
 
-def at(grid: Mesh, axis: int, place: float) -> np.ndarray:
+def at(grid: TriangleMesh, axis: int, place: float) -> np.ndarray:
     return np.flatnonzero(np.abs(grid.nodes[:, axis] - place) < 1e-12)
 
 
-def problem(grid: Mesh, groups: list[Group], law=HOOKE, width: float = 1e-3) -> SolidProblem:
+def problem(grid: TriangleMesh, groups: list[Group], law=HOOKE, width: float = 1e-3) -> SolidProblem:
     elements = Elements(grid, law, np.full(len(grid.triangles), width))
     return SolidProblem(elements, Supports(grid.nodes, tuple(groups)))
 
@@ -280,7 +280,7 @@ SHARP_SHOULDER = {
 }
 
 
-def shoulder(narrow: float, wide: float, radius: float) -> Mesh:
+def shoulder(narrow: float, wide: float, radius: float) -> TriangleMesh:
     """Return a bar along x that narrows at x = 0, with fillets of a radius less than the step."""
     turn = np.linspace(0, np.pi / 2, 40)
     fillet = np.column_stack([radius * (1 - np.sin(turn)), 0.5 * narrow + radius * (1 - np.cos(turn))])

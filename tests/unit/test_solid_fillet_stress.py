@@ -6,28 +6,17 @@ import math
 
 import numpy as np
 import pytest
+from vee_leaf import VEE
 
 import cfmkit
 from cfmkit.solid.edge_rings import Ring
 from cfmkit.solid.fillet_stress import FilletStress, arcs
 
-VEE = """
-cfmkit: 1
-family: beam
-name: vee
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
-  thickness: 0.5 mm
-  width: 10 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
-  beams:
-    leaf: {start: root, end: shuttle}
-  drive: {kind: displacement, node: shuttle, direction: -90 deg}
-  part: {fillet: 0.3 mm}
-analysis: {travel: 0.3 mm, window: [0.1 mm, 0.3 mm], points: 11, fidelity: solid, solid: {poses: 3, mesh: 0.4 mm}}
-"""
+SHORT = {
+    "mechanism.part.fillet": "0.3 mm",
+    "analysis.travel": "0.3 mm", "analysis.window": ["0.1 mm", "0.3 mm"], "analysis.points": 11,
+    "analysis.solid.poses": 3, "analysis.solid.mesh": "0.4 mm",
+}  # fmt: skip
 
 
 def circle(start: float, end: float, radius: float = 1.0) -> np.ndarray:
@@ -58,7 +47,7 @@ def test_outside_corners_holes_and_arcs_of_other_radii_are_no_fillets():
 
 
 def test_each_fillet_of_a_leaf_has_a_row_and_the_largest_is_the_peak_of_the_window():
-    result = cfmkit.analyze(cfmkit.loads(VEE))
+    result = cfmkit.analyze(cfmkit.loads(VEE).replace(SHORT))
     table = result.tables["fillets"]()
     assert table["place"] == ("root: leaf", "shuttle: leaf", "shuttle: leaf", "root: leaf")
     assert table["radius"].tolist() == [0.3] * 4

@@ -24,7 +24,7 @@ from cfmkit.arrays import distinct, read_only
 from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.outcome.corners import Corner, Stretch
+from cfmkit.elastica.outcome.corners import Corner, SmoothStretch
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ class BetweenPoints:
         return read_only(x), read_only(effort)
 
     @cached_property
-    def _stresses(self) -> tuple[tuple[Stretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
+    def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
         """Of each stretch between corners, and there of each beam, smooth variables and stresses.
 
         They are those of the path and its corners, and extremes between them that may be the largest.
@@ -185,14 +185,14 @@ class BetweenPoints:
         found = []
         for number in range(len(corners) + 1):
             low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
-            stretch, own = Stretch(low, high), numbers == number
+            stretch, own = SmoothStretch(low, high), numbers == number
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
             x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
             found.append((stretch, self._with_tops(stretch, x, rows.T)))
         return tuple(found)
 
     def _with_tops(
-        self, stretch: Stretch, x: FloatArray, rows: FloatArray
+        self, stretch: SmoothStretch, x: FloatArray, rows: FloatArray
     ) -> tuple[tuple[FloatArray, FloatArray], ...]:
         """Return smooth variables and stresses of each beam on a stretch, with the extremes that may be the largest."""
         t, largest, found = stretch.smooth(x), rows.max(axis=0), []
@@ -353,7 +353,7 @@ class BetweenPoints:
         found = np.empty((len(wanted), self._y.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
-            stretch = Stretch(self._corners.get(number), self._corners.get(number + 1))
+            stretch = SmoothStretch(self._corners.get(number), self._corners.get(number + 1))
             ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
             x, y = stretch.with_ends(self._drive[own], self._y[own], *ends)
             found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))

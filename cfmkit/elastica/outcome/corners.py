@@ -36,7 +36,7 @@ class Corner:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class SmoothStretch:
     """A path between two corners, or up to an end of the path: None."""
 
     low: Corner | None

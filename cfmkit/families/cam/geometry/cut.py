@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Corner:
+class CamCorner:
     """The corner at which an undercut cam begins.
 
     Attributes
@@ -53,7 +53,7 @@ class CamProfile:
     path: RollerPath
     roller_radius: float
     end: float
-    corner: Corner | None = None
+    corner: CamCorner | None = None
 
     def normal(self, x: Real) -> tuple[Real, Real]:
         """Return the unit normal from cam to roller on the right flank, (f, -1)/sqrt(1 + f^2)."""
@@ -112,7 +112,7 @@ def cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
 
     contact = _crossing(clear_of_start, cusp, end)
     cx, cy = profile.flank(contact)
-    return CamProfile(path, roller_radius, end, Corner((float(cx), float(cy)), contact, cusp))
+    return CamProfile(path, roller_radius, end, CamCorner((float(cx), float(cy)), contact, cusp))
 
 
 def _crossing(function: Callable[[float], float], low: float, high: float) -> float:

@@ -80,7 +80,7 @@ class KeyPosition:
 
 
 @dataclass(frozen=True)
-class Scene:
+class PanelView:
     """What all panels have in common.
 
     Attributes
@@ -123,7 +123,7 @@ def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
     return first, middle, last
 
 
-def scene(solution: Solution) -> Scene:
+def scene(solution: Solution) -> PanelView:
     """Return a box around all positions of the motion, with room for symbols."""
     link, units = solution.assembly.linkage, solution.units
     x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
@@ -139,7 +139,7 @@ def scene(solution: Solution) -> Scene:
     ]
     room = 1.6 * size
     bottom, top = min(float(y.min()), -size) - room, max(float(y.max()), link.offset + size) + room
-    return Scene((min(ends) - room, bottom, max(ends) + room, top), size, wall)
+    return PanelView((min(ends) - room, bottom, max(ends) + room, top), size, wall)
 
 
 def torsion_spring(joint: Point, direction: float, radius: float) -> FloatArray:
@@ -331,7 +331,7 @@ def _key_curve(
 
 
 @styled
-def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: Scene) -> Axes:
+def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView) -> Axes:
     """Draw the linkage at one place of its motion; return the axes, which are in millimetres."""
     link, rates, size = solution.assembly.linkage, solution.assembly.rates, view.size
     pin, end = key.crank_pin, key.slider_pin
@@ -355,7 +355,7 @@ def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: Scene) ->
     return ax
 
 
-def _names(solution: Solution, key: KeyPosition, view: Scene) -> list[Label]:
+def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]:
     """Return the names of the parts."""
     crank = np.linspace(0.2, 0.8, 20)[:, None] * np.array(key.crank_pin)
     coupler = key.crank_pin + np.linspace(0.3, 0.8, 20)[:, None] * (np.array(key.slider_pin) - key.crank_pin)
