@@ -98,7 +98,7 @@ class FilletStress:
     travel : (k,) array
         Of the poses, rising [m or rad].
     stress : (k,) array
-        Along the edge [Pa].
+        Along the edge, that of largest size, tension positive [Pa].
     """
 
     arc: FilletArc
@@ -108,7 +108,8 @@ class FilletStress:
     def largest(self, low: float, high: float) -> tuple[float, float] | None:
         """Return the largest stress of the poses from one travel to another [Pa], and the travel of it [m or rad].
 
-        At ends that are no pose the stress is interpolated. None where the part does not come to any.
+        Largest in size; tension is positive. At ends that are no pose the size is interpolated, and the sign is that of
+        the nearest pose. None where the part does not come to any.
         """
         from scipy.interpolate import PchipInterpolator
 
@@ -118,9 +119,11 @@ class FilletStress:
         places = np.concatenate([self.travel[inside], ends])
         if not len(places):
             return None
-        found = np.concatenate([self.stress[inside], PchipInterpolator(self.travel, self.stress)(ends)])
+        size = np.abs(self.stress)
+        found = np.concatenate([size[inside], PchipInterpolator(self.travel, size)(ends)])
         worst = int(found.argmax())
-        return float(found[worst]), float(places[worst])
+        nearest = int(np.abs(self.travel - places[worst]).argmin())
+        return float(np.copysign(found[worst], self.stress[nearest])), float(places[worst])
 
 
 def stressed_fillets(solved: MeshSolution, radius: float) -> tuple[FilletStress, ...]:
@@ -140,8 +143,9 @@ def stressed_fillets(solved: MeshSolution, radius: float) -> tuple[FilletStress,
     for number, ring in enumerate(solved.part.rings):
         for arc in arcs(ring, number, radius):
             own = (ring_of[nodes] == number) & arc.covers(grid.nodes[nodes])
-            largest = np.abs(stress[:, own]).max(axis=1, initial=0.0)
-            if largest.max() > RIGID * np.abs(stress).max():
+            if np.abs(stress[:, own]).max(initial=0.0) > RIGID * np.abs(stress).max():
+                worst = np.abs(stress[:, own]).argmax(axis=1)
+                largest = stress[:, own][np.arange(len(stress)), worst]
                 found.append(FilletStress(arc, solved.course.travel[rising], read_only(largest[rising])))
     return tuple(found)
 

@@ -51,6 +51,17 @@ def test_each_fillet_of_a_strip_has_a_row_with_the_pad_that_it_is_at(strip):
     assert "fillets" not in strip["beam"].tables
 
 
+def test_fillets_of_a_strip_raise_the_stress_of_the_beam_beside_them(strip):
+    table = strip["solid"].tables["fillets"]()
+    factor = table["stress_concentration"]
+    assert ((factor > 1.1) & (factor < 1.4)).all()
+    assert strip["solid"].values["stress_concentration_max"].value == factor.max()
+    # half a millimetre from its end the strip has all but the stress that the beam model finds there
+    largest = strip["beam"].curve.extra["max_stress"].values.max()
+    assert 1e6 * table["nominal_stress"].max() == pytest.approx(largest, rel=0.05)
+    assert strip["beam"].values["stress_concentration_max"].value is None
+
+
 def test_the_stress_map_is_drawn_and_there_is_no_film(strip):
     assert list(api.figures(strip["solid"])) == ["curve", "stress_map"]
     assert api.figures(strip["solid"])["stress_map"]().axes

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shoulder_fillets import handbook
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import contours
@@ -268,18 +269,6 @@ def test_stress_beside_a_hole_is_kirschs_in_a_wide_plate_and_howlands_in_a_narro
     assert peak / (force / (width * thickness)) == pytest.approx(factor, rel=0.01)
 
 
-# Coefficients of [R] W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed., table 17.1, case 5:
-# rows of 1, sqrt(h/r), h/r; for tension those of h/r up to 2 and beyond
-SHOULDER = {
-    "bending": ((1.007, 1.0, -0.031), (-0.270, -2.404, 0.749), (0.677, 1.133, -0.904), (-0.414, 0.271, 0.186)),
-    "tension": ((1.007, 1.0, -0.031), (-0.114, -0.585, 0.314), (0.241, -0.992, -0.271), (-0.134, 0.577, -0.012)),
-}
-SHARP_SHOULDER = {
-    "bending": ((1.042, 0.982, -0.036), (-3.599, 1.619, -0.431), (6.084, -5.607, 1.158), (-2.527, 3.006, -0.691)),
-    "tension": ((1.042, 0.982, -0.036), (-0.074, -0.156, -0.010), (-3.418, 1.220, -0.005), (3.450, -2.046, 0.051)),
-}
-
-
 def shoulder(narrow: float, wide: float, radius: float) -> TriangleMesh:
     """Return a bar along x that narrows at x = 0, with fillets of a radius less than the step."""
     turn = np.linspace(0, np.pi / 2, 40)
@@ -305,11 +294,7 @@ def test_stress_in_a_shoulder_fillet_is_the_handbooks(load, wide, radius):
     here = lambda nodes: np.abs(grid.nodes[nodes, 0]) < 2 * radius  # noqa: E731
     peak, effort = greatest_along(problem(grid, [root, tip]), 1e-7 if load == "tension" else 1e-5, here)
     nominal = effort / (narrow * 1e-3) * (1.0 if load == "tension" else 6 / narrow)
-    step = 0.5 * (wide - narrow)
-    rows = (SHOULDER if step / radius <= 2 else SHARP_SHOULDER)[load]
-    factors = [a + b * np.sqrt(step / radius) + c * step / radius for a, b, c in rows]
-    handbook = sum(factor * (2 * step / wide) ** k for k, factor in enumerate(factors))
-    assert peak / nominal == pytest.approx(handbook, rel=0.05)
+    assert peak / nominal == pytest.approx(handbook(load, wide, narrow, radius), rel=0.05)
 
 
 # --- stability -----------------------------------------------------------------------------------------------------

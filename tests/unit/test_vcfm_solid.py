@@ -66,6 +66,21 @@ def test_each_fillet_of_leaf_and_spring_has_a_row_with_its_place_and_the_preload
     assert "fillets" not in straight["exact"].tables
 
 
+def test_fillets_of_leaves_and_spring_raise_the_stress_of_the_exact_model_as_those_of_clamped_strips_do(straight):
+    """Fillets of half the thickness: 1.2 to 1.3 in bending by the charts of shoulders, 1.3 to 1.6 in tension."""
+    result = straight["solid"]
+    table = result.tables["fillets"]()
+    factor = table["stress_concentration"]
+    assert ((factor > 0.9) & (factor < 1.6)).all()
+    assert result.values["stress_concentration_max"].value == factor.max()
+    worst = int(table["nominal_stress"].argmax())
+    assert table["place"][worst] == "spring at block"
+    pressed = 1e-3 * (table["displacement"] + table["preload"])[worst]
+    at_its_end = straight["exact"].state.sampler.spring(np.array([pressed]))[1][0]
+    assert 0.8 * at_its_end < 1e6 * table["nominal_stress"][worst] < at_its_end  # more than the radius from there
+    assert straight["exact"].values["stress_concentration_max"].value is None
+
+
 def test_the_curve_is_stable_and_its_stress_map_is_drawn(straight):
     assert straight["solid"].curve.stable.all()
     figure = api.figures(straight["solid"])["stress_map"]()

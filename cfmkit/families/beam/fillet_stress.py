@@ -1,8 +1,13 @@
-"""The largest stress of a beam mechanism's part in each of its fillets, with the node and the beams that it joins."""
+"""The largest stress of a beam mechanism's part in each of its fillets, with the node and the beams that it joins.
+
+Nominal stresses are those of the network that the part is drawn from, with stretching and shear.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,19 +15,20 @@ from cfmkit.elastica.model.layout import Layout
 from cfmkit.families.beam.build import mirror_axis
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.strips import mirrored, strips
-from cfmkit.families.fillet_table import FilletRow, fillet_table
+from cfmkit.families.fillet_table import FilletRow, with_nominal
+from cfmkit.families.nominal_stress import both_images, nominal_stresses
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Displacement, Rotation
     from cfmkit.families.beam.build import Assembly
     from cfmkit.solid.meshed_part import MeshSolution
-    from cfmkit.tables import Table
 
 EXACT = 1e-6
 """Lines between points of a beam are no farther from its edges than this [m]."""
 
 
-def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> Table:
+def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> tuple[FilletRow, ...]:
     """Return the fillets with their largest stress in a window [m or rad]; those of a mirrored half with a prime."""
     from cfmkit.solid.fillet_stress import stressed_fillets
 
@@ -34,8 +40,22 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
         node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
         if (found := one.largest(*window)) is not None:
             rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
-    turns = spec.mechanism.drive.kind == "rotation"
-    return fillet_table(rows, ("angle", "angle") if turns else ("displacement", "length"))
+    travel = np.array([row.motion for row in rows])
+    paths = partial(both_images, assembly.network, partial(_drive, assembly))
+    return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described, assembly)))
+
+
+def _drive(assembly: Assembly, travel: FloatArray) -> Displacement | Rotation:
+    """Return the drive through some travels [m or rad]: a solid has no other than these two."""
+    drive: Any = assembly.drive()
+    moved: Displacement | Rotation = replace(drive, points=travel)
+    return moved
+
+
+def _described(assembly: Assembly, points: FloatArray) -> FloatArray:
+    """Return points of the part (m, 2), and where in the half that is described they are if they are mirrored [m]."""
+    axis = mirror_axis(assembly)
+    return points if axis is None else np.concatenate([points, mirrored(points, *axis)])
 
 
 def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:

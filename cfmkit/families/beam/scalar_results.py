@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
-from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
+from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import between
@@ -62,7 +62,7 @@ DEFINITIONS = {
     "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),
     "peak_stress_x": ("length", "x of the place of the largest stress in the window, on the part before any load"),
     "peak_stress_y": ("length", "y of that place"),
-    **OF_MESHES,
+    **OF_SOLIDS,
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 

@@ -21,6 +21,7 @@ from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.fillet_table import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
@@ -37,9 +38,11 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.fillet_table import FilletRow
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
     from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
+    from cfmkit.tables import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +133,11 @@ class SolidSolution:
         """What the two meshes differ by."""
         return self.meshes.error
 
+    @cached_property
+    def fillets(self) -> tuple[FilletRow, ...]:
+        """Stress fillet by fillet."""
+        return fillets(self.assembly, self.fine, self.window)
+
 
 def analyze(spec: BeamSpec, run: Run) -> Result:
     """Return the force-displacement curve of the part as drawn, with everything that is wrong with it.
@@ -174,7 +182,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         travel=(0.0, spec.extent),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
-        tables={"fillets": partial(fillets, assembly, meshes.fine, solution.window)},
+        tables={"fillets": partial(_fillet_table, solution)},
         state=solution,
     )
 
@@ -295,11 +303,16 @@ def _curve(solution: SolidSolution) -> Curve:
     return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), stable[before], extra, kind)
 
 
+def _fillet_table(solution: SolidSolution) -> Table:
+    return fillet_table(solution.fillets, ("angle", "angle") if _turns(solution.spec) else ("displacement", "length"))
+
+
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None where the model does not know a value."""
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         **solution.error.values(),
+        "stress_concentration_max": largest_concentration(solution.fillets),
     }
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()

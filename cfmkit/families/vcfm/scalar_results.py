@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
+from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 DEFINITIONS = {
-    **OF_MESHES,
+    **OF_SOLIDS,
     "positive_stiffness": ("stiffness", "K_p of the spring as made"),
     "negative_stiffness": ("stiffness", "size of the leaves' negative stiffness: constant where they are buckled"),
     "first_stiffness": ("stiffness", "stiffness K_b1 of the leaves as made"),
@@ -99,7 +99,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
     } | _adjustment(solution)
     error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
-    numbers |= dict.fromkeys(OF_MESHES) if error is None else error.values()
+    numbers |= dict.fromkeys(OF_SOLIDS) | ({} if error is None else error.values())
     return {name: _quantity(name, value) for name, value in numbers.items()} | _bought(solution)
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError, SolutionError
+from cfmkit.families.fillet_table import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
@@ -23,7 +24,8 @@ from cfmkit.families.vcfm.fillet_stress import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
-from cfmkit.results import Result, Status
+from cfmkit.families.vcfm.scalar_results import DEFINITIONS
+from cfmkit.results import Result, Status, quantities
 from cfmkit.specs.units import between
 from cfmkit.stock.spec import CutPart
 
@@ -234,10 +236,14 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
     found = result_of(solution := solve(spec, made, sampler))
+    warnings = (*found.warnings, *_findings(spec, sampler))
+    if not found.curves:
+        return replace(found, warnings=warnings)
+    rows = fillets(solution)
+    more = quantities(DEFINITIONS, {"stress_concentration_max": largest_concentration(rows)})
     tables = dict(found.tables)
-    if found.curves:
-        tables["fillets"] = partial(fillets, solution)
-    return replace(found, warnings=(*found.warnings, *_findings(spec, sampler)), tables=tables)
+    tables["fillets"] = partial(fillet_table, rows)
+    return replace(found, values={**found.values, **more}, warnings=warnings, tables=tables)
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:

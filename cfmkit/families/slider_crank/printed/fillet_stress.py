@@ -1,4 +1,7 @@
-"""The largest stress of a printed slider-crank in each of its fillets."""
+"""The largest stress of a printed slider-crank in each of its fillets.
+
+Nominal stresses are those of the flexures between rigid links, or of the strip.
+"""
 
 from __future__ import annotations
 
@@ -6,30 +9,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fillet_table import FilletRow, fillet_table
+from cfmkit.families.fillet_table import FilletRow, with_nominal
+from cfmkit.families.nominal_stress import TOLERANCE, nominal_stresses, with_steps
 from cfmkit.families.slider_crank.printed.chain import FLEXURES
 from cfmkit.stock.spec import PaddedPart
 
 if TYPE_CHECKING:
-    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.pressing import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.solid.meshed_part import MeshSolution
-    from cfmkit.tables import Table
 
 
-def fillets(spec: SliderCrankSpec, pins: FloatArray, solved: MeshSolution, window: tuple[float, float]) -> Table:
+def fillets(
+    spec: SliderCrankSpec, chain: Chain, solved: MeshSolution, window: tuple[float, float]
+) -> tuple[FilletRow, ...]:
     """Return the fillets of a leg with their largest stress in a window [m], named by pad or flexure.
 
-    pins: places of the flexures, unloaded, (3, 2) [m].
+    chain: the leg as beams, unloaded.
     """
     from cfmkit.solid.fillet_stress import stressed_fillets
 
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []
     for one in stressed_fillets(solved, (spec.mechanism.part or PaddedPart()).fillet):
-        nearest = FLEXURES[int(np.hypot(*(pins - one.arc.middle).T).argmin())]
+        nearest = FLEXURES[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
         names = [] if spec.piece == "beam" else [nearest]
         names += one.arc.touched(pads) or ([] if names else ["strip"])
         if (found := one.largest(*window)) is not None:
             rows.append(FilletRow(": ".join(names), one.arc, *found))
-    return fillet_table(rows)
+    stresses = nominal_stresses(
+        rows,
+        np.array([row.motion for row in rows]),
+        lambda travel: [chain.press(with_steps(travel), tolerance=TOLERANCE).path],
+        lambda points: points,
+    )
+    return with_nominal(rows, stresses)

@@ -133,8 +133,8 @@ def _thickness(chain: Chain) -> float:
 
 
 def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:
-    """Return the chain that a specification's fidelity asks for."""
-    if spec.fidelity == "lumped":
+    """Return the chain that a specification's fidelity asks for; of a solid the one that it is drawn from."""
+    if spec.piece == "lumped":
         return lumped_chain(spec.mechanism, linkage, unloaded)
     strip = strip_of(spec.mechanism, linkage, unloaded)
     pins = pins_of(spec.mechanism, linkage, unloaded)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
 from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +30,7 @@ DEFINITIONS = {
     "stress_stroke": ("length", "travel at which the allowable stress is reached"),
     "width_ratio": ("ratio", "smallest width over thickness"),
     "recheck_force": ("ratio", "largest difference of the force by corotational elements, as a share"),
-    **OF_MESHES,
+    **OF_SOLIDS,
     "recheck_stress": ("ratio", "largest difference of the stress by corotational elements, as a share"),
 }
 
@@ -52,7 +52,7 @@ def numbers(solution: Solution) -> Iterator[tuple[str, float | None, str]]:
     yield "energy_max", float(solution.energy.max()), ""
     check = solution.recheck
     why = "set 'analysis.recheck' to compute it"
-    for name in OF_MESHES:
+    for name in OF_SOLIDS:
         yield name, None, "only the model of the part as a solid has meshes"
     yield "recheck_force", None if check is None else check.force, why
     yield "recheck_stress", None if check is None else check.stress, why

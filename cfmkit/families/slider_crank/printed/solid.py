@@ -8,7 +8,7 @@ Assumes: plane stress. No contact, no plasticity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -17,15 +17,16 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
+from cfmkit.families.fillet_table import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.assembly import elasticity, travel_direction
 from cfmkit.families.slider_crank.printed.chain import kink
 from cfmkit.families.slider_crank.printed.fillet_stress import fillets
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
-from cfmkit.families.slider_crank.printed.model import as_run
+from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
+    from cfmkit.families.fillet_table import FilletRow
+    from cfmkit.families.slider_crank.printed.pressing import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
@@ -63,14 +66,14 @@ class SolidSolution:
     meshes : TwoMeshes
     travel : (n,) array
         Of the slider, at the points of the curve [m].
-    pins : (3, 2) array
-        Pivot, crank pin, slider pin, unloaded [m].
+    chain : Chain
+        The leg as beams.
     """
 
     spec: SliderCrankSpec
     meshes: TwoMeshes
     travel: FloatArray
-    pins: FloatArray = field(default_factory=lambda: np.zeros((3, 2)))
+    chain: Chain
 
     @cached_property
     def force(self) -> FloatArray:
@@ -94,6 +97,11 @@ class SolidSolution:
     def error(self) -> MeshError:
         """What the two meshes differ by."""
         return self.meshes.error
+
+    @cached_property
+    def fillets(self) -> tuple[FilletRow, ...]:
+        """Stress fillet by fillet."""
+        return fillets(self.spec, self.chain, self.fine, self.window)
 
     @property
     def window(self) -> tuple[float, float]:
@@ -135,7 +143,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     asked = np.linspace(low, high, spec.analysis.points)
     course = meshes.fine.course
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
-    solution = SolidSolution(spec, meshes, reached, pins_of(spec.mechanism, linkage, unloaded))
+    solution = SolidSolution(spec, meshes, reached, chain_of(spec, linkage, unloaded))
     complete = course.ending is PathEnd.COMPLETE
     found = (*_findings(solution), *friction_left_out(spec))
     return Result(
@@ -149,7 +157,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=elasticity(spec.mechanism).allowable_stress,
-        tables={"fillets": partial(fillets, spec, solution.pins, meshes.fine, solution.window)},
+        tables={"fillets": partial(fillet_table, solution.fillets)},
         state=solution,
     )
 
@@ -235,12 +243,13 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; those that a solid does not know have no value."""
     limit = elasticity(solution.spec.mechanism).allowable_stress
     known: dict[str, float | None] = {
-        "kink": kink(solution.pins),
+        "kink": kink(solution.chain.pins),
         "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
         "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
         "allowable_stress": limit,
         "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
         **solution.error.values(),
+        "stress_concentration_max": largest_concentration(solution.fillets),
     }
     names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
     about = OF_SPRINGS | DEFINITIONS

@@ -1,4 +1,4 @@
-"""Values that every family gives of a part that is solved as a solid: how far its mesh can be trusted."""
+"""Values that every family gives of a part that is solved as a solid: errors of its mesh, stress concentration."""
 
 from __future__ import annotations
 
@@ -19,5 +19,11 @@ DEFINITIONS = {
         "largest difference of the curve between poses and of poses solved there, where it is expected to be largest, "
         "in parts of the largest force; poses are added until it is 5e-4 at most, twice as many at most",
     ),
+    "stress_concentration_max": (
+        "factor",
+        "largest stress of a fillet over that of beams in large deflection at the same displacement: bending and axial "
+        "stress of the section where the fillet ends, at its edge; of the fillets where that is at least a tenth of "
+        "the beams' largest",
+    ),
 }
-"""Name -> dimension and definition; `cfmkit.solid.two_meshes` computes them."""
+"""Name -> dimension and definition; `cfmkit.solid.two_meshes` and `nominal_stress` compute them."""
