@@ -59,11 +59,16 @@ def largest_concentration(rows: Sequence[FilletRow]) -> float | None:
     return max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
 
 
+def numbered(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:
+    """Return fillets by their numbers in the table, where so many rows stand before them."""
+    return {number: row.arc for number, row in enumerate(rows, start=before + 1)}
+
+
 def fillet_table(rows: Sequence[FilletRow], motion: tuple[str, str] = ("displacement", "length")) -> Table:
     """Return the table, with the name and the dimension of the motion."""
     places = np.array([row.arc.middle for row in rows]).reshape(-1, 2)
     columns = [
-        TableColumn("fillet", tuple(range(1, len(rows) + 1))),
+        TableColumn("fillet", tuple(numbered(rows))),
         TableColumn("place", tuple(row.place for row in rows)),
         border_column("x", places[:, 0], "length"),
         border_column("y", places[:, 1], "length"),

@@ -1,30 +1,37 @@
-"""Stress on deformed parts: several poses in one colour scale, the peak marked where it is."""
+"""Stress on deformed parts: several poses in one colour scale, the peak marked where it is, fillets numbered."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.plots import parts
+from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.style import VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
+    from cfmkit.solid.fillet_stress import FilletArc
     from cfmkit.solid.meshed_part import MeshSolution
 
 WIDE, BESIDE, ABOVE = 140.0, 110.0, 62.0
 """Room for the parts: across, and in height where they stand beside or above each other [mm]."""
 GAP = 7.0
 """Between views, for what stands above each [mm]."""
+NUMBERS = 6.0
+"""Size of the numbers of fillets [pt]."""
+NEAREST = 8
+"""Nodes around the middle of a fillet that tell how far it has turned: enough to lie around it on any mesh."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +45,14 @@ class StressView:
         Number of the pose.
     name : str
         What stands above it.
+    fillets : mapping
+        Fillets that are to be numbered, by their numbers in fillets.csv.
     """
 
     solved: MeshSolution
     pose: int
     name: str
+    fillets: Mapping[int, FilletArc] = field(default_factory=dict)
 
     @property
     def moved(self) -> FloatArray:
@@ -60,6 +70,15 @@ class StressView:
     def peak(self) -> float:
         """Largest stress along a free edge [Pa]."""
         return float(self.solved.peaks[0][self.pose])
+
+    def numbers(self, moved: FloatArray) -> Iterator[Label]:
+        """Yield the numbers of fillets, to stand beside them on the side of the waste; moved: nodes (n, 2) [m]."""
+        nodes = self.solved.problem.elements.mesh.nodes
+        for number, arc in self.fillets.items():
+            near = np.hypot(*(nodes - arc.middle).T).argsort()[:NEAREST]
+            before, after = ((places[near] - places[near].mean(axis=0)) @ [1.0, 1.0j] for places in (nodes, moved))
+            turned = complex(*(arc.center - arc.middle)) * complex(np.vdot(before, after))
+            yield parts.part_name(str(number), moved[near[0]], (turned.real, turned.imag))
 
     @property
     def _balance(self) -> Any:
@@ -98,6 +117,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
         ax.set_xlim(1e3 * low[number][0], 1e3 * (low[number][0] + width))
         ax.set_ylim(1e3 * low[number][1], 1e3 * (low[number][1] + height))
         ax.set_axis_off()
+        place_labels(ax, list(view.numbers(moved[number])), NUMBERS)
     bar = axes_mm(figure, (30.0, 10.0, 100.0, 3.0))
     figure.colorbar(shades, cax=bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
     return figure
@@ -126,5 +146,6 @@ def _drawn(ax: Axes, view: StressView, places: FloatArray, top: float) -> Any:
     ax.plot(
         *(1e3 * places[start]), marker="o", markersize=6, color=VERMILLION, fillstyle="none", linestyle="", zorder=4
     )
-    ax.set_title(f"{view.name}: {value_text(view.peak, 'stress')}", fontsize=7, loc="left", pad=1.0)
+    numbers = "; fillets numbered as in fillets.csv" if view.fillets else ""
+    ax.set_title(f"{view.name}: {value_text(view.peak, 'stress')}{numbers}", fontsize=7, loc="left", pad=1.0)
     return shades

@@ -67,6 +67,19 @@ def test_the_stress_map_is_drawn_and_there_is_no_film(strip):
     assert api.figures(strip["solid"])["stress_map"]().axes
 
 
+def test_the_stress_map_numbers_each_fillet_once_beside_it_as_the_table_does(strip):
+    table = strip["solid"].tables["fillets"]()
+    figure = api.figures(strip["solid"])["stress_map"]()
+    texts = [(ax, text) for ax in figure.axes for text in ax.texts if text.get_text().isdigit()]
+    assert sorted(text.get_text() for _, text in texts) == ["1", "2", "3", "4"]
+    way = np.array([1e3 * strip["solid"].curve.motion[-1], 0.0])
+    for ax, text in texts:
+        row = int(text.get_text()) - 1
+        place = np.array([table["x"][row], table["y"][row]]) - way * (table["place"][row] == "slider")
+        stands = ax.transData.inverted().transform(text.get_transform().transform(text.get_position()))
+        assert np.hypot(*(stands - place)) < 10.0  # mm of a part that is 125 mm long
+
+
 def test_a_mirrored_pair_has_twice_the_force(strip):
     pair = api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm", "mechanism.copies=mirrored"))
     assert pair.curve.effort == pytest.approx(2.0 * strip["solid"].curve.effort, rel=1e-9)

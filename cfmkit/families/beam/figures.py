@@ -14,6 +14,7 @@ from cfmkit.families.beam.build import mirror_axis
 from cfmkit.families.beam.scalar_results import natural, window_of
 from cfmkit.families.beam.strips import mirrored, strips
 from cfmkit.families.beam.surface_following import ride
+from cfmkit.families.fillet_table import numbered
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
@@ -97,8 +98,17 @@ def stress_map(result: Result) -> Figure:
     """Return the stress of the part as a solid at up to three poses, in one scale, with the place of its peak."""
     solution: SolidSolution = result.state
     solved, poses = solution.fine, solution.fine.course.poses
-    shown = sorted({len(poses) // 2, int(solved.peaks[0].argmax()), len(poses) - 1})
-    views = [StressView(solved, pose, value_text(poses[pose].travel, result.curve.motion_dimension)) for pose in shown]
+    worst = int(solved.peaks[0].argmax())
+    shown = sorted({len(poses) // 2, worst, len(poses) - 1})
+    views = [
+        StressView(
+            solved,
+            pose,
+            value_text(poses[pose].travel, result.curve.motion_dimension),
+            numbered(solution.fillets) if pose == worst else {},
+        )
+        for pose in shown
+    ]
     return stress_map_figure(result, views, "equivalent stress of the part as cut")
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Curve
+from cfmkit.families.fillet_table import numbered
+from cfmkit.families.vcfm.fillet_stress import fillets
 from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.longest_window import flat_window
@@ -219,13 +221,15 @@ def stress_map(result: Result) -> Figure:
     """Return the stress of a leaf and of a chain of the spring as drawn, where each has its largest one."""
     solution: Solution = result.state
     sampler: Any = solution.sampler
-    solids = [("leaf", sampler.pushed.solved, 1.0)]
+    leaf, spring = fillets(solution)
+    solids = [("leaf", sampler.pushed.solved, 1.0, numbered(leaf))]
     if sampler.sides:
-        solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel))
+        solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel, numbered(spring, len(leaf))))
     views = []
-    for name, solved, share in solids:
+    for name, solved, share, own in solids:
         pose = int(solved.peaks[0].argmax())
-        views.append(StressView(solved, pose, f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"))
+        told = f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"
+        views.append(StressView(solved, pose, told, own))
     return stress_map_figure(result, views, "stress of leaf and spring as drawn")
 
 

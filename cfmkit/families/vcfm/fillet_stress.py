@@ -27,24 +27,23 @@ if TYPE_CHECKING:
     from cfmkit.solid.meshed_part import MeshSolution
 
 
-def fillets(solution: Solution) -> tuple[FilletRow, ...]:
-    """Return the fillets of a leaf and of a chain of the spring, with their largest stress up to the window's end.
+def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow, ...]]:
+    """Return the fillets of a leaf, and of a chain of the spring, with their largest stress up to the window's end.
 
-    That of all preloads, as in `spring_stress_max` and `bistable_stress_max`.
+    That of all preloads, as in `spring_stress_max` and `bistable_stress_max`. A bought spring has none.
     """
     sampler: Any = solution.sampler  # of solids
     leaf = _rows(solution, "leaf", "shuttle", (sampler.pushed, sampler.pulled))
     network, placed = leaf_network(solution.spec), partial(_in_leaf_network, solution.spec)
-    found = _with_nominal(leaf, [row.motion for row in leaf], network, "shuttle", placed)
+    leaf = _with_nominal(leaf, [row.motion for row in leaf], network, "shuttle", placed)
     if not sampler.sides:
-        return found
+        return leaf, ()
     chain, spring = sampler.chain, _rows(solution, "spring", "block", sampler.sides)
     travel = [chain.travel * (row.motion + (row.preload or 0.0)) for row in spring]
-    placed = partial(_in_chain, solution.spec)
-    return found + _with_nominal(spring, travel, chain.network, chain.node, placed)
+    return leaf, _with_nominal(spring, travel, chain.network, chain.node, partial(_in_chain, solution.spec))
 
 
-def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> list[FilletRow]:
+def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tuple[FilletRow, ...]:
     """Return the fillets of one piece that is pushed and pulled."""
     radius = (solution.spec.mechanism.part or CutPart()).fillet
     pushed, pulled = (way.solved for way in ways)
@@ -53,7 +52,7 @@ def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> li
         joined = one.arc.touched(_rigid(pushed, moved))
         row = _largest(solution, one, f"{piece} at {joined[0] if joined else 'corner'}", piece == "spring")
         rows += [] if row is None else [row]
-    return rows
+    return tuple(rows)
 
 
 def _with_nominal(

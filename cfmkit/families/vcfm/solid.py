@@ -239,7 +239,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     warnings = (*found.warnings, *_findings(spec, sampler))
     if not found.curves:
         return replace(found, warnings=warnings)
-    rows = fillets(solution)
+    rows = sum(fillets(solution), ())
     more = quantities(DEFINITIONS, {"stress_concentration_max": largest_concentration(rows)})
     tables = dict(found.tables)
     tables["fillets"] = partial(fillet_table, rows)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.fillet_table import numbered
 from cfmkit.families.slider_crank.printed.chain import STRIP
 from cfmkit.plots import parts
 from cfmkit.plots.label_placement import Label, place_labels
@@ -55,8 +56,13 @@ def stress_map(result: Result) -> Figure:
     solved = result.state.fine
     poses = solved.course.poses
     middle = int(np.abs(solved.course.travel - 0.5 * solved.course.travel[-1]).argmin())
-    shown = sorted({middle, int(solved.peaks[0].argmax()), len(poses) - 1})
-    views = [StressView(solved, pose, value_text(poses[pose].travel, "length")) for pose in shown]
+    worst = int(solved.peaks[0].argmax())
+    shown = sorted({middle, worst, len(poses) - 1})
+    fillets = numbered(result.state.fillets)
+    views = [
+        StressView(solved, pose, value_text(poses[pose].travel, "length"), fillets if pose == worst else {})
+        for pose in shown
+    ]
     return stress_map_figure(result, views, "stress of the part as drawn")
 
 
