@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 DEFINITIONS = {
-    "mesh_force_difference": ("ratio", "largest difference of the force on a coarser mesh, in parts of the largest"),
+    "mesh_force_difference": (
+        "ratio",
+        "largest difference of the force on a coarser mesh, relative to the largest force",
+    ),
     "mesh_stress_difference": (
         "ratio",
-        "largest difference of a pose's largest stress on a coarser mesh, in parts of the largest of all poses",
+        "largest difference of a pose's largest stress on a coarser mesh, relative to the largest of all poses",
     ),
     "mesh_force_error": (
         "ratio",
-        "error of the force by the mesh, in parts of the largest: that difference, 1e-4 at least, times a factor below "
-        "which 95 % of the errors of the parts in docs/solid.md are",
+        "discretisation error of the force, relative to the largest force: that difference, at least 1e-4, times a "
+        "factor that covers 95 % of the parts in docs/solid.md",
     ),
-    "mesh_stress_error": ("ratio", "the same of the largest stress, whose difference counts as 2 % at least"),
+    "mesh_stress_error": ("ratio", "the same for the largest stress, with a difference of at least 2 %"),
     "curve_error": (
         "ratio",
-        "largest difference of the curve between poses and of poses solved there, where it is expected to be largest, "
-        "in parts of the largest force; poses are added until it is 5e-4 at most, twice as many at most",
+        "difference between the interpolated curve and poses solved between its poses, where it is expected to be "
+        "largest, relative to the largest force; poses are added, up to twice as many, until it is at most 5e-4",
     ),
     "stress_concentration_max": (
         "factor",

@@ -14,7 +14,7 @@ class Panel(Model):
     """One picture."""
 
     run: str = Field(min_length=1, description="a specification, or the output folder of a run; relative to this file")
-    plot: str = Field(min_length=1, description="name of the picture, as below figures/ without its ending")
+    plot: str = Field(min_length=1, description="name of the figure, as in figures/, without the extension")
     verb: Literal["analyze", "design", "sweep"] | None = Field(
         None, description="verb to run; default: sweep if the specification has such a block, else analyze"
     )
@@ -27,6 +27,7 @@ class ComposedFigure(Model):
     panels: tuple[Panel, ...] = Field(min_length=1, max_length=24, description="from left to right, then down")
     columns: int = Field(2, ge=1, le=6, description="panels beside each other")
     width: Annotated[Length, Field(ge=0.06, le=0.6)] = Field(
-        0.174, description="of the print, letters keep their size; default: 174 mm, two columns of a journal"
+        0.174,
+        description="width in print, at which lettering keeps its size; default: 174 mm, two columns of a journal",
     )
     description: str = Field("", description="free text")

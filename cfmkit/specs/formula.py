@@ -140,7 +140,9 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
         with np.errstate(all="ignore"):
             return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
     told = shown(ast.unparse(node))
-    raise ValueError(f"{told} means nothing here; there are numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}")
+    raise ValueError(
+        f"{told} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}"
+    )
 
 
 def _number(value: int | float) -> float:

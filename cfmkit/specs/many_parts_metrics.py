@@ -8,7 +8,7 @@ OF_MANY_PARTS = {
     "yield_high": "upper end of that interval",
     "yield_before": "yield of the specification that the design began with",
     "yield_with_common_frozen": "yield without the errors that scale the force of a whole part, such as that of the "
-    "modulus: those that a coupon and a trim take away",
+    "modulus: those that a test coupon and a trim remove",
     "yield_after_trim": "yield where the mean force of each part is adjusted to that of the design, by a trim or by "
     "its width; stresses do not change",
 }

@@ -183,7 +183,8 @@ class Sensitivity(Model):
     )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
     costs: dict[str, Annotated[float, Field(gt=0)]] = Field(
-        {}, description="inverse: what a tolerance costs, over its width, in any unit: {path: 2.0}; default: 1 each"
+        {},
+        description="inverse: a tolerance costs this number over its width, in any unit: {path: 2.0}; default: 1 each",
     )
     design: bool = Field(False, description="redesign the mechanism at each point")
 
@@ -209,7 +210,7 @@ class DesignKeys(Model):
     )
     robust: Literal["cvar", "worst"] | None = Field(
         None,
-        description="after margins to first order: 48 random parts are solved at each step, to improve the mean of "
+        description="after first-order margins: 48 random parts are solved at each step, to improve the mean of "
         "the worst share of them (cvar), or the worst one",
     )
     verify: Literal["solid"] | None = Field(
@@ -220,7 +221,7 @@ class DesignKeys(Model):
     samples: int = Field(
         400, ge=20, le=1_000_000, description="random parts within the tolerances with which the design is evaluated"
     )
-    seed: int | None = Field(None, ge=0, description="of the parts that are drawn; default: `--seed`")
+    seed: int | None = Field(None, ge=0, description="of the random parts; default: `--seed`")
 
     def tolerances_of(self, _spec: Any) -> tuple[Mapping[str, Any], int]:
         """Return the tolerances that are stated for a specification, and how many parts are to be drawn."""

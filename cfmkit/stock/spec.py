@@ -46,8 +46,8 @@ class Fatigue(Model):
     ultimate_strength: PositiveStress = Field(description="s_u, at which Goodman's line ends")
     cycles: Annotated[float, Field(gt=0)] | None = Field(
         None,
-        description="required life in cycles: the allowable stress is then at most the one that lasts "
-        "them, from 0 and back",
+        description="required life in cycles: the allowable stress is then at most the one that "
+        "can be applied so often, from 0 and back",
     )
     source: str | None = Field(None, max_length=300, description="where the values were read")
 
@@ -72,8 +72,8 @@ class Fatigue(Model):
             raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {told}")
         if self.cycles is not None and self.cycles > points[-1][0] * (1 + 1e-12):
             raise ValueError(
-                f"'cycles' is {self.cycles:g}, but 'points' end at {points[-1][0]:g}: more have not been shown; add "
-                "points, or give Basquin's line"
+                f"'cycles' is {self.cycles:g}, more than the {points[-1][0]:g} at which 'points' end: add points, or "
+                "give Basquin's line"
             )
 
     @property
@@ -111,7 +111,7 @@ class Relaxation(Model):
         if (self.terms is None) == (self.points is None):
             raise ValueError("give either 'terms' or 'points'")
         if self.terms is not None and sum(share for share, _ in self.terms) >= 1:
-            raise ValueError("the shares of 'terms' must add up to less than 100 %: something of the modulus remains")
+            raise ValueError("the shares of 'terms' must add up to less than 100 %: part of the modulus must remain")
         for (before, above), (after, below) in pairwise(self.points or ()):
             if after <= before or below > above:
                 raise ValueError("'points' must have increasing times and moduli that do not rise")
@@ -215,27 +215,25 @@ class Pins(Model):
     """Plain pins that rub as the parts on them turn."""
 
     diameter: Annotated[Length, Field(gt=0)] = Field(description="of the pins")
-    friction: Friction = Field(0.0, description="Coulomb friction in them")
+    friction: Friction = Field(0.0, description="coefficient of Coulomb friction")
 
 
 class Guide(Model):
     """The slider's way: what it takes from the force."""
 
-    friction: Friction = Field(
-        0.0, description="Coulomb friction, times the transverse load of the slider on its guide"
-    )
+    friction: Friction = Field(0.0, description="coefficient of Coulomb friction, on the transverse load of the slider")
     drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")
     length: Annotated[Length, Field(gt=0)] | None = Field(
         None, description="of the guide, between its ends; needed for 'offset'"
     )
     offset: Annotated[Length, Field(ge=0)] = Field(
-        0.0, description="distance of the force's line from the guide's middle"
+        0.0, description="distance of the line of force from the middle of the guide"
     )
 
     @model_validator(mode="after")
     def _offset_has_a_length(self) -> Self:
         if self.offset and self.length is None:
-            raise ValueError("'offset' presses the guide's ends apart: it needs the guide's 'length'")
+            raise ValueError("the load that 'offset' puts on the guide depends on its length: state 'length'")
         if self.length and 2.0 * self.friction * self.offset >= self.length:
             jam = format_short(2.0 * self.friction * self.offset, "length")
             raise ValueError(f"a guide shorter than {jam} (twice friction times offset) jams like a drawer")
@@ -272,7 +270,7 @@ AboveZero = Annotated[Length, Field(gt=0)]
 class Hole(Model):
     """A round hole that is cut out of the part."""
 
-    at: Place = Field(description="its middle [x, y], in the drawing")
+    at: Place = Field(description="centre [x, y] in the drawing")
     diameter: AboveZero = Field(description="of the hole as cut")
 
 

@@ -416,7 +416,7 @@ def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
 def test_a_surface_that_rises_too_far_is_partial():
     result = solved("beam_end_effector", "analysis.surface.preload=3 mm")
     assert result.status is Status.PARTIAL
-    assert "the surface asks for a displacement of" in result.message
+    assert "the surface requires a displacement of" in result.message
     assert value(result, "surface_reach") < 12.3 * MM
 
 

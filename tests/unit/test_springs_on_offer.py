@@ -142,13 +142,13 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, told):
 @pytest.mark.parametrize(
     ("data", "told"),
     [
-        (b"name,stiffness [N/mm],name\nA,1,B\n", "'name' is there twice"),
+        (b"name,stiffness [N/mm],name\nA,1,B\n", "'name' appears twice"),
         (b"name,stiffness [N/mm]\nA,1\nA,2\n", "csv:3: there are two springs 'A' with different values"),
         (b"name,stiffness [N/mm]\n", "lists no spring"),
         (b"", "lists no spring"),
         (b"\xff\xfen\x00", "byte 1 is not UTF-8"),
-        (b"name;stiffness [N/mm]\nA;0,4\n", "cells are parted by commas"),
-        (b"name,stiffness [N/mm],fatigue\nA,1,x\n", "'fatigue' is no column"),
+        (b"name;stiffness [N/mm]\nA;0,4\n", "cells are separated by commas"),
+        (b"name,stiffness [N/mm],fatigue\nA,1,x\n", "'fatigue' is not a column"),
         (b"stiffness [N/mm]\n1\n", "csv:2: name: missing"),
     ],
 )
@@ -177,7 +177,7 @@ def test_two_different_springs_of_one_name_are_refused_in_a_list():
     ("block", "told"),
     [
         ({}, "needs 'stiffness'"),
-        ({"kind": "torsion", "stiffness": "1 N/mm"}, "'stiffness' is not what"),
+        ({"kind": "torsion", "stiffness": "1 N/mm"}, "kind 'torsion' has no 'stiffness'"),
         ({"wire": "1 mm", "coil": "10 mm"}, "belong together"),
         (
             {"kind": "compression", "stiffness": "1 N/mm", "free_length": "9 mm", "body_length": "12 mm"},

@@ -42,7 +42,7 @@ def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
     wide = "mechanism.bistable.width=20 mm"
     (one,) = told(DING, wide)
     assert "4.74 % more energy in the leaves at 4.263 mm" in one.message
-    assert "only 'analysis.fidelity: exact' counts it" in one.message
+    assert "only 'analysis.fidelity: exact' accounts for it" in one.message
     with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
         changed(DING, wide, "mechanism.wide_beams=true")
 

@@ -284,8 +284,8 @@ def _stress(spec: BeamSpec) -> list[Finding]:
     return [
         finding(
             "rescale_stress",
-            f"the stress at the end of the window is {format_short(stress, 'stress')}, allowable are "
-            f"{format_short(allowable, 'stress')}: they are reached at {format_short(place, 'length')}",
+            f"the stress at the end of the window is {format_short(stress, 'stress')}; the allowable stress, "
+            f"{format_short(allowable, 'stress')}, is reached at {format_short(place, 'length')}",
             "design.rescale.to_allowable_stress=true",
         )
     ]

@@ -125,7 +125,7 @@ def ending_of(solution: Solution) -> PathEnding:
     else:
         where = format_short(float(solution.motion[-1]), solution.motion_dimension)
     return PathEnding(
-        f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams go no further: allow stretching "
+        f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow: allow stretching "
         "('mechanism.axial: true')",
         (STRETCH,),
     )

@@ -55,8 +55,8 @@ DEFINITIONS = {
     "parasitic_rotation": ("angle", "largest rotation of the driven node, in the window"),
     "cross_stiffness": (
         "stiffness",
-        "smallest stiffness in the window of the driven node across the drive: force by displacement, held along the "
-        "drive, its rotation as its support has it; without what guides it across, of all copies",
+        "smallest stiffness of the driven node across the drive, in the window: force over displacement with the drive "
+        "held and the rotation as supported, without what guides the node across; of all copies",
     ),
     "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
     "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),

@@ -343,6 +343,6 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         at = ", ".join(format_short(one, "length") for one in spot.tolist())
         yield finding(
             "overstressed",
-            f"the stress reaches {format_short(largest, 'stress')} at ({at}), allowed are "
+            f"the stress reaches {format_short(largest, 'stress')} at ({at}); the allowable stress is "
             f"{format_short(allowable, 'stress')}",
         )

@@ -133,7 +133,7 @@ class BeamDesign(DesignBlock):
     optimise: Optimise | None = Field(None, description="node positions and beam shapes for a constant force")
 
     target: Target | None = Field(
-        None, description="instead of a constant force a curve over the window of 'optimise', with 'objective: ripple'"
+        None, description="a curve over the window of 'optimise' instead of a constant force, with 'objective: ripple'"
     )
 
     @model_validator(mode="after")
@@ -173,7 +173,7 @@ class Outputs(Model):
 
     nodes: tuple[str, ...] = Field((), max_length=100, description="nodes whose motion is reported: [tip]")
     reactions: tuple[str, ...] = Field(
-        (), max_length=100, description="nodes whose reactions are, of support and drive: [root]"
+        (), max_length=100, description="nodes whose reactions (of support and drive) are reported: [root]"
     )
     cross_stiffness: bool = Field(False, description="column with the stiffness of the driven node across the drive")
 
@@ -192,7 +192,7 @@ class BeamAnalysis(Analysis):
         description="model: bending only, with stretching, with stretching and shear, or the part as a planar "
         "solid; default: as in the mechanism, or 'reissner' for a search of shapes",
     )
-    solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
+    solid: SolidAnalysis = Field(SolidAnalysis(), description="settings of fidelity 'solid'")
     stress: Literal["bending", "total"] | None = Field(
         None, description="which stress is used; default: bending for inextensible beams, otherwise with the axial part"
     )

@@ -273,7 +273,7 @@ class Tip:
         low, high = (format_short(float(end), "length") for end in (self.x[0], self.x[-1]))
         return finding(
             "surface_out_of_reach",
-            f"the surface asks for a displacement of {asked} at {where}, the mechanism is solved for {low} to {high}",
+            f"the surface requires a displacement of {asked} at {where}, the mechanism is solved for {low} to {high}",
         )
 
 
@@ -355,7 +355,7 @@ def _findings(tip: Tip, found: Ride, allowable: float | None) -> Iterator[Findin
     if allowable is not None and stress is not None and stress > allowable:
         yield finding(
             "surface_stress_exceeded",
-            f"along the surface the largest stress is {format_short(stress, 'stress')}; allowable are "
+            f"along the surface the largest stress is {format_short(stress, 'stress')}; the allowable stress is "
             f"{format_short(allowable, 'stress')}",
         )
     if not len(found.place):

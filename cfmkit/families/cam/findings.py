@@ -59,7 +59,7 @@ FINDINGS = {
     "end_stop": "the end stops of the slider allow less travel than requested",
     "parts_touch": "the clearance between moving parts, or from them to the plate or its screws, is less than required",
     "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
-    "overwritten": "the design replaces a stated value of the profile by its own",
+    "overwritten": "the design replaces a stated value of the profile with its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "an old word in the specification, which the next version will not accept",
     "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or needs a vertical path",
@@ -134,7 +134,7 @@ def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
     if not said:
         return ()
     keys = ", ".join(f"'mechanism.{name}.friction'" for name in said)
-    return (finding("friction_left_out", f"{model} has the friction of rolling only: {keys} is left out"),)
+    return (finding("friction_left_out", f"{model} includes rolling friction only: {keys} is neglected"),)
 
 
 def _undercut(solution: Solution) -> Iterator[Finding]:
@@ -299,7 +299,9 @@ def findings_of_built(built: Built) -> list[Finding]:
     last = built.assembly.stroke
     if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
         span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
-        found.append(finding("part_measured", f"the flanks were measured for {span} of travel only, of {mm(last)}"))
+        found.append(
+            finding("part_measured", f"the flanks were measured for {span} of the travel only, which is {mm(last)}")
+        )
     return found
 
 
@@ -346,7 +348,7 @@ def _weak_registration(built: Built) -> Iterator[Finding]:
         names = ("the angle", "the shift in x", "the shift in y")
         parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
         taken = (
-            f"; and 0.01 mm more on both flanks would be mistaken for a cam that lies {mm(1e-5 * abs(lifted))} "
+            f"; 0.01 mm more material on both flanks would be mistaken for a cam that lies {mm(1e-5 * abs(lifted))} "
             f"{'lower' if lifted > 0 else 'higher'}: the flanks are steep"
         )
         yield finding(
@@ -369,7 +371,7 @@ def _doubtful_points(built: Built) -> Iterator[Finding]:
     if seen > TOO_NOISY * stated:
         yield finding(
             "noise_understated",
-            f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}; "
+            f"neighbouring points scatter like a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}; "
             "the difference is treated as waviness of the flank, and the force depends on its slope",
         )
     elif root_mean_square(errors_used(built)) < 0.8 * stated:

@@ -160,7 +160,9 @@ def _check_fit(found: Registration, name: str) -> None:
     errors = np.concatenate([error[use] for error, use in zip(found.errors, found.used, strict=True)])
     height = max(float(np.ptp(points[:, 1])) for points in found.points)
     if (rms := float(np.sqrt(np.mean(errors**2)))) > STRANGE * height:
-        raise DataError(f"{name}: laid on the design, the points are still {mm(rms)} (rms) off it; is it the same cam?")
+        raise DataError(
+            f"{name}: registered to the design, the points are still {mm(rms)} (rms) off it; is it the same cam?"
+        )
 
 
 def flanks_of(assembly: Assembly) -> tuple[DesignFlank, DesignFlank]:

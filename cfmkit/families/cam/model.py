@@ -190,7 +190,7 @@ def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
             finding(
                 "outside_profile",
                 f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
-                "cut a longer profile ('mechanism.profile.stroke') or ask for less ('analysis.travel')",
+                "cut a longer profile ('mechanism.profile.stroke') or request less ('analysis.travel')",
             )
         )
     return tuple(found)

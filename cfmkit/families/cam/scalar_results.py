@@ -98,16 +98,16 @@ DEFINITIONS = {
         f"loop_{what}_{kind}": (
             "energy" if what == "energy" else "ratio",
             (
-                f"energy that {words} over the window, up and down; the four kinds add up to the loop's area"
+                f"energy that {words} over the window, up and down; the four losses add up to the loop's area"
                 if what == "energy"
-                else f"the share of the loop's area that {words}"
+                else f"share of the loop's area that {words}"
             ),
         )
         for kind, words in {
-            "rolling": "rolling on the cam takes",
-            "bearings": "the rollers' bearings take",
-            "pins": "slider pin and spring hooks take",
-            "guide": "the slider's guide takes",
+            "rolling": "rolling on the cam dissipates",
+            "bearings": "the rollers' bearings dissipate",
+            "pins": "slider pin and spring hooks dissipate",
+            "guide": "the slider's guide dissipates",
         }.items()
         for what in ("energy", "share")
     },
@@ -119,8 +119,8 @@ DEFINITIONS = {
     "bearing_load_max": ("force", "largest radial load of one roller bearing"),
     "bearing_life": (
         "count",
-        "strokes up and down that 90 % of single bearings outlast, L10 = (C/P)^3, for roller bearings (C/P)^(10/3), in "
-        "million turns, with the mean of P^3 over the turns of a stroke [ISO 281]",
+        "strokes up and down that 90 % of single bearings survive: L10 = (C/P)^3 million revolutions, for roller "
+        "bearings (C/P)^(10/3), with the mean of P^3 over the revolutions of a stroke [ISO 281]",
     ),
     "bearing_static_safety": ("factor", "static rating C0 of a bearing over its largest load [ISO 76]"),
     "contact_pressure_max": (
@@ -139,7 +139,7 @@ DEFINITIONS = {
     "moving_mass_max": ("mass", "largest mass that, fixed to the slider, would have the same kinetic energy"),
     "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the static force at the same position"),
     "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes sign"),
-    "force_peak_over_slow": ("ratio", "largest F/F_1 - 1, F_1 the force of the same motion within 1 s [SS, Fig. 14]"),
+    "force_peak_over_slow": ("ratio", "largest F/F_1 - 1, F_1 the force of the same motion in 1 s [SS, Fig. 14]"),
     "angle_error_effect": (
         "ratio",
         "static force at the end of the motion over that without the angular error, minus 1 [SS, Fig. 15 and 16]",

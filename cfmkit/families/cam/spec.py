@@ -35,8 +35,8 @@ class Springs(Model):
     rest_length: PositiveLength | None = Field(
         None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
     )
-    max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
-    name: str | None = Field(None, min_length=1, description="of the spring as it is bought, for the list of parts")
+    max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed for a spring")
+    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
     wound: SpringWire | None = Field(
         None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
     )
@@ -118,11 +118,13 @@ class Plate(Model):
     """The plate that the cam is cut from: what closes the contour beside the flanks."""
 
     top_margin: NonNegativeLength = Field(0.010, description="plate above the end of the flanks")
-    base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
+    base_height: NonNegativeLength = Field(
+        0.040, description="height of the tab below the cam that carries it; 0 for none"
+    )
     base_width: PositiveLength | None = Field(None, description="width of the tab; default: gap between the rollers")
-    hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
+    hole_diameter: NonNegativeLength = Field(0.0066, description="diameter of the fixing holes; 0 for none")
     tool_radius: NonNegativeLength = Field(
-        0.0, description="of the tool that cuts it: inside corners beside the tab are rounded with it; 0: sharp"
+        0.0, description="radius of the tool that cuts it: rounds the inside corners beside the tab; 0: sharp"
     )
     thickness: PositiveLength | None = Field(
         None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if stated"
@@ -132,8 +134,8 @@ class Plate(Model):
 class Stops(Model):
     """Where the slider is stopped, as travel from the start of the roller path."""
 
-    lower: NonNegativeLength = Field(0.0, description="lowest place: the curve begins there")
-    upper: PositiveLength | None = Field(None, description="highest place; default: none but the end of the flank")
+    lower: NonNegativeLength = Field(0.0, description="lowest position: the curve begins there")
+    upper: PositiveLength | None = Field(None, description="highest position; default: only the end of the flank")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -179,7 +181,7 @@ class Bearings(Model):
     )
     kind: Literal["ball", "roller"] = Field("ball", description="exponent of the life: 3, or 10/3")
     per_roller: int = Field(1, ge=1, le=16, description="bearings side by side in one roller; they share its load")
-    name: str | None = Field(None, min_length=1, description="designation, for the list of bought parts")
+    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
 
 
 MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
@@ -213,9 +215,7 @@ class Left(Model):
 
     brace_length: PositiveLength | None = Field(None, description="left brace")
     roller_radius: PositiveLength | None = Field(None, description="left roller")
-    profile: Profile | None = Field(
-        None, description="complete left flank: values that are left out follow the left side"
-    )
+    profile: Profile | None = Field(None, description="complete left flank; omitted values follow the left side")
     masses: LeftMasses | None = Field(None, description="of the left brace and roller")
 
     @property
@@ -249,18 +249,18 @@ class Mechanism(Model):
     masses: Masses | None = Field(None, description="needed for gravity and for dynamics")
     profile: Profile = Field(description="the cam as cut")
     left: Left | None = Field(None, description="values that differ on the left side; for the dynamic model")
-    errors: Errors | None = Field(None, description="flanks at a wrong angle; for the dynamic model")
+    errors: Errors | None = Field(None, description="angular errors of the flanks; for the dynamic model")
     plate: Plate = Field(default_factory=Plate, description="plate that closes the contour of the part")
     contact: Contact | None = Field(None, description="for the contact pressure")
     pins: Pins | None = Field(None, description="slider pin and spring hooks: their friction")
     bearings: Bearings | None = Field(None, description="of the rollers: their friction and life")
     guide: Guide | None = Field(None, description="of the slider: its friction")
     stops: Stops | None = Field(None, description="end stops of the slider")
-    envelope: Envelope | None = Field(None, description="sizes of the moving parts, for their distances")
+    envelope: Envelope | None = Field(None, description="sizes of the moving parts, for their clearances")
     mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
         None,
-        description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; if this is "
-        "stated, weight acts; with gravity alone the direction is up",
+        description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; if stated, "
+        "weight acts; if only gravity is requested, the slider moves up",
     )
     safety_factor: SafetyFactor = 1.0
 
@@ -331,7 +331,7 @@ class CamDesign(DesignBlock):
         None, description="target force, weight included if gravity is on"
     )
     target: Target | None = Field(
-        None, description="instead of a constant force a curve of forces over travel, from 0 to the stroke"
+        None, description="a curve of force over travel, from 0 to the stroke, instead of a constant force"
     )
     stroke: PositiveLength = Field(description="target travel of the slider")
     choose: Literal["force-constant", "stiffness", "catalogue", "preload"] = Field(
@@ -346,7 +346,7 @@ class CamDesign(DesignBlock):
         (), description="springs to pick from: a list, a CSV file beside the specification, or `generic`"
     )
     spring_life: Life | None = Field(
-        None, description="cycles that a spring of the catalogue must last; one whose life is not known is not taken"
+        None, description="cycles that a spring of the catalogue must last; one of unknown life is not chosen"
     )
     friction: DesignFriction = Field(
         0.0,

@@ -41,7 +41,7 @@ FINDINGS = {
     "straight_start": "the chain is exactly straight: it buckles, and the side is not determined",
     "kink_too_small": "the kink that determines the buckling side is smaller than the process can make",
     "long_run_in": "the kink is so large that the force needs much of the travel to reach its level",
-    "meets_itself": "the chain would pass through its own anchor, or cross itself: the curve ends before",
+    "meets_itself": "the chain would pass through its own anchor, or cross itself: the curve ends before that",
     "wrong_branch": "the chain bends to the side opposite to the requested one: the force differs",
     "unstable": "the equilibrium is unstable even with the slider held: the chain would snap",
     "limit_point": "there is no equilibrium for a further displacement of the slider",

@@ -17,7 +17,7 @@ from cfmkit.stock.spec import Guide, Pins, sheet_faults
 
 
 class Mechanism(Printed):
-    """A crank about a fixed pivot, a coupler, a slider on a straight way; a spring at each joint."""
+    """A crank about a fixed pivot, a coupler, a slider on a straight guide; a spring at each joint."""
 
     crank_length: PositiveLength = Field(description="r1, pivot to crank pin")
     coupler_length: PositiveLength | None = Field(
@@ -34,7 +34,8 @@ class Mechanism(Printed):
         None, description="crank angle from the guide's direction with all springs relaxed"
     )
     unloaded_offset: Angle | None = Field(
-        None, description="the same from the stretched position, where 0 is exact; instead of 'unloaded_angle'"
+        None,
+        description="the same, measured from the stretched position (0: exactly there); instead of 'unloaded_angle'",
     )
     springs: Springs = Field(default_factory=Springs, description="rates of one leg; default: 0 each")
     legs: int = Field(1, ge=1, le=1000, description="equal legs in parallel on one crank, or on one slider")
@@ -94,9 +95,9 @@ class CrankAnalysis(PrintedAnalysis):
     fidelity: Literal["prb", "lumped", "beam", "solid"] | None = Field(
         None,
         description="rigid links with springs, flexures, or a strip; default: the last of these that the mechanism "
-        "has. Or that one as drawn, as a planar solid",
+        "has; solid: flexures or strip as drawn, as a planar solid",
     )
-    solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
+    solid: SolidAnalysis = Field(SolidAnalysis(), description="settings of fidelity 'solid'")
 
     @model_validator(mode="after")
     def _ranges_increase(self) -> Self:

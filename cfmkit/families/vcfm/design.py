@@ -94,7 +94,7 @@ def _attempt(spec: VcfmSpec) -> Design:
     if target.catalogue or spec.mechanism.springs is not None:
         return with_bought_springs(spec, target)
     if allowable is None:
-        message = "a design needs the stress that is allowed: add 'mechanism.material.yield_strength'"
+        message = "a design needs an allowable stress: add 'mechanism.material.yield_strength'"
         return Design(None, Status.INVALID, message)
     if target.level <= 0:
         told = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"

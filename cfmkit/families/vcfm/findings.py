@@ -323,8 +323,8 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
         hint = "" if solution.spec.analysis.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
         yield finding(
             "asymmetric_buckling",
-            f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and lose their straight "
-            f"line{hint}. Use two Vs at a distance, or a guide",
+            f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and their force "
+            f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
             "mechanism.bistable.guided=true",
         )
     if about.width < 2.0 * about.thickness:
@@ -337,7 +337,9 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 def _width(solution: Solution) -> Iterator[Finding]:
     exact = solution.spec.analysis.fidelity == "exact"
-    cures, hint = (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' counts it")
+    cures, hint = (
+        (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' accounts for it")
+    )
     for name, share, place in solution.hindered_curling:
         if told := too_soft(share, f"in the {name} at {mm(place)}"):
             yield finding("wide_beam", told + hint, *cures)
@@ -347,7 +349,7 @@ def _imperfect(solution: Solution) -> Iterator[Finding]:
     about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity in TRACED
     share = about.waviness / about.thickness
     if share > WAVY or (about.waviness and not exact):
-        told = "is counted in" if exact else "is left out: only 'analysis.fidelity: exact' has it"
+        told = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
         effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
         yield finding(
             "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told}{effect}"
@@ -380,7 +382,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
         much = (
             f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
             f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
-            "pseudo-rigid bodies do not: the force is overestimated, by up to several times"
+            "pseudo-rigid bodies cannot: the force is overestimated, by up to several times"
             if solution.parts.leaf.flexures_buckle
             else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
         )

@@ -97,13 +97,13 @@ class BoughtSprings(Model):
         0.0, description="force at which an extension spring begins to open"
     )
     max_elongation: PositiveLength | None = Field(
-        None, description="largest elongation (compression) that a spring may see"
+        None, description="largest elongation (or compression) allowed for a spring"
     )
     free_length: PositiveLength | None = Field(
         None, description="relaxed length, for drawings and for the space required"
     )
     outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
-    name: str | None = Field(None, min_length=1, description="by which it is bought, for the list of parts")
+    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
     wound: SpringWire | None = Field(
         None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
     )
@@ -182,7 +182,8 @@ class Frame(Model):
     spacing: PositiveLength = Field(0.020, description="between the two Vs on the shuttle")
     block: PositiveLength = Field(0.006, description="width of walls, corners and blocks")
     corner: PositiveLength = Field(
-        0.012, description="height of the diamond's rigid corners: it closes at about this and twice its leaves' rise"
+        0.012,
+        description="height of the diamond's rigid corners: compressed by this plus twice its leaves' rise, it closes",
     )
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
@@ -199,8 +200,8 @@ class Mechanism(Model):
     bistable: Bistable
     wide_beams: bool = Field(
         False,
-        description="whether wide leaves stiffen as their curling across the width is hindered; exact model only, "
-        "clamped ends left out",
+        description="whether wide leaves are stiffer because they cannot curl across their width; exact model only, "
+        "the effect of clamped ends is left out",
     )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: VcfmPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes, frame")
@@ -252,28 +253,28 @@ class VcfmDesign(DesignBlock):
 
     force: Annotated[Force, Field(gt=0)] | None = Field(None, description="constant force without preload")
     target: Target | None = Field(
-        None, description="instead of a constant force a curve over the displacement, best a line ('stiffness')"
+        None, description="a curve over the displacement instead of a constant force, preferably a line ('stiffness')"
     )
     adjustment: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="increase of the force by the preload; default: no preload, then state 'rise'"
     )
     stroke: PositiveLength = Field(description="travel over which it is constant")
-    preload: PositiveLength | None = Field(None, description="preload that raises it by that much")
+    preload: PositiveLength | None = Field(None, description="preload that increases the force by that much")
     rise: PositiveLength | None = Field(
         None,
-        description="of the leaves, h; instead of 'preload'. Of bought springs, whose rate decides it: the largest",
+        description="of the leaves, h; instead of 'preload'; with bought springs, whose rate determines it, its limit",
     )
     catalogue: Catalogue = Field(
         (),
         description="springs to pick instead of a diamond: a list, a CSV file beside the specification, or `generic`",
     )
     spring_room: PositiveLength | None = Field(
-        None, description="place for a spring of the catalogue: a longer one, relaxed, is not taken"
+        None, description="space for a spring of the catalogue: one that is longer when relaxed is not chosen"
     )
     spring_life: Life | None = Field(
-        None, description="cycles that a spring of the catalogue must last; one whose life is not known is not taken"
+        None, description="cycles that a spring of the catalogue must last; one of unknown life is not chosen"
     )
-    leaf_length: PositiveLength | None = Field(None, description="L2 to take; default: the shortest within the stress")
+    leaf_length: PositiveLength | None = Field(None, description="L2; default: the shortest that the stress allows")
     min_thickness: PositiveLength | None = Field(None, description="thinnest leaf that can be made")
     max_span: PositiveLength | None = Field(
         None, description="space across the motion between the walls, 2 L cos(theta)"
@@ -352,7 +353,7 @@ class VcfmAnalysis(Analysis):
         description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
         "spring as drawn, as planar solids; for hybrid leaves the default is exact",
     )
-    solid: SolidAnalysis = Field(SolidAnalysis(poses=41), description="of fidelity 'solid'; default: 41 poses")
+    solid: SolidAnalysis = Field(SolidAnalysis(poses=41), description="settings of fidelity 'solid'; default: 41 poses")
     branch: Literal["stable", "primary"] = Field(
         "stable",
         description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",

@@ -48,7 +48,7 @@ _DIMENSIONS = (
     Dimension("force", "N", "force", "50 N"),
     Dimension("torque", "N*mm", "moment of a force", "1200 N*mm", up=1e3),
     Dimension("energy", "N*mm", "energy, work, area of a force-displacement loop", "310 N*mm", up=1e3),
-    Dimension("stiffness", "N/mm", "force per length of stretch", "0.69 N/mm", down=1e3),
+    Dimension("stiffness", "N/mm", "force per displacement", "0.69 N/mm", down=1e3),
     Dimension("rotational_stiffness", "N*mm/rad", "torque per angle", "500 N*mm/rad", up=1e3),
     Dimension("stress", "MPa", "stress, pressure, elastic modulus", "2100 MPa", down=1e6),
     Dimension("mass", "kg", "mass", "0.25 kg"),
@@ -68,8 +68,8 @@ _DIMENSIONS = (
     Dimension("angular_acceleration", "deg/s^2", "angular velocity per time", "90 deg/s^2", up=_DEGREES),
     Dimension("damping", "N*s/mm", "force per velocity", "0.01 N*s/mm", down=1e3),
     Dimension("rotational_damping", "N*mm*s/rad", "torque per angular velocity", "2 N*mm*s/rad", up=1e3),
-    Dimension("factor", "1", "how many times something is something else", "1.5"),
-    Dimension("count", "1", "a number of things", "2"),
+    Dimension("factor", "1", "multiple of a value", "1.5"),
+    Dimension("count", "1", "number of items", "2"),
     Dimension("text", "", "a word, not a number", "load"),
 )
 

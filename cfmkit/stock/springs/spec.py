@@ -31,10 +31,11 @@ class WireLimits(Model):
 
     max_stress: Annotated[Stress, Positive] | None = Field(
         None,
-        description="largest stress allowed in the wire, with the factor of its curvature; needs wire, coil, turns",
+        description="allowable stress in the wire, Wahl's curvature factor included; needs wire, coil and turns",
     )
     fatigue: Fatigue | None = Field(
-        None, description="S-N points or Basquin's line of the wire in that stress, for the life; needs the same"
+        None,
+        description="S-N points or Basquin's line of the wire, in terms of that stress, for the life; needs the same",
     )
 
 
@@ -85,7 +86,7 @@ class CatalogueSpring(WireLimits):
     """A spring that can be bought."""
 
     name: str = Field(min_length=1, description="part number")
-    kind: Literal["extension", "compression", "torsion"] = Field("extension", description="what it is loaded by")
+    kind: Literal["extension", "compression", "torsion"] = Field("extension", description="how it is loaded")
     stiffness: Annotated[Stiffness, Positive] | None = Field(
         None, description="of one spring; default: from wire, coil and turns"
     )
@@ -100,18 +101,22 @@ class CatalogueSpring(WireLimits):
         YOUNGS_MODULUS, description="of a torsion spring's wire; default: music wire"
     )
     free_length: Annotated[Length, Positive] | None = Field(
-        None, description="relaxed, between the hooks; a spring that is longer than its place is not chosen"
+        None, description="relaxed, between the hooks; a spring longer than the space for it is not chosen"
     )
-    body_length: Annotated[Length, Positive] | None = Field(None, description="of the coil; default: turns on turns")
-    outer_diameter: Annotated[Length, Positive] | None = Field(None, description="of the coil; default: coil and wire")
+    body_length: Annotated[Length, Positive] | None = Field(
+        None, description="of the coil; default: with the turns touching"
+    )
+    outer_diameter: Annotated[Length, Positive] | None = Field(
+        None, description="of the coil; default: from coil and wire"
+    )
     initial_tension: Annotated[Force, Field(ge=0)] = Field(
         0.0, description="force at which an extension spring begins to open"
     )
     max_elongation: Annotated[Length, Positive] | None = Field(
-        None, description="largest elongation (compression) allowed"
+        None, description="largest elongation (or compression) allowed"
     )
     max_angle: Annotated[Angle, Positive] | None = Field(None, description="largest angle of a torsion spring")
-    max_torque: Annotated[Torque, Positive] | None = Field(None, description="the same as its largest couple")
+    max_torque: Annotated[Torque, Positive] | None = Field(None, description="or its largest torque")
     life: Life | None = None
     counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
 
@@ -120,14 +125,14 @@ class CatalogueSpring(WireLimits):
         stated = self.rate if self.kind == "torsion" else self.stiffness
         other = "'stiffness'" if self.kind == "torsion" else "'rate'"
         if (self.stiffness if self.kind == "torsion" else self.rate) is not None:
-            raise ValueError(f"{other} is not what a spring of kind {self.kind!r} has")
+            raise ValueError(f"a spring of kind {self.kind!r} has no {other}")
         given = [self.wire, self.coil, self.turns]
         if any(item is not None for item in given) and None in given:
             raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
         _is_a_coil(self.wire, self.coil)
         if (self.max_stress or self.fatigue) and self.wound is None:
             raise ValueError(
-                "'max_stress' and 'fatigue' are of the stress in the wire: give 'wire', 'coil' and 'turns'"
+                "'max_stress' and 'fatigue' refer to the stress in the wire: give 'wire', 'coil' and 'turns'"
             )
         if stated is None and self.wound is None:
             word = "rate" if self.kind == "torsion" else "stiffness"
@@ -135,7 +140,7 @@ class CatalogueSpring(WireLimits):
         body = self.body_length or (self.wound.body_length if self.wound else None)
         if self.kind == "compression" and body and self.free_length is not None and self.free_length <= body:
             raise ValueError(
-                "'free_length' of a compression spring must be larger than its 'body_length', turns closed"
+                "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
             )
         if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
             raise ValueError(_disagree(self.wound.rate / stated))
@@ -294,7 +299,7 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
     except csv.Error as error:
         raise DataError(f"{source}:{rows.line_num}: {error}") from None
     if not found:
-        raise DataError(f"{source}: lists no spring: a header and a line for each are needed")
+        raise DataError(f"{source}: lists no spring; a header and one line per spring are needed")
     yield from found
 
 
@@ -317,11 +322,11 @@ def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | No
         head = _HEADER.fullmatch(cell)
         name = head["name"] if head else cell.strip()
         if name not in allowed:
-            hint = "; cells are parted by commas" if ";" in name else ""
+            hint = "; cells are separated by commas" if ";" in name else ""
             listed = ", ".join(allowed)
-            raise DataError(f"{source}:1: {name!r} is no column of a list of springs{hint}; columns are {listed}")
+            raise DataError(f"{source}:1: {name!r} is not a column of a list of springs{hint}; columns are {listed}")
         if name in dict(found):
-            raise DataError(f"{source}:1: the column {name!r} is there twice")
+            raise DataError(f"{source}:1: the column {name!r} appears twice")
         found.append((name, head["unit"] if head else None))
     return found
 

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 WIRE_DEFINITIONS = {
     "wire_stress_max": (
         "stress",
-        "largest stress in the wire of a bought spring over the travel, with the factor of its curvature (Wahl): "
-        "shear, in a torsion spring bending",
+        "largest stress in the wire of a bought spring over the travel, with Wahl's curvature factor: shear, or "
+        "bending in a torsion spring",
     ),
     "spring_life": (
         "count",

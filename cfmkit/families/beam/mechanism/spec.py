@@ -210,7 +210,7 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 
 class Mechanism(Model):
-    """A planar network of slender beams, and what is done to it."""
+    """A planar network of slender beams, its loads and its drive."""
 
     material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
     safety_factor: SafetyFactor = 1.0
@@ -222,7 +222,7 @@ class Mechanism(Model):
     shear: bool = Field(False, description="whether beams shear, too")
     wide_beams: bool = Field(
         False,
-        description="whether wide beams stiffen as their curling across the width is hindered; clamped ends, which "
+        description="whether wide beams are stiffer because they cannot curl across their width; clamped ends, which "
         "stiffen them further, are left out",
     )
     closure: Literal["rotscale", "chain", "raw"] = Field(

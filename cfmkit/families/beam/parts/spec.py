@@ -76,11 +76,12 @@ class NodeSpec(Model):
     support: Literal["free", "clamped", "pinned", "guided", "roller", "parallel"] = Field(
         "free",
         description=(
-            "guided slides along its direction and does not turn, a roller does turn; parallel moves, but does not turn"
+            "guided: slides along its direction without turning; roller: slides and turns; parallel: moves without "
+            "turning"
         ),
     )
     direction: Angle | None = Field(None, description="along which a guided node or a roller slides; from the x axis")
-    moved: Moved | None = Field(None, description="a prescribed displacement of what the support holds")
+    moved: Moved | None = Field(None, description="prescribed displacements of what the support holds")
     mass: Annotated[Mass, Field(ge=0)] | None = Field(
         None, description="mass of a part fixed to the node, for natural frequencies; it has no weight"
     )

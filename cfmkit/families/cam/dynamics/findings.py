@@ -161,7 +161,7 @@ def _friction(moved: MotionSolution) -> Iterator[Finding]:
         yield finding(
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
-            f"{moved.spec.mechanism.rolling_friction:g} is left out; 'analysis.dynamics.method: inverse' has it",
+            f"{moved.spec.mechanism.rolling_friction:g} is neglected; 'analysis.dynamics.method: inverse' includes it",
         )
 
 
@@ -171,7 +171,7 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
         yield finding(
             "friction_left_out",
             "the nine-coordinate model has no weight across the slider's way, which 'mechanism.mounting' implies; "
-            "'analysis.dynamics.method: inverse' has it",
+            "'analysis.dynamics.method: inverse' includes it",
         )
 
 

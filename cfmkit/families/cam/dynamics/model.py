@@ -336,7 +336,7 @@ def _said(name: str, known: Mapping[str, FloatArray], machine: Machine, when: st
         ),
         "spring_slack": lambda: finding(
             "spring_slack",
-            f"the springs go slack {when}: they get up to {mm(-worst)} shorter than their rest length and hold the "
+            f"the springs go slack {when}: they become up to {mm(-worst)} shorter than their rest length and hold the "
             f"rollers no longer; use shorter springs ('mechanism.rest_half_width', here {mm(machine.rest_length / 2)})",
         ),
     }

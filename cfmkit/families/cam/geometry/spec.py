@@ -54,23 +54,24 @@ class Profile(Model):
     )
     slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
         1.0,
-        description="1; more if the profile carries the weight of the moving parts, less if they hang down",
+        description="1, or more if the profile carries the weight of the moving parts, less if they hang down",
     )
     curve: ProfileCurve | None = Field(
         None, description="force over travel, as shares of 4 K A, that it is cut for; default: constant"
     )
     stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
-    brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
+    brace_length: PositiveLength | None = Field(None, description="length of the brace it is cut for")
     rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
-    roller_radius: PositiveLength | None = Field(None, description="roller it is cut for")
-    preload: NonNegativeLength | None = Field(None, description="elongation of the springs at the start, cut for")
+    roller_radius: PositiveLength | None = Field(None, description="radius of the roller it is cut for")
+    preload: NonNegativeLength | None = Field(None, description="elongation of the springs at the start it is cut for")
     offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
     file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
     noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")
     registration: Literal["auto", "motion", "width", "datum"] | None = Field(
         None,
-        description="how the points in `file` are laid on the design: by a motion, by a motion and one error of width, "
-        "not at all because they are in the part's datum; auto, the default: with the width where the points tell it",
+        description="how the points in `file` are registered to the design: by a motion, by a motion and one error of "
+        "width, or not at all because they are in the part's datum; auto, the default: with the width if the points "
+        "determine it",
     )
 
     @field_validator("file", mode="wrap")
@@ -84,5 +85,5 @@ class Profile(Model):
         if (self.file is None) != (self.noise is None):
             raise ValueError("'file' and 'noise' belong together: how exact are the measured points?")
         if self.registration is not None and self.file is None:
-            raise ValueError("'registration' says how measured points are laid on the design: it needs a 'file'")
+            raise ValueError("'registration' is about measured points: it needs a 'file'")
         return self

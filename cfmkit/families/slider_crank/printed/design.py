@@ -187,9 +187,9 @@ def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
         "elements_force": (
             judged.opinion.force,
             "ratio",
-            "most that corotational elements differ in force in the audit",
+            "largest relative difference of corotational elements in force, in the audit",
         ),
-        "elements_stress": (judged.opinion.stress, "ratio", "most that they differ in stress in the audit"),
+        "elements_stress": (judged.opinion.stress, "ratio", "the same in stress"),
     }
     if _compared(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
@@ -312,7 +312,7 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     thickness, width = found
     low, high = ranges.form[0] / 1e3
     if not low <= thickness <= high:
-        text = f"the stress asks for a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
+        text = f"the stress requires a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
         text += f"{mm(low)} to {mm(high)}"
         return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:

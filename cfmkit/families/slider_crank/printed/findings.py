@@ -140,7 +140,7 @@ def _guide(solution: Solution) -> Iterator[Finding]:
         side = float(abs(solution.side_force[worst]))
         yield finding(
             "side_force",
-            f"the guide carries up to {newton(side)} across the way, {100 * share[worst]:.0f} % of the "
+            f"the guide carries up to {newton(side)} across the travel, {100 * share[worst]:.0f} % of the "
             f"force: friction of 0.1 there changes it by {newton(0.1 * side)}; a mirrored pair on one "
             "slider cancels it",
             "mechanism.copies=mirrored",

@@ -29,9 +29,9 @@ DEFINITIONS = {
     "stress_place": ("length", "position of the largest stress along the centre line from the clamped end"),
     "stress_stroke": ("length", "travel at which the allowable stress is reached"),
     "width_ratio": ("ratio", "smallest width over thickness"),
-    "recheck_force": ("ratio", "largest difference of the force by corotational elements, as a share"),
+    "recheck_force": ("ratio", "largest relative difference between the force and that of corotational elements"),
     **OF_SOLIDS,
-    "recheck_stress": ("ratio", "largest difference of the stress by corotational elements, as a share"),
+    "recheck_stress": ("ratio", "largest relative difference between the stress and that of corotational elements"),
 }
 
 

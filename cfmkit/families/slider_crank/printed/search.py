@@ -384,7 +384,7 @@ def infeasible(found: FoundStrip) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
     descent, program, task = found.descent, found.program, found.task
     if descent.ending is SearchEnding.NO_ANSWER:
-        why = "could not begin: the first strip has no equilibrium over 'design.travel'; ask for less of it, or "
+        why = "could not begin: the first strip has no equilibrium over 'design.travel'; reduce it, or "
         why += "for other ranges in 'design.beam'"
         return no_design(finding("target_unreachable", f"the search {why}"))
     if descent.ending is SearchEnding.OUT_OF_TIME:

@@ -282,6 +282,6 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding(
             "overstressed",
             f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at ({at}) of the drawing, at "
-            f"{format_short(float(course.travel[worst]), 'length')} of travel; allowed are "
+            f"{format_short(float(course.travel[worst]), 'length')} of travel; the allowable stress is "
             f"{format_short(limit, 'stress')}",
         )

@@ -38,7 +38,7 @@ class Flexures(Model):
     """The three flexures of one leg; rigid links between them."""
 
     pivot: FlexureSpec = Field(description="between ground and crank")
-    crank_pin: FlexureSpec = Field(description="between crank and coupler; straight, the chord across the kink")
+    crank_pin: FlexureSpec = Field(description="between crank and coupler; straight, along the chord across the kink")
     slider_pin: FlexureSpec = Field(description="between coupler and slider")
 
     @property
@@ -56,13 +56,16 @@ class StripSpec(Model):
     )
     shares: tuple[tuple[Share, ...], ...] | None = Field(
         None,
-        description="where the thicknesses between the first and the last are: for each straight piece, shares of it",
+        description="positions of the thicknesses between the first and the last: for each straight piece, shares of "
+        "its length",
     )
     flexure_length: PositiveLength | None = Field(
         None, description="of the flexures whose ends the centre line passes; default: 'flexures', or a fifth of r1"
     )
     centreline: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(
-        None, description="corners [x, y] from the ground to the slider instead, the pivot at [0, 0]"
+        None,
+        description="corners [x, y] of the line from ground to slider, the pivot at [0, 0]; default: through the "
+        "flexures",
     )
     offset: Length = Field(
         0.0, description="by how much the printed part is thicker than drawn, everywhere; negative: thinner"
@@ -110,12 +113,14 @@ class Printed(Model):
         None, description="of 'flexures' or 'beam': a name from `show materials`, or {youngs_modulus, ...}"
     )
     safety_factor: SafetyFactor = 1.0
-    flexures: Flexures | None = Field(None, description="small flexures at the joints, rigid links between: 'lumped'")
+    flexures: Flexures | None = Field(
+        None, description="small flexures at the joints, with rigid links between them: fidelity 'lumped'"
+    )
     beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
     wide_beams: bool = Field(
         False,
-        description="whether a wide strip or flexure stiffens as its curling across the width is hindered; clamped "
-        "ends left out",
+        description="whether a wide strip or flexure is stiffer because it cannot curl across its width; the effect of "
+        "clamped ends is left out",
     )
     process: Process | None = Field(None, description="deprecated: 'position' and 'least_feature' of 'part.process'")
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
@@ -151,7 +156,7 @@ class FlexureDesign(Model):
     """Sections of the flexures from the springs' rates and the stress: closed forms, then the exact force."""
 
     length: PositiveLength | None = Field(None, description="of all three; default: as stated, or a fifth of r1")
-    exact: bool = Field(True, description="correct the closed forms until the beams have the force and the stress")
+    exact: bool = Field(True, description="correct the closed forms until the beam model has the force and the stress")
 
 
 class StripDesign(Model):
@@ -164,11 +169,11 @@ class StripDesign(Model):
         "stroke", description="longest stroke within `tolerance`, or smallest deviation over `travel`"
     )
     nodes: int = Field(17, ge=2, le=65, description="thicknesses of the shape 'even'")
-    thickness: LengthRange | None = Field(None, description="smallest and largest everywhere")
-    thicknesses: tuple[LengthRange, ...] | None = Field(None, description="or for each of them")
+    thickness: LengthRange | None = Field(None, description="smallest and largest thickness")
+    thicknesses: tuple[LengthRange, ...] | None = Field(None, description="the same for each of the thicknesses")
     shares: tuple[ShareRange, ...] | None = Field(None, description="ranges of 'beam.shares'; default: fixed")
     width: PositiveLength | LengthRange | None = Field(
-        None, description="one value, or a range to choose from; default: as the beam has it"
+        None, description="one value, or a range to choose from; default: that of the beam"
     )
     start: PositiveLength = Field(1e-3, description="where the band of the force begins: the run-in is before it")
     longest: PositiveLength | None = Field(

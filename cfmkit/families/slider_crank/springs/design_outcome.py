@@ -111,8 +111,8 @@ def cannot_hold(task: Task) -> Finding:
     if wanted.angle_travel is not None and not wanted.hold_stiffness:
         text = (
             f"no springs give an adjustment of {format_short(wanted.adjustment or 0.0, 'force')} when the unloaded "
-            f"angle is turned by {format_short(wanted.angle_travel, 'angle')}, within 'design.max_rates'; ask for less "
-            "'design.adjustment', or more 'design.angle_travel'"
+            f"angle is turned by {format_short(wanted.angle_travel, 'angle')}, within 'design.max_rates'; reduce "
+            "'design.adjustment', or increase 'design.angle_travel'"
         )
         return finding("infeasible_targets", text)
     text = (
@@ -134,7 +134,7 @@ def nowhere(task: Task) -> Finding:
         return finding("infeasible_targets", f"{text}; change it, its window, or 'design.springs'")
     if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
         other = format_short(-task.wanted.size, "torque")
-        text = f"in the window torsion springs turn the crank the other way; ask for 'design.torque: {other}'"
+        text = f"in the window torsion springs turn the crank the other way; request 'design.torque: {other}'"
         return finding("infeasible_targets", text)
     if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
         text = "torsion springs alone give no constant torque next to the stretched position; "

@@ -61,10 +61,10 @@ DEFINITIONS = {
         "K_P kappa^2 phi^2/(2 k), k = K_A + (1 + r1/r2)^2 K_B + (r1/r2)^2 K_C, kappa = r1 (1 + r1/r2)/cos t2, phi the "
         "lead of the unloaded position; for small phi above 4 bistable, 1 zero stiffness, below 1 positive",
     ),
-    "loop_energy_pins": ("energy", "energy that the pins take over the window, back and forth"),
-    "loop_energy_guide": ("energy", "energy that the slider's guide takes over the window, back and forth"),
-    "loop_share_pins": ("ratio", "the share of the loop's area that the pins take"),
-    "loop_share_guide": ("ratio", "the share of the loop's area that the slider's guide takes"),
+    "loop_energy_pins": ("energy", "energy that the pins dissipate over the window, back and forth"),
+    "loop_energy_guide": ("energy", "energy that the slider's guide dissipates over the window, back and forth"),
+    "loop_share_pins": ("ratio", "share of the loop's area that the pins dissipate"),
+    "loop_share_guide": ("ratio", "share of the loop's area that the slider's guide dissipates"),
     "force_per_anchor": (
         "stiffness",
         "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "

@@ -39,7 +39,7 @@ SAME = 1e-9
 """An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
 
 NEXT_TO_START = 1e-9
-"""Share of the motion at which forces with friction are asked for at its start: a stretched start itself is 0/0."""
+"""Share of the motion at which forces with friction are computed at its start: a stretched start itself is 0/0."""
 
 EDGE = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""

@@ -26,7 +26,7 @@ JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
 class Bought(Model):
     """A spring of one leg that is bought."""
 
-    at: JointName = Field(description="where it is")
+    at: JointName = Field(description="the joint that it acts at")
     name: str = Field(min_length=1, description="part number")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
     wound: SpringWire | None = Field(
@@ -56,11 +56,11 @@ class Springs(Model):
     slider: ExtensionRate = Field(0.0, description="extension between slider and ground, K_PC")
     anchor: Length | None = Field(
         None,
-        description="how far the anchor of the slider's spring is screwed beyond where that spring is relaxed in the "
-        "unloaded position: a trim, positive adds force against the travel; needs 'slider'",
+        description="a trim: how far the anchor of the slider's spring is moved from where that spring is relaxed in "
+        "the unloaded position; positive adds force against the travel; needs 'slider'",
     )
 
-    bought: tuple[Bought, ...] = Field((), description="springs as they are bought, for the list of parts")
+    bought: tuple[Bought, ...] = Field((), description="the bought springs, for the parts list")
 
     @model_validator(mode="after")
     def _rates_are_those_of_the_wires(self) -> Self:
@@ -116,7 +116,7 @@ class SpringDesign(DesignBlock):
     force: PositiveForce | None = Field(None, description="target at the slider, all legs together")
     target: Target | None = Field(
         None,
-        description="instead of a constant torque or force a curve: torques over crank angles, or forces over travel",
+        description="a curve instead of a constant torque or force: torque over crank angle, or force over travel",
     )
     angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be constant")
     travel: tuple[Length, Length] | None = Field(
@@ -125,10 +125,10 @@ class SpringDesign(DesignBlock):
         "`tolerance`",
     )
     angle_within: tuple[Angle, Angle] | None = Field(
-        None, description="crank angles among which the widest window is looked for; default: all that can be reached"
+        None, description="crank angles within which the widest window is sought; default: all that can be reached"
     )
     travel_within: tuple[Length, Length] | None = Field(
-        None, description="slider travel in which the widest window is looked for; default: all that can be reached"
+        None, description="slider travel within which the widest window is sought; default: all that can be reached"
     )
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] | None = Field(
         None, description="largest deviation allowed, as a fraction of the target"
@@ -140,10 +140,11 @@ class SpringDesign(DesignBlock):
         None, description="target slope of the torque, which then follows a line through the stretched position"
     )
     hold_stiffness: bool = Field(
-        False, description="the slope in the stretched position exactly; the torque itself as constant as that allows"
+        False,
+        description="meet the slope in the stretched position exactly, and keep the torque as constant as that allows",
     )
     springs: tuple[JointName, ...] = Field(
-        ("pivot", "crank_pin", "slider_pin", "slider"), min_length=1, description="those that may be used"
+        ("pivot", "crank_pin", "slider_pin", "slider"), min_length=1, description="springs that may be used"
     )
     catalogue: Catalogue | None = Field(
         None,
@@ -151,10 +152,11 @@ class SpringDesign(DesignBlock):
         "or `generic`; default: any rate",
     )
     spring_life: Life | None = Field(
-        None, description="cycles that springs of the catalogue must last; one whose life is not known is not taken"
+        None, description="cycles that springs of the catalogue must last; one of unknown life is not chosen"
     )
     spring_room: PositiveLength | None = Field(
-        None, description="place for the slider's spring of the catalogue: a longer one, relaxed, is not taken"
+        None,
+        description="space for the slider's spring of the catalogue: one that is longer when relaxed is not chosen",
     )
     max_rates: MaxRates | None = Field(None, description="largest rates; default: no limit")
     crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
@@ -167,7 +169,7 @@ class SpringDesign(DesignBlock):
     spacing: Literal["even", "crank"] = Field(
         "even", description="points of the window: even in the motion, or in the crank's angle"
     )
-    points: int = Field(100, ge=10, le=10_000, description="points of the window, its start left out")
+    points: int = Field(100, ge=10, le=10_000, description="points of the window, its start excluded")
     slack: Annotated[Ratio, Field(ge=0, lt=1)] = Field(
         0.0,
         description="deviation beyond the best that is treated as equally good: among these designs `prefer` decides",
