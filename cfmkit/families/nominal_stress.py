@@ -30,10 +30,10 @@ NEGLIGIBLE = 0.1
 some hundredths of the largest for other reasons, which would make a third of such a ratio."""
 
 STEPS = 40
-"""Of the beams' path beside the displacements that are asked for: as dense as curves are."""
+"""Of the beams' path beside the requested displacements: as dense as curves are."""
 
 TOGETHER = 1e-6
-"""Steps nearer to a displacement that is asked for than this part of the largest are left out."""
+"""Steps nearer to a requested displacement than this part of the largest are left out."""
 
 TOLERANCE = 1e-6
 """Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""
@@ -106,7 +106,7 @@ def with_steps(travel: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SolvedBeams:
-    """Beams at the points of a path, asked for their stress at places on their edges.
+    """Beams at the points of a path, whose stress is wanted at places on their edges.
 
     Attributes
     ----------
