@@ -143,9 +143,9 @@ def metrics_page() -> Answer:
         {"name": name, "unit": "1", "definition": about, "per_branch": False} for name, about in OF_MANY_PARTS.items()
     ]
     text = (
-        "Over the requirement's `over`, else analysis.window, else the full travel. Without a branch the worst one "
-        "counts; force_mean[load] picks one. On a torque curve force_... is called torque_..., in N*mm over deg. "
-        "`cfmkit show FAMILY` lists what a family adds."
+        "Evaluated over the requirement's `over`, else analysis.window, else the full travel. Without a branch in "
+        "brackets the worst branch counts; force_mean[load] selects one. For torques force_... is called torque_..., "
+        "in N*mm over deg. `cfmkit show FAMILY` lists what a family adds."
     )
     return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 

@@ -190,8 +190,8 @@ _RANGES = (
         Definition(
             name,
             "motion",
-            f"{what} of the longest part of the travel on which every branch keeps the {{effort}} band (around the "
-            "target, else around the mean in the window), the allowable stress and its valid range",
+            f"{what} of the longest part of the travel on which every branch stays within the {{effort}} band (around "
+            "the target, else around the mean in the window), the allowable stress and its valid range",
             function,
             "smallest",
             "cycle",

@@ -243,7 +243,7 @@ class Mechanism(Model):
         description="half the distance of the roller axes at the start; the springs are at rest there, or stretched by "
         "their `preload`"
     )
-    roller_radius: PositiveLength = Field(description="r")
+    roller_radius: PositiveLength = Field(description="of the rollers, r")
     springs: Springs = Field(description="{stiffness, count}, or a list of measured stiffnesses")
     rolling_friction: Friction = Field(0.0, description="mu = d/r, rolling resistance over roller radius")
     masses: Masses | None = Field(None, description="needed for gravity and for dynamics")
