@@ -155,8 +155,8 @@ def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
     kept = [piece for piece in pieces if len(piece) >= _FEWEST]
     if not kept:
         raise DataError(
-            f"{recording.name}: no stroke has at least {_FEWEST} points: the {_word(recording)} jumps to and fro, or "
-            "the rows are not in the order of time"
+            f"{recording.name}: no stroke has at least {_FEWEST} points: the {_word(recording)} jumps back and forth, "
+            "or the rows are not in the order of time"
         )
     return Strokes(_numbered(kept, motion), int(standing.sum()))
 

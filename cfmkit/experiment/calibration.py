@@ -49,7 +49,7 @@ SWING = 0.2
 """Swings of the residuals that are smaller than this part of their noise are left alone, however certain."""
 
 TIED = 0.999
-"""Parameters more correlated than this are reported as badly told apart."""
+"""Parameters more correlated than this are reported as poorly distinguished."""
 
 FINDINGS = {
     "weakly_identified": "the data determine a fitted value badly",
@@ -215,7 +215,7 @@ def _undetermined(paths: Sequence[str]) -> str:
     if len(paths) == 1:
         return f"the measured curve does not determine {paths[0]}: changing it changes no force; leave it out of --fit"
     told = f"{', '.join(paths[:-1])} and {paths[-1]}"
-    return f"the measured curve cannot tell {told} apart: one makes up for the other; fit only one of them"
+    return f"the measured curve cannot distinguish {told}: one compensates for the other; fit only one of them"
 
 
 def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
@@ -232,7 +232,7 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
             )
         for other in range(k):
             if abs(fit.correlation[k, other]) > TIED:
-                told = f"{parameters[other].path} and {item.path} are badly told apart"
+                told = f"{parameters[other].path} and {item.path} are poorly distinguished"
                 found.append(Finding("weakly_identified", f"{told} (correlation {fit.correlation[k, other]:.5f})"))
     if not fit.converged:
         found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
@@ -256,7 +256,7 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     return [
         Finding(
             "lack_of_fit",
-            f"model less measurement swings by {swing} (rms) along the travel, beside a noise of {noise}: what was "
+            f"the residual swings by {swing} (rms) along the travel, beside a noise of {noise}: what was "
             f"fitted does not describe the measurement, and the intervals hold only where it does; {cure}",
         )
     ]

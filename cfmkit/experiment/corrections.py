@@ -85,7 +85,7 @@ def _shown(value: str | float | None, first: FloatArray, option: str, dimension:
     try:
         return read_quantity(value, dimension)
     except QuantityError as error:
-        raise UsageError(f"{option}: {error}; or say {START!r} for what the first point says") from None
+        raise UsageError(f"{option}: {error}; or say {START!r} for the value at the first point") from None
 
 
 def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:

@@ -49,15 +49,15 @@ CYCLES_PER_STROKE = 60.0
 """Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
 
 FINDINGS = {
-    "one_branch": "the recording has no way back: there is no loop",
+    "one_branch": "the recording has no return branch: there is no loop",
     "unfinished_cycle": "strokes that belong to no complete cycle are left out",
     "pauses": "points at which the machine stood are left out",
     "spikes": "points far off their neighbours are left out",
     "reversals": "points next to reversals, where the force passes from one branch to the other, are left out",
     "window_at_reversal": "the window reaches into points that are left out next to reversals: it was shortened",
     "not_filtered": "there are too few points for the filter",
-    "negative_force": "the mean force is negative: the sign of the sensor may be turned",
-    "negative_loop": "the mechanism would give energy in every cycle: a sign may be turned",
+    "negative_force": "the mean force is negative: the sign of the sensor may be reversed",
+    "negative_loop": "the mechanism would deliver energy in every cycle: a sign may be reversed",
 }
 
 
@@ -124,8 +124,10 @@ def measured(
     chosen = _default(recording) if isinstance(low_pass, str) else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
     if turned_loop(raw):
-        told = f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would give energy"
-        warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column turned?"))
+        told = (
+            f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
+        )
+        warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column reversed?"))
     plain = MeasuredCurves(recording, strokes, raw, reached=reached, warnings=warnings)
     if chosen is None:
         return plain
@@ -313,7 +315,7 @@ def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
         told = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
         found.append(Finding("pauses", told))
     if float(recording.effort.mean()) < 0:
-        told = f"the mean {recording.kind} is negative: is the sensor's sign turned?"
+        told = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
         found.append(Finding("negative_force", told))
     return tuple(found)
 

@@ -115,10 +115,11 @@ def message(found: Suggestions) -> str:
     """Return how it ended, in one sentence."""
     if found.proposals:
         late = "; the time budget ended the search before everything was tried" if found.late else ""
-        return f"{len(found.proposals)} mechanisms do all that is wished{late}"
+        count = len(found.proposals)
+        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the wish{late}"
     if found.late:
         return "the time budget ended the search before a mechanism met the wish; increase it (--time-budget)"
-    return "no mechanism does what is wished"
+    return "no mechanism meets the wish"
 
 
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:

@@ -387,7 +387,7 @@ def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Ro
         told, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
     told += (
         f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
-        f"make it tighter, {cure} or ask for less"
+        f"make it tighter, {cure} or require less"
     )
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
     return Design(None, Status.INFEASIBLE, told, nearest_feasible=nearest, search=design.search, tables=design.tables)

@@ -168,7 +168,7 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     seen: dict[tuple[Any, ...], int] = {}
     for index in range(size):
         if (first := seen.setdefault(plan.point(index), index)) != index:
-            raise UsageError(f"values side by side: the set number {index + 1} is that of number {first + 1} again")
+            raise UsageError(f"values side by side: set number {index + 1} repeats number {first + 1}")
     return plan
 
 

@@ -143,7 +143,7 @@ def faults(
             yield one, str(problem)
             continue
         if not joint and (twice := [value for k, value in enumerate(found.listed) if value in found.listed[:k]]):
-            yield one, f"{written(twice[0], found.dimension)} stands twice in the list"
+            yield one, f"{written(twice[0], found.dimension)} appears twice in the list"
         for other in asked[:index]:
             if one.path == other.path or f"{one.path}.".startswith(f"{other.path}."):
                 yield one, f"{other.path!r} is varied already; one of them is enough"

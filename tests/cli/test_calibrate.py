@@ -115,7 +115,7 @@ def test_a_tare_is_fitted_and_the_page_says_how_to_take_it_off(cli, cam, rig):
         (
             ("--fit", "mechanism.springs.stiffness,mechanism.profile.force_constant",
              "--set", "mechanism.rolling_friction=0"),
-            4, "cannot tell mechanism.springs.stiffness and mechanism.profile.force_constant apart",
+            4, "cannot distinguish mechanism.springs.stiffness and mechanism.profile.force_constant",
         ),
         (("--fit", "mechanism.rolling_friction", "--units", "F=kN"), 3, "the header gives 'F' in N, --units in kN"),
     ],

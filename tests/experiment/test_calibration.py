@@ -114,7 +114,7 @@ def test_stiffness_and_force_constant_cannot_be_told_apart_without_friction_and_
     with pytest.raises(SolutionError) as caught:
         calibrate(start, recording(built(0.0)), parameters(start, [STIFFNESS, FRICTION, CONSTANT]))
     assert str(caught.value) == (
-        f"the measured curve cannot tell {STIFFNESS} and {CONSTANT} apart: one makes up for the other; "
+        f"the measured curve cannot distinguish {STIFFNESS} and {CONSTANT}: one compensates for the other; "
         "fit only one of them"
     )
 

@@ -122,7 +122,7 @@ def test_a_large_grid_holds_its_axes_only():
         (f"{RADIUS}=8mm:9mm:-3", "'-3' is not a number of values"),
         (f"{RADIUS}=8mm:9mm:1e3", "'1e3' is not a number of values"),
         (f"{RADIUS}=[]", "the list is empty"),
-        (f"{RADIUS}=[8 mm, 0.8 cm]", "8 mm stands twice"),
+        (f"{RADIUS}=[8 mm, 0.8 cm]", "8 mm appears twice"),
         (f"{RADIUS}=[8 mm, {{a: b}}]", "a block is not a length"),
         ("analysis.points=10:21:3", "are no whole numbers"),
         ("analysis.points=[10.5]", "10.5 is not a whole number"),

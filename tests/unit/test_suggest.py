@@ -16,7 +16,7 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
-from cfmkit.runs.suggestion_files import exit_code
+from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
@@ -242,6 +242,11 @@ def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
     assert found.proposals
     assert found.late
     assert exit_code(found) == 0
+
+
+@pytest.mark.parametrize(("count", "told"), [(1, "1 mechanism meets the wish"), (2, "2 mechanisms meet the wish")])
+def test_one_proposal_is_told_of_in_the_singular(count, told):
+    assert message(SimpleNamespace(proposals=("one", "other")[:count], late=False)) == told
 
 
 def test_a_candidate_whose_time_is_up_is_not_made():
