@@ -380,6 +380,34 @@ def test_springs_at_pins_hold_no_more_energy_than_steel_wire_in_the_room():
     assert propose(large, Run()).candidates
 
 
+def pinned(force_or_torque, room):
+    asked = wish_of(None, force_or_torque | {"ripple": "2 %", "room": room}).wish()
+    offer = function_named(family("slider-crank").propose)(asked, Run())
+    assert offer.candidates, offer.reason
+    return [made(ProposalJob("slider-crank", one, asked, 0)) for one in offer.candidates[5:8]]
+
+
+@pytest.mark.parametrize("torque", ["100 N*mm", "1 N*m"])
+def test_springs_at_pins_are_of_wire_that_bears_the_motion_and_fit_the_room(torque):
+    found = [one for one in pinned({"torque": torque, "angle": "5 deg"}, "[60 mm, 200 mm]") if one.good]
+    assert found
+    for one in found:
+        mechanism, values = one.spec.mechanism, cfmkit.analyze(one.spec).values
+        wires = [spring.wound for spring in mechanism.springs.bought]
+        assert values["wire_stress_max"].value <= 0.6 * max(tensile_strength(wire.wire) for wire in wires)
+        coils = [spring.wound for spring in mechanism.springs.bought if spring.at != "slider"]
+        assert max(coil.coil + coil.wire for coil in coils) <= min(mechanism.crank_length, one.numbers["across"])
+        for coil in mechanism.springs.coils_at("slider"):
+            assert loaded_length(coil) < one.numbers["along"]
+
+
+def test_a_torque_whose_springs_are_wider_than_the_linkage_is_refused():
+    """The wire of springs for this work fills a hundredth of the room; but no coil of it goes between the pins."""
+    found = pinned({"torque": "5 N*m", "angle": "10 deg"}, "[50 mm, 100 mm]")
+    assert not any(one.good for one in found)
+    assert any("no spring of steel wire" in one.message for one in found)
+
+
 def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_first():
     asked = wish_of(None, {"torque": "5 N*m", "angle": "90 deg", "ripple": "3 %", "room": "[150 mm, 700 mm]"}).wish()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates

@@ -8,9 +8,11 @@ import numpy as np
 
 from cfmkit.families.base import Room
 from cfmkit.families.slider_crank.dispatch import drawing
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.spec import Springs
     from cfmkit.results import Result
 
 POSES = 13
@@ -66,14 +68,27 @@ def _widest(spec: SliderCrankSpec) -> float:
 
 
 def _linkage(result: Result) -> Room:
-    """Return the box of links and pins over the motion of the curve."""
-    solution = result.state
+    """Return the box of links and pins, and of springs whose wire is known, over the motion of the curve."""
+    solution, springs = result.state, result.spec.at("mechanism.springs")
     link, units = solution.assembly.linkage, solution.units
-    x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
-    y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle)])
-    rim = 2.0 * PIN * link.crank
-    told = f"links {2e3 * PIN * link.crank:.3g} mm wide; springs at pins have no size, and no depth"
-    across, along = float(np.ptp(y)) + rim, float(np.ptp(x)) + rim
-    springs = int(np.count_nonzero(solution.assembly.rates))
-    corner = float(x.min()) - 0.5 * rim, float(y.min()) - 0.5 * rim
-    return Room(across, along, None, 3 + springs, told, corner, True)
+    half = PIN * link.crank
+    at = ("pivot",), ("crank_pin",), ("slider_pin", "slider")
+    coils = [[coil for name in names for coil in springs.coils_at(name)] for names in at]
+    around = [max([half, *(0.5 * coil.outer_diameter for coil in found)]) for found in coils]
+    pivot, turned = np.zeros((1, 2)), link.crank * np.column_stack([np.cos(units.angle), np.sin(units.angle)])
+    slid = np.column_stack([units.position, np.full(len(units.position), link.offset)])
+    pins = list(zip((pivot, turned, slid), around, strict=True))
+    low = np.min([pin.min(axis=0) - radius for pin, radius in pins], axis=0)
+    high = np.max([pin.max(axis=0) + radius for pin, radius in pins], axis=0)
+    along, across = high - low
+    count = int(np.count_nonzero(solution.assembly.rates))
+    told = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}"
+    return Room(float(across), float(along), None, 3 + count, told, (float(low[0]), float(low[1])), True)
+
+
+def _sizes(springs: Springs) -> str:
+    found = [coil for name in JOINTS[:3] for coil in springs.coils_at(name)]
+    if not found:
+        return "springs at pins have no size, and no depth"
+    wide, long = (1e3 * max(getattr(one, name) for one in found) for name in ("outer_diameter", "body_length"))
+    return f"torsion springs up to {wide:.3g} mm wide and {long:.3g} mm deep; the depth of links is not known"

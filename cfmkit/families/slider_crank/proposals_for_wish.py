@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.slider_crank.bounding_box import PIN
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
-from cfmkit.specs.units import Place
+from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.spec import MaterialSpec
 from cfmkit.stock.springs.catalogue import BENDING_SHARE
 from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
+from cfmkit.stock.springs.made_to_measure import extension_spring, torsion_spring
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -98,6 +101,12 @@ last three are the flattest of some thousands of random linkages over 40 to 90 d
 WOUND_UP = -math.radians(60.0)
 """Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
 
+SHRUNK = (0.96, 0.8)
+"""Sizes of linkages for a torque, over the largest that the room allows: the second leaves room for wider springs."""
+
+STILL = 1e-9
+"""Share of the slider's travel that is none."""
+
 ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
 """What round wire in bending holds at most, over its volume [J/m^3]."""
 
@@ -105,6 +114,9 @@ OFFERED = 24
 
 PART = "cfmkit.families.slider_crank.proposals_for_wish:part"
 """What finishes the parts of one piece."""
+
+WOUND = "cfmkit.families.slider_crank.proposals_for_wish:wound"
+"""What finishes linkages with springs."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -114,10 +126,12 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 
 def _of_torque(wish: Wish) -> FamilyOffer:
     if wish.depth is not None:
-        return FamilyOffer(reason="springs at pins have no size here, and no depth: wish a room without one")
+        return FamilyOffer(reason="the depth of links and pins is not known: wish a room without one")
     if (reason := _overfilled(wish)) is not None:
         return FamilyOffer(reason=reason)
-    found = [_turned(wish, *one) for one in TURNED]
+    found = [_turned(wish, size, one, JOINTS) for size in SHRUNK for one in TURNED]
+    # of these the slider goes far: there may be no place for a spring that is stretched so much
+    found += [_turned(wish, SHRUNK[0], one, JOINTS[:3]) for one in TURNED if math.radians(one[3]) < WOUND_UP]
     return FamilyOffer(tuple(one for one in found if one is not None))
 
 
@@ -130,8 +144,11 @@ def _overfilled(wish: Wish) -> str | None:
     return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
 
 
-def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: float) -> Candidate | None:
-    """Return a linkage that turns as much as is wished around its stretched position, as large as the room allows."""
+def _turned(
+    wish: Wish, share: float, linkage: tuple[float, float, float, float], springs: tuple[str, ...]
+) -> Candidate | None:
+    """Return a linkage that turns as much as is wished around its stretched position, a share of what fits the room."""
+    crank, coupler, offset, unloaded = linkage
     low = math.radians(unloaded)
     within = (0.0, max(1.6 * wish.travel, math.radians(60.0)))
     if low > WOUND_UP:
@@ -143,7 +160,7 @@ def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: f
         return None
     x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
     sides = np.ptp(x) + 2.0 * PIN * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * PIN * crank
-    size = 0.96 * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
+    size = share * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
     data = {
         "family": "slider-crank",
         "name": "suggested",
@@ -153,7 +170,7 @@ def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: f
         },
         "design": {
             "torque": wish.target, "tolerance": min(0.45 * wish.ripple, 0.2),
-            "angle_within": within,
+            "angle_within": within, "springs": springs,
         },
         "analysis": {"angle": (low, within[1]), "points": 961},
     }  # fmt: skip
@@ -163,6 +180,50 @@ def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: f
 
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     """Return a designed linkage that is judged over the middle of the window found, as long as the travel wished."""
+    return wound(_in_middle(spec, wish), wish)
+
+
+def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a designed linkage with springs wound to measure of steel wire, which bear its motion.
+
+    A torsion spring is no wider than the crank, or the coupler, is long, so that those of two pins stand beside each
+    other, and no deeper than the longer side of the room.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If there is no such spring for a joint.
+    """
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.springs.model import analyze
+
+    solution = analyze(spec.replace({"design": None, "requirements": ()}), Run()).state
+    if solution is None:
+        return spec
+    link, (high, low) = solution.assembly.linkage, solution.extremes.turns
+    widest, longest = min(link.crank, link.coupler), max(wish.room[:2])
+    # a spring at the slider lies beside the coupler and is stretched by a slider that leaves the pivot
+    rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
+    rates, bought = spec.mechanism.springs.rates, []
+    for joint in np.flatnonzero(rates):
+        name, rate, turn = JOINTS[joint], rates[joint], float(max(high[joint], -low[joint]))
+        if name == "slider":
+            coil = extension_spring(rate, turn, rest) if low[joint] > -STILL * turn else None
+        else:
+            coil = torsion_spring(rate, turn, longest)
+        if coil is None or (name != "slider" and coil.outer_diameter > widest):
+            dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
+            told = f"{format_short(rate, dimension, 3)} over {format_short(turn, way, 3)}"
+            wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
+            raise SolutionError(f"no spring of steel wire fits at the {name.replace('_', ' ')}: {told}{wide}")
+        told = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
+        wire = {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}
+        bought.append({"at": name, "name": told, "wound": wire})
+    return spec.replace({"mechanism.springs.bought": tuple(bought)})
+
+
+def _in_middle(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a designed linkage whose window is the middle of the one found, as long as the travel wished."""
     low, high = (float(end) for end in spec.analysis.window or (0.0, 0.0))
     name = "length" if wish.kind == "force" else "angle"
     spare = 0.5 * max(high - low - wish.travel * (1.0 + 1e-6), 0.0)
@@ -414,4 +475,4 @@ def _springs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float
         "analysis": _analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("springs at pins", spec, True, "", _rank(crank, wish))
+    return Candidate("springs at pins", spec, True, WOUND, _rank(crank, wish))

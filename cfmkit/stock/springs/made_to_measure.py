@@ -1,4 +1,4 @@
-"""Extension springs wound to measure: the slimmest one of a rate that can be stretched so far, where no list has it.
+"""Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
 The formulas and the wire are those of `cfmkit.stock.springs.helical`, the share of the strength is that of the generic
 series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are close-wound, loops
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from math import log2
 
-from cfmkit.stock.springs.catalogue import SHEAR_SHARE
-from cfmkit.stock.springs.helical import Wound, tensile_strength
+from cfmkit.stock.springs.catalogue import BENDING_SHARE, SHEAR_SHARE
+from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
 
 INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 """Mean diameter of the coil over that of the wire: what is wound easily."""
@@ -33,9 +33,26 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
     (690.0, 1.71, 15.3, 43)
     """
-    found = [_wound(index, rate, stretch) for index in INDICES]
+    found = [_wound("extension", index, rate, stretch) for index in INDICES]
     fitting = [one for one in found if loaded_length(one) <= room]
     return min(fitting, key=lambda one: one.outer_diameter, default=None)
+
+
+def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
+    """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
+
+    None if there is none: the body would be longer.
+
+    Examples
+    --------
+    >>> spring = torsion_spring(0.05, 1.0, 0.05)
+    >>> round(spring.rate, 9), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
+    (0.05, 0.77, 4.6, 6)
+    >>> torsion_spring(0.05, 1.0, 0.002) is None
+    True
+    """
+    found = [_wound("torsion", index, rate, turn) for index in INDICES]
+    return min((one for one in found if one.body_length <= room), key=lambda one: one.outer_diameter, default=None)
 
 
 def loaded_length(spring: Wound) -> float:
@@ -43,14 +60,17 @@ def loaded_length(spring: Wound) -> float:
     return spring.body_length + 2.0 * (spring.coil - spring.wire)
 
 
-def _wound(index: float, rate: float, stretch: float) -> Wound:
-    """Return the spring of an index whose wire is at its allowed stress when stretched, or with the fewest turns."""
-    unit = Wound("extension", 1e-3, index * 1e-3, FEWEST)
-    # stress falls with the square of the wire, strength with its 0.163rd power: with 1 mm as the unit of the wire
-    exponent = 2.0 - log2(tensile_strength(1e-3) / tensile_strength(2e-3))
-    wire = 1e-3 * (unit.stress(rate * stretch) / (SHEAR_SHARE * tensile_strength(1e-3))) ** (1.0 / exponent)
-    wire = max(wire, THINNEST)
-    turns = unit.shear_modulus * wire / (8.0 * index**3 * rate)
+def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
+    """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
+    unit = Wound(kind, 1e-3, index * 1e-3, FEWEST)
+    # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
+    # with the 0.163rd power: with 1 mm as the unit of the wire
+    power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
+    falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
+    exponent = (3.0 if kind == "torsion" else 2.0) - falls
+    wire = (unit.stress(rate * deflection) / (share * tensile_strength(1e-3))) ** (1.0 / exponent)
+    wire = max(wire, THINNEST / 1e-3)
+    turns = FEWEST * unit.rate * wire**power / rate
     if turns < FEWEST:
-        wire, turns = FEWEST * 8.0 * index**3 * rate / unit.shear_modulus, FEWEST
-    return Wound("extension", wire, index * wire, turns)
+        wire, turns = (rate / unit.rate) ** (1.0 / power), FEWEST
+    return Wound(kind, 1e-3 * wire, 1e-3 * index * wire, turns)

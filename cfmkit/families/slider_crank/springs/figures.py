@@ -21,6 +21,7 @@ from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 from cfmkit.specs.units import format_short, to_border
+from cfmkit.stock.springs.made_to_measure import loaded_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.families.slider_crank.springs.spec import Springs
     from cfmkit.results import Result
 
 
@@ -123,8 +125,9 @@ def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
     return first, middle, last
 
 
-def scene(solution: Solution) -> PanelView:
+def scene(result: Result) -> PanelView:
     """Return a box around all positions of the motion, with room for symbols."""
+    solution: Solution = result.state
     link, units = solution.assembly.linkage, solution.units
     x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
     y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle)])
@@ -132,6 +135,11 @@ def scene(solution: Solution) -> PanelView:
     size = 0.045 * extent
     far = float(units.position.max()) if link.branch > 0 else float(units.position.min())
     wall = far + link.branch * 4.0 * size
+    springs: Springs = result.spec.at("mechanism.springs")
+    if springs.pulled_outwards(*(float(end[3]) for end in solution.extremes.turns)):
+        # it lies beside the coupler, as long as its wire is wound
+        rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
+        wall = rest - link.branch * max(loaded_length(coil) for coil in springs.coils_at("slider"))
     ends = [
         float(x.min()),
         float(x.max()),
@@ -293,7 +301,7 @@ def joints(result: Result) -> Figure:
 def linkage(result: Result) -> Figure:
     """Return the linkage to scale in its key positions, above each other if it is flat, with the curve they are on."""
     solution: Solution = result.state
-    keys, view = key_positions(solution), scene(solution)
+    keys, view = key_positions(solution), scene(result)
     heading = Heading.of(result, "linkage to scale in its key positions")
     width, height = view.box[2] - view.box[0], view.box[3] - view.box[1]
     slender = height / width
@@ -373,6 +381,6 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
 def moving(result: Result) -> Moving:
     """Return the linkage over its motion, for a film."""
     solution: Solution = result.state
-    motion, view = solution.motion[chosen(len(solution.motion))], scene(solution)
+    motion, view = solution.motion[chosen(len(solution.motion))], scene(result)
     poses = [key(solution, "", float(place)) for place in motion]
     return Moving(motion, view.box, lambda ax, number: draw_linkage(solution, poses[number], ax, view))

@@ -13,7 +13,7 @@ from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
     from cfmkit.specs.target_function import TargetCurve
-    from cfmkit.stock.springs.helical import Kind
+    from cfmkit.stock.springs.helical import Kind, Wound
 
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
@@ -82,6 +82,17 @@ class Springs(Model):
                     },
                 )
         return self
+
+    def coils_at(self, joint: str) -> list[Wound]:
+        """Return the springs at a joint whose wire is known."""
+        return [one.wound.wound(one.kind) for one in self.bought if one.at == joint and one.wound is not None]
+
+    def pulled_outwards(self, high: float, low: float) -> bool:
+        """Return whether the slider's spring has a known wire and is stretched by a slider that leaves the pivot.
+
+        `high` and `low`: how far the slider goes outwards and inwards from the unloaded position [m].
+        """
+        return bool(self.coils_at("slider")) and high > abs(low)
 
     @property
     def rates(self) -> tuple[float, float, float, float]:
