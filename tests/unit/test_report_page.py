@@ -247,7 +247,7 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
         "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE],
     }  # fmt: skip
     told = {
-        "status": "complete", "message": "1 mechanism meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
+        "status": "complete", "message": "1 meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
         "proposals": [one], "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
