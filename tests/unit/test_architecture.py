@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -199,3 +200,11 @@ def test_files_and_functions_stay_small(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 500
     size, name = longest_function(path)
     assert size <= 60, name
+
+
+def test_the_page_on_architecture_names_files_that_there_are():
+    page = (ROOT.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"`([a-z_]+(?:/[a-z_]+)*/[a-z_]+\.py)`", page))
+    assert len(shown) > 20
+    there = [f"/{path.relative_to(ROOT.parent).as_posix()}" for path in (*SOURCES, *ROOT.parent.glob("t*/**/*.py"))]
+    assert {name for name in shown if not any(path.endswith(f"/{name}") for path in there)} == set()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
 import importlib
 import inspect
 import pkgutil
+import re
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,14 @@ def test_the_public_names_exist_and_are_listed():
         assert getattr(cfmkit, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'simulate'"):
         cfmkit.simulate  # noqa: B018
+
+
+@pytest.mark.parametrize("folder", sorted((ROOT / "cfmkit").rglob("__init__.py")), ids=lambda path: path.parent.name)
+def test_what_a_folder_says_of_its_files_names_files_that_there_are(folder):
+    """A word in backticks is a file of the folder, or something that one of them defines or the folder exports."""
+    text = folder.read_text(encoding="utf-8")
+    files = [path for path in folder.parent.iterdir() if path != folder]
+    code = "\n".join(path.read_text(encoding="utf-8") for path in files if path.suffix == ".py")
+    words = set(re.findall(r"(?<!`)`([a-z][a-z_]{2,})`(?!`)", ast.get_docstring(ast.parse(text)) or ""))
+    known = {path.stem for path in files} | set(re.findall(r'^    "([a-z_]+)",$', text, re.M))
+    assert {word for word in words - known if not re.search(rf"\bdef {word}\(|^{word}\b.*=", code, re.M)} == set()
