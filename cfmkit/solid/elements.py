@@ -55,9 +55,11 @@ class Elements:
 
     def without(self, held: NDArray[np.bool_]) -> Elements:
         """Return the elements of which not all nodes move as one: all others never strain."""
-        moving = ~held[self.mesh.triangles].all(axis=1)
-        mesh = replace(self.mesh, triangles=self.mesh.triangles[moving])
-        return Elements(mesh, self.law, self.width[moving])
+        return self.only(np.asarray(~held[self.mesh.triangles].all(axis=1)))
+
+    def only(self, chosen: NDArray[np.bool_]) -> Elements:
+        """Return some of the elements (m,), on all nodes."""
+        return Elements(replace(self.mesh, triangles=self.mesh.triangles[chosen]), self.law, self.width[chosen])
 
     @cached_property
     def _parent(self) -> tuple[FloatArray, FloatArray]:

@@ -24,6 +24,7 @@ from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
+from cfmkit.families.beam.output_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.surface_following import curve_of, findings_along, ride, values_along
@@ -189,15 +190,7 @@ def _ends(solution: Solution) -> Curve | None:
 def _outputs(solution: Solution) -> dict[str, Column]:
     """Return the motions and reactions that the specification names, of one copy."""
     keep, path, outputs = solution.keep, solution.path, solution.spec.analysis.outputs
-    columns: dict[str, Column] = {}
-    for name in outputs.nodes:
-        x, y, turn = path.motion(name)[keep].T
-        columns |= {f"{name}_x": Column(x, "length"), f"{name}_y": Column(y, "length")}
-        columns[f"{name}_rotation"] = Column(turn, "angle")
-    for name in outputs.reactions:
-        x, y, moment = path.reaction(name)[keep].T
-        columns |= {f"{name}_fx": Column(x, "force"), f"{name}_fy": Column(y, "force")}
-        columns[f"{name}_m"] = Column(moment, "torque")
+    columns = output_columns(outputs, lambda name: path.motion(name)[keep], lambda name: path.reaction(name)[keep])
     if outputs.cross_stiffness:
         columns["cross_stiffness"] = Column(solution.cross_stiffness, "stiffness")
     if solution.spec.mechanism.drive.kind == "loads":

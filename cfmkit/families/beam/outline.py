@@ -113,7 +113,7 @@ def _held_places(assembly: Assembly, beams: dict[str, list[BeamStrip]], toleranc
         region = _region(assembly, node, ends, SHARE * tolerance)
         joined = tuple(bars) if node in moving else ()
         yield replace(region, shapes=(*region.shapes, *joined))
-        if axis is not None and not _on_axis(assembly, node):
+        if axis is not None and not on_axis(assembly, node):
             yield HeldPlace(
                 f"{node}'",
                 node,
@@ -133,7 +133,7 @@ def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], b
     strip, last = ends[0]
     index = -1 if last else 0
     size = float(strip.thickness[index])
-    if about.support.across and not about.support.rotation and not _on_axis(assembly, node):
+    if about.support.across and not about.support.rotation and not on_axis(assembly, node):
         return HeldPlace(node, node, at, (_disc(strip.points[index], HOLE * size, bulge),))
     across = np.array([-math.sin(strip.angle[index]), math.cos(strip.angle[index])])
     line = strip.points[index] + 0.5 * size * np.array([across, -across])
@@ -332,14 +332,14 @@ def _padded(assembly: Assembly, node: str) -> bool:
 
     Not on the mirror axis: there the beams of the two halves meet.
     """
-    if _on_axis(assembly, node):
+    if on_axis(assembly, node):
         return False
     found = assembly.network.nodes[node]
     linked = {link.node for link in assembly.network.links}
     return (found.support.rotation and found.support.across) or node in linked
 
 
-def _on_axis(assembly: Assembly, node: str) -> bool:
+def on_axis(assembly: Assembly, node: str) -> bool:
     """Tell whether a node is on the mirror axis."""
     found, axis = assembly.network.nodes[node], mirror_axis(assembly)
     if axis is None:
@@ -415,7 +415,7 @@ def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, di
     moving = {assembly.driven, assembly.spec.mechanism.drive.node}
     for node in sorted(moving):
         ends = _ends(assembly, beams, node)
-        if not ends or _on_axis(assembly, node):
+        if not ends or on_axis(assembly, node):
             continue
         padded = _padded(assembly, node)
         middle = _pad(assembly, *ends[0], True)[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)

@@ -19,8 +19,10 @@ from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_
 from cfmkit.families.beam.fillet_stress import fillets
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.output_columns import output_columns
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.beam.solid_nodes import SolidNodes
 from cfmkit.families.fillet_table import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status, quantities
@@ -298,9 +300,19 @@ def _curve(solution: SolidSolution) -> Curve:
     extra = {
         "max_stress": Column(solution.stress, "stress"),
         "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
-    }
+    } | _outputs(solution)
     kind: Kind = "torque" if _turns(solution.spec) else "force"
     return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), stable[before], extra, kind)
+
+
+def _outputs(solution: SolidSolution) -> dict[str, Column]:
+    """Return the motions and reactions that the specification names, of one copy."""
+    nodes = SolidNodes(solution.assembly, solution.fine)
+    return output_columns(
+        solution.spec.analysis.outputs,
+        lambda name: read_only(nodes.motion(name)(solution.motion)),
+        lambda name: read_only(nodes.reaction(name)(solution.motion)),
+    )
 
 
 def _fillet_table(solution: SolidSolution) -> Table:

@@ -374,7 +374,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         name for name, beam in mechanism.beams.items() if "pin" in (beam.start_joint, beam.end_joint)
     ]
     things["analysis.modes"], things["analysis.surface"] = analysis.modes, analysis.surface
-    things["analysis.outputs"] = analysis.outputs.nodes or analysis.outputs.reactions
+    things["analysis.outputs.cross_stiffness"] = analysis.outputs.cross_stiffness
     things["analysis.imperfection"] = analysis.imperfection
     things["analysis.through_folds"] = analysis.through_folds
     things["copies.layers"] = mechanism.copies is not None and mechanism.copies.layers > 1

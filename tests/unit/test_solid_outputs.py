@@ -1,0 +1,114 @@
+"""Motions of nodes and reactions of supports of a part as a solid: what `analysis.outputs` adds to its curve."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.solid.edge_rings import Ring
+from cfmkit.solid.elements import Elements
+from cfmkit.solid.mesh import mesh
+from cfmkit.solid.motions_and_reactions import MaterialPoint
+from cfmkit.solid.plane_stress_law import SaintVenantKirchhoff
+
+if TYPE_CHECKING:
+    from cfmkit.results import Result
+
+VEE = """
+cfmkit: 1
+family: beam
+name: vee
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 0.5 mm
+  width: 10 mm
+  nodes:
+    root: {at: [0 mm, 0 mm], support: clamped}
+    middle: {at: [8.2 mm, 1.1 mm]}
+    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
+  beams:
+    outer: {start: root, end: middle}
+    inner: {start: middle, end: shuttle}
+  drive: {kind: displacement, node: shuttle, direction: -90 deg}
+  part: {fillet: 0.3 mm}
+analysis:
+  travel: 0.2 mm
+  points: 9
+  fidelity: solid
+  solid: {poses: 3, mesh: 0.4 mm}
+  outputs: {nodes: [middle, shuttle], reactions: [root, shuttle]}
+"""
+FORCES = ("fx", "fy", "m")
+
+
+def columns(result: Result, node: str, names: tuple[str, ...]) -> np.ndarray:
+    return np.array([result.curve.extra[f"{node}_{name}"].values for name in names])
+
+
+@pytest.fixture(scope="module")
+def vee() -> dict[str, Result]:
+    spec = cfmkit.loads(VEE)
+    mirrored = {"mechanism.copies": {"mirror": ["24.6 mm", "3.3 mm"]}}
+    return {
+        "solid": cfmkit.analyze(spec),
+        "beams": cfmkit.analyze(spec.replace({"analysis.fidelity": "reissner"})),
+        "mirrored": cfmkit.analyze(spec.replace(mirrored)),
+    }
+
+
+def test_reactions_of_a_solid_are_in_equilibrium_at_poses_and_between_them(vee):
+    root, shuttle = (columns(vee["solid"], node, FORCES) for node in ("root", "shuttle"))
+    largest = np.abs(root[:2]).max()
+    assert root[:2] + shuttle[:2] == pytest.approx(np.zeros((2, 9)), abs=1e-6 * largest)
+    x, y = 24.6e-3, 3.3e-3 - vee["solid"].curve.motion
+    moment = np.abs(root[2] + shuttle[2] + x * shuttle[1] - y * shuttle[0]) / np.abs(root[2]).max()
+    assert moment.max() < 2e-3  # a product of two cubics between poses
+    assert moment[vee["solid"].curve.extra["solved"].values == "yes"].max() < 1e-6
+    assert -shuttle[1] == pytest.approx(vee["solid"].curve.effort, abs=1e-6 * largest)
+
+
+def test_a_driven_node_goes_with_its_drive_and_a_free_one_as_that_of_beams(vee):
+    motion = vee["solid"].curve.motion
+    moved = columns(vee["solid"], "shuttle", ("x", "y", "rotation"))
+    assert moved == pytest.approx(np.array([0 * motion, -motion, 0 * motion]), abs=1e-12)
+    solid, beams = (columns(vee[name], "middle", ("x", "y", "rotation")) for name in ("solid", "beams"))
+    for one, other in zip(solid, beams, strict=True):
+        assert one == pytest.approx(other, abs=0.02 * np.abs(other).max())
+
+
+def test_reactions_of_a_slender_leaf_are_those_of_the_beam(vee):
+    for node in ("root", "shuttle"):
+        solid, beams = (columns(vee[name], node, FORCES) for name in ("solid", "beams"))
+        for one, other in zip(solid, beams, strict=True):
+            assert one == pytest.approx(other, abs=0.03 * np.abs(other).max())
+
+
+def test_reactions_of_a_mirrored_part_are_those_of_the_half_that_is_described(vee):
+    """On the axis, too, where the halves press on each other beside the node; their meshes are not mirror images."""
+    one = vee["mirrored"]
+    shuttle = columns(one, "shuttle", FORCES)
+    assert -2.0 * shuttle[1] == pytest.approx(one.curve.effort, abs=5e-4 * np.abs(one.curve.effort).max())
+    alone = columns(vee["solid"], "shuttle", FORCES)
+    for half, whole in zip(shuttle, alone, strict=True):
+        assert half == pytest.approx(whole, abs=0.01 * np.abs(whole).max())
+
+
+def test_the_material_around_a_point_tells_its_motion_and_its_turn():
+    """A square that is turned by 2 rad about its corner, and moved: every point does the same."""
+    grid = mesh((Ring.of(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), False),), 0.3)
+    elements = Elements(grid, SaintVenantKirchhoff(1.0, 0.3), np.ones(len(grid.triangles)))
+    turn = np.array([[np.cos(2.0), -np.sin(2.0)], [np.sin(2.0), np.cos(2.0)]])
+    moved = grid.nodes @ (turn - np.eye(2)).T + [0.1, 0.2]
+    for place in ((0.37, 0.81), (0.0, 0.5), (1.0, 1.0)):
+        point = MaterialPoint.at(elements, np.array(place))
+        assert point.motion(moved) == pytest.approx([*((turn - np.eye(2)) @ place + [0.1, 0.2]), 2.0], abs=1e-12)
+    assert MaterialPoint.at(elements, np.array([1.1, 0.5])) is None
+
+
+def test_a_stiffness_across_is_refused_of_a_solid():
+    with pytest.raises(SpecError, match=r"does not know analysis\.outputs\.cross_stiffness"):
+        cfmkit.loads(VEE).replace({"analysis.outputs.cross_stiffness": True})
