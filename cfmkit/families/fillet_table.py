@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.solid_definitions import DEFINITIONS
+from cfmkit.results import Quantity
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
@@ -54,9 +56,11 @@ def with_nominal(rows: Sequence[FilletRow], stresses: FloatArray) -> tuple[Fille
     return tuple(replace(row, nominal=float(stress)) for row, stress in zip(rows, stresses, strict=True))
 
 
-def largest_concentration(rows: Sequence[FilletRow]) -> float | None:
-    """Return the largest stress concentration of some fillets; None where none has one."""
-    return max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
+def largest_concentration(rows: Sequence[FilletRow]) -> dict[str, Quantity]:
+    """Return the largest stress concentration of some fillets by its name, without a value where none has one."""
+    found = max((row.concentration for row in rows if not math.isnan(row.concentration)), default=None)
+    name = "stress_concentration_max"
+    return {name: Quantity(found, *DEFINITIONS[name], "" if found else "beams have no stress at any fillet")}
 
 
 def numbered(rows: Sequence[FilletRow], before: int = 0) -> dict[int, FilletArc]:

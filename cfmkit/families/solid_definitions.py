@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from cfmkit.results import Quantity
+
 DEFINITIONS = {
     "mesh_force_difference": (
         "ratio",
@@ -30,3 +32,11 @@ DEFINITIONS = {
     ),
 }
 """Name -> dimension and definition; `cfmkit.solid.two_meshes` and `nominal_stress` compute them."""
+
+
+def unknown_to_beams() -> dict[str, Quantity]:
+    """Return them without values, for models that are no solid."""
+    return {
+        name: Quantity(None, *about, "only the model of the part as a solid has it")
+        for name, about in DEFINITIONS.items()
+    }

@@ -71,9 +71,12 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
 @pytest.mark.parametrize(
     ("config", "said"),
     [
-        ("beam_cantilever", "needs a drive of kind 'displacement' or 'rotation'"),
+        (
+            "beam_cantilever",
+            "needs a drive of kind 'displacement' or 'rotation': move the node, and read its force off the curve",
+        ),
         ("beam_end_effector", "does not know analysis.surface"),
-        ("beam_two_layers", "does not know copies.layers"),
+        ("beam_two_layers", "does not know copies.layers: leave that out, or take the beams, 'reissner'"),
     ],
 )
 def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said):

@@ -165,8 +165,16 @@ def test_a_ratio_without_nominal_stress_is_an_empty_cell_and_does_not_count_for_
     ]
     assert fillet_table(rows)["stress_concentration"].tolist() == pytest.approx([math.nan, 1.5], nan_ok=True)
     assert fillet_table(rows)["max_stress"].tolist() == [3.0, 3.0]
-    assert largest_concentration(rows) == 1.5
-    assert largest_concentration(rows[:1]) is None
+    assert largest_concentration(rows)["stress_concentration_max"].value == 1.5
+    none = largest_concentration(rows[:1])["stress_concentration_max"]
+    assert (none.value, none.reason) == (None, "beams have no stress at any fillet")
+
+
+@pytest.mark.parametrize("config", ["beam_williams_toggle", "vcfm_u_shape", "slider_crank_strip"])
+def test_of_beams_the_page_says_that_only_the_solid_has_a_stress_concentration(config):
+    result = cfmkit.analyze(cfmkit.load(f"configs/{config}.yaml", ["analysis.points=21"]))
+    found = result.values["stress_concentration_max"]
+    assert (found.value, found.reason) == (None, "only the model of the part as a solid has it")
 
 
 def test_travels_that_are_asked_for_are_each_solved_once_with_steps_from_rest_on():

@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.solid_definitions import unknown_to_beams
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import between
@@ -85,7 +86,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         numbers |= extremes(solution) | _events(solution)
     if solution.spec.mechanism.drive.kind == "displacement":
         numbers |= ranges(solution)
-    return quantities(DEFINITIONS, numbers)
+    return quantities(DEFINITIONS, numbers) | unknown_to_beams()
 
 
 def window_of(solution: OnCurve) -> tuple[float, float]:

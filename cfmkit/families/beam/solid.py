@@ -324,13 +324,12 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         **solution.error.values(),
-        "stress_concentration_max": largest_concentration(solution.fillets),
     }
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
         numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | ranges(solution)
-    return quantities(DEFINITIONS, numbers)
+    return quantities(DEFINITIONS, numbers) | largest_concentration(solution.fillets)
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:

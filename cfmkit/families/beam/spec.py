@@ -367,7 +367,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield what the model of the part as a solid cannot do."""
     mechanism, analysis = spec.mechanism, spec.analysis
     if mechanism.drive.kind not in ("displacement", "rotation"):
-        yield "needs a drive of kind 'displacement' or 'rotation'"
+        yield "needs a drive of kind 'displacement' or 'rotation': move the node, and read its force off the curve"
     things: dict[str, object] = {"springs": mechanism.springs, "loads": mechanism.loads}
     things["nodes that are moved"] = [name for name, node in mechanism.nodes.items() if node.moved is not None]
     things["pins between beams"] = [
@@ -380,7 +380,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     things["copies.layers"] = mechanism.copies is not None and mechanism.copies.layers > 1
     unknown = [name for name, thing in things.items() if thing]
     if unknown:
-        yield f"does not know {', '.join(unknown)}"
+        yield f"does not know {', '.join(unknown)}: leave that out, or take the beams, 'reissner'"
     if mechanism.closure == "raw":
         yield "needs beams that end at their nodes: closure 'rotscale' or 'chain'"
     if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:

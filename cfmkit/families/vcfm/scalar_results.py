@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.solid_definitions import unknown_to_beams
 from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
@@ -99,8 +100,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
     } | _adjustment(solution)
     error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
-    numbers |= dict.fromkeys(OF_SOLIDS) | ({} if error is None else error.values())
-    return {name: _quantity(name, value) for name, value in numbers.items()} | _bought(solution)
+    found = {name: _quantity(name, value) for name, value in numbers.items()} | unknown_to_beams() | _bought(solution)
+    return found if error is None else found | {name: _quantity(name, value) for name, value in error.values().items()}
 
 
 def _bought(solution: Solution) -> dict[str, Quantity]:

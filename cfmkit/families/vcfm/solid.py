@@ -24,8 +24,7 @@ from cfmkit.families.vcfm.fillet_stress import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
-from cfmkit.families.vcfm.scalar_results import DEFINITIONS
-from cfmkit.results import Result, Status, quantities
+from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 from cfmkit.stock.spec import CutPart
 
@@ -240,10 +239,9 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     if not found.curves:
         return replace(found, warnings=warnings)
     rows = sum(fillets(solution), ())
-    more = quantities(DEFINITIONS, {"stress_concentration_max": largest_concentration(rows)})
     tables = dict(found.tables)
     tables["fillets"] = partial(fillet_table, rows)
-    return replace(found, values={**found.values, **more}, warnings=warnings, tables=tables)
+    return replace(found, values={**found.values, **largest_concentration(rows)}, warnings=warnings, tables=tables)
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:

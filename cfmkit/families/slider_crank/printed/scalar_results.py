@@ -53,7 +53,7 @@ def numbers(solution: Solution) -> Iterator[tuple[str, float | None, str]]:
     check = solution.recheck
     why = "set 'analysis.recheck' to compute it"
     for name in OF_SOLIDS:
-        yield name, None, "only the model of the part as a solid has meshes"
+        yield name, None, "only the model of the part as a solid has it"
     yield "recheck_force", None if check is None else check.force, why
     yield "recheck_stress", None if check is None else check.stress, why
 

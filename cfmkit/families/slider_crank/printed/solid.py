@@ -249,13 +249,13 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         "allowable_stress": limit,
         "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
         **solution.error.values(),
-        "stress_concentration_max": largest_concentration(solution.fillets),
     }
     names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
     about = OF_SPRINGS | DEFINITIONS
-    return {
+    found = {
         name: Quantity(known.get(name), *about[name], ELSEWHERE if known.get(name) is None else "") for name in names
     }
+    return found | largest_concentration(solution.fillets)
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
