@@ -78,6 +78,15 @@ def test_a_sound_mechanism_has_nothing_to_be_said_against_it():
     assert set(names(found)) == set()
 
 
+def test_a_stress_that_is_too_high_from_the_first_point_on_passes_no_limit_there():
+    found = analyzed("mechanism.material.yield_strength=5 MPa", "analysis.preloads=[7.5 mm]")
+    (told,) = (one.message for one in found.warnings if one.name == "overstressed")
+    assert "is above 5 MPa from" in told
+    found = analyzed("mechanism.material.yield_strength=30 MPa", "analysis.preloads=[0 mm]", "analysis.travel=6 mm")
+    (told,) = (one.message for one in found.warnings if one.name == "overstressed")
+    assert "passes 30 MPa at" in told
+
+
 @pytest.mark.parametrize("name", ["not_flat", "overload", "measured_contradiction"])
 def test_what_does_not_hold_is_not_said(name):
     changes = {

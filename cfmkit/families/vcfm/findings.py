@@ -309,11 +309,12 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     over = np.flatnonzero(stress > allowed * (1 + slack))
     if len(over):
         first, top = int(over[0]), int(stress.argmax())
+        place = mm(float(push.travel[first]))
+        passes = f"passes {mpa(allowed)} at {place}" if first else f"is above {mpa(allowed)} from {place} on"
         yield finding(
             "overstressed",
-            f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
-            f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
-            "use longer or thinner leaves, or less preload",
+            f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches "
+            f"{mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; use longer or thinner leaves, or less preload",
         )
 
 
