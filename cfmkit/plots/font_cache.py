@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cfmkit.store.private_folder import private_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 VARIABLE = "MPLCONFIGDIR"
 
@@ -16,21 +20,26 @@ def find_room() -> None:
 
     Nothing is done where the user has named a folder, or where matplotlib is there already.
     """
-    if VARIABLE in os.environ or "matplotlib" in sys.modules or _is_writable(_own_folder()):
+    if VARIABLE in os.environ or "matplotlib" in sys.modules or all(map(_is_writable, _own_folders())):
         return
     if (folder := private_folder("fonts")) is not None:
         os.environ[VARIABLE] = str(folder)
 
 
-def _own_folder() -> Path:
-    base = os.environ.get("XDG_CONFIG_HOME") if sys.platform.startswith(("linux", "freebsd")) else None
-    return Path(base or os.path.expanduser("~/.config")) / "matplotlib"
+def _own_folders() -> Iterator[Path]:
+    """Yield where matplotlib wants to write: its settings, its list of fonts."""
+    for variable, usual in (("XDG_CONFIG_HOME", "~/.config"), ("XDG_CACHE_HOME", "~/.cache")):
+        base = os.environ.get(variable) if sys.platform.startswith(("linux", "freebsd")) else None
+        yield Path(base or os.path.expanduser(usual)) / "matplotlib"
 
 
 def _is_writable(folder: Path) -> bool:
-    """Return whether a folder can be written, or made: then the nearest of those above it that exists counts."""
-    there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("/"))
-    return os.access(there, os.W_OK | os.X_OK)
+    """Return whether a folder can be written, or made; matplotlib would make it, too."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
 
 
 def kept_lists() -> Path:

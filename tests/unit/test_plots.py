@@ -319,7 +319,8 @@ def test_nothing_solved_is_nothing_drawn():
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_pictures_need_no_folder_of_the_user_that_can_be_written(tmp_path, named):
+@pytest.mark.parametrize("lost", ["HOME", "XDG_CACHE_HOME"])
+def test_pictures_need_no_folder_of_the_user_that_can_be_written(tmp_path, named, lost):
     """A service account has none: matplotlib complained on standard error and listed all fonts in every run."""
     program = (
         "import os, cfmkit.plots.style as look; figure = look.new_figure(); figure.text(0, 0, 'a'); look.png(figure); "
@@ -327,7 +328,7 @@ def test_pictures_need_no_folder_of_the_user_that_can_be_written(tmp_path, named
     )
     hidden = {"XDG_CONFIG_HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR"}
     environment = {key: value for key, value in os.environ.items() if key not in hidden}
-    environment |= {"HOME": "/dev/null", "TMPDIR": str(tmp_path)}
+    environment |= {"HOME": str(tmp_path), "TMPDIR": str(tmp_path), lost: "/dev/null"}
     environment |= {"MPLCONFIGDIR": str(tmp_path / "own")} if named else {}
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     kept = Path(done.stdout.strip())

@@ -314,7 +314,8 @@ def _strength(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "overstressed",
             f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches "
-            f"{mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; use longer or thinner leaves, or less preload",
+            f"{mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
+            "use longer or thinner leaves, or less preload",
         )
 
 
