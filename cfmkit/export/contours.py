@@ -152,7 +152,8 @@ def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
         return edge.points
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end])
-    step = min(2.0 * math.acos(max(1.0 - sagitta / edge.radius, 0.0)), turn)
+    # quarter turns at most: a circle within `sagitta` of its centre is still a ring
+    step = min(2.0 * math.acos(max(1.0 - sagitta / edge.radius, 0.0)), turn, 0.5 * math.pi)
     count = max(math.ceil(abs(edge.end - edge.start) / step), 2)
     angle = np.linspace(edge.start, edge.end, count + 1)
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])

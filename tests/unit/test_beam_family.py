@@ -14,7 +14,7 @@ from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
 from cfmkit.elastica import Section, Taper
-from cfmkit.errors import DataError, SpecError
+from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
 from cfmkit.results import Status
@@ -521,6 +521,19 @@ def test_a_window_that_is_wider_than_the_curve_is_told():
     assert "50 ... 120 mm is not within the curve, 0 ... 100 mm" in warned(wide)["window_outside"]
     exact = cfmkit.analyze(cantilever(("points: 21", "points: 21\n  window: [0 mm, 100 mm]")))
     assert "window_outside" not in warned(exact)
+
+
+def test_a_travel_that_only_beams_of_several_times_their_length_could_follow_is_refused():
+    """It took minutes, for a force of beams that are 200 times as long as they were made."""
+    with pytest.raises(InputError, match=r"to more than twice their length: from 'eye' .* 35.26 mm .* 105.8 mm at most"):
+        solved("beam_v_bifurcation", "analysis.travel=8600 mm")
+    assert solved("beam_v_bifurcation", "analysis.travel=40 mm").status is Status.COMPLETE
+
+
+def test_a_network_without_any_equilibrium_cannot_be_rescaled():
+    design = cfmkit.design(config("beam_rescaled", "mechanism.nodes.n4.at=[12.44 mm, 2.4e10 mm]"))
+    assert design.status is Status.NO_EQUILIBRIUM
+    assert "has no force at the end of its window" in design.message
 
 
 def test_the_last_point_of_a_drive_to_the_negative_side_counts():

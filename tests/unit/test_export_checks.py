@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+import cfmkit
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, circle, polygon
@@ -147,3 +148,10 @@ def test_a_mirrored_arc_turns_the_other_way():
 def test_the_extents_of_a_contour_hold_its_arcs():
     assert circle((1.0, 2.0), 0.5, "cut").extents == (0.5, 1.5, 1.5, 2.5)
     assert SQUARE.extents == (0, 0, 0.1, 0.1)
+
+
+def test_a_link_too_short_to_be_drawn_is_refused_in_one_line():
+    """Its eye is smaller than what circles are flattened within: two points are no ring."""
+    spec = cfmkit.load("configs/slider_crank_li2019.yaml", ["mechanism.coupler_length=5e-7 mm"])
+    with pytest.raises(GeometryError):
+        cfmkit.export(spec)

@@ -107,8 +107,11 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
 def _force(spec: BeamSpec) -> float | None:
     """Return the force at the end of the window [N]."""
     solution = solve(spec)
-    x, end = solution.motion, window_of(solution)[1]
-    if len(x) < 2 or not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12):
+    x = solution.motion
+    if len(x) < 2:
+        return None
+    end = window_of(solution)[1]
+    if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12):
         return None
     force = value_at(x, solution.effort, end)
     return force if np.isfinite(force) and force != 0 else None

@@ -11,6 +11,7 @@ operations (2010), sec. 2.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -32,10 +33,14 @@ from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.curves import Kind
+    from cfmkit.elastica.model.network import Network
     from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
 
+_TORN = 3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
@@ -89,6 +94,7 @@ def solve(spec: BeamSpec) -> Solution:
     """Return the path of a mechanism as its specification asks for it."""
     assembly = assemble(spec)
     _refuse_tight_coils(assembly)
+    _refuse_torn_beams(assembly)
     path = trace(assembly.network, assembly.drive(), assembly.control())
     keep, ends = _kept(assembly, path)
     return Solution(assembly, path, keep, ends)
@@ -110,6 +116,48 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
                 f"mechanism.beams.{name}.shape winds the beam to a radius of {format_short(radius, 'length')}, less "
                 f"than half of its thickness of {format_short(thick, 'length')}: fewer turns, or a thinner beam"
             )
+
+
+def _refuse_torn_beams(assembly: Assembly) -> None:
+    """Refuse a travel that only beams of several times their length could follow: no law of a material holds there.
+
+    So taut beams would need thousands of segments, and minutes for every solution.
+    """
+    spec, network = assembly.spec, assembly.network
+    drive, travel = spec.mechanism.drive, spec.analysis.travel
+    if drive.kind != "displacement" or travel is None:
+        return
+    straight = {name: _distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
+    if abs(spec.extent) <= _TORN * _way_to_support(network, drive.node, straight):
+        return
+    lengths = {name: fit.length for name, fit in Layout(network, assembly.drive()).fits.items()}
+    way = _way_to_support(network, drive.node, lengths)
+    if abs(spec.extent) > _TORN * way:
+        raise InputError(
+            f"analysis.travel of {format_short(spec.extent, 'length')} would stretch beams to more than twice their "
+            f"length: from {drive.node!r} to a node that is held they are {format_short(way, 'length')} long; "
+            f"{format_short(_TORN * way, 'length')} at most"
+        )
+
+
+def _distance(network: Network, one: str, other: str) -> float:
+    first, second = network.nodes[one], network.nodes[other]
+    return math.hypot(second.x - first.x, second.y - first.y)
+
+
+def _way_to_support(network: Network, node: str, lengths: Mapping[str, float]) -> float:
+    """Return the length of beams and links from a node to the nearest one that is held in place [m]; else infinity."""
+    ways = [(beam.start, beam.end, lengths[name]) for name, beam in network.beams.items()]
+    ways += [(link.master, link.node, _distance(network, link.master, link.node)) for link in network.links]
+    reached = {node: 0.0}
+    for _ in network.nodes:
+        for one, other, length in (*ways, *((b, a, length) for a, b, length in ways)):
+            if one in reached and reached[one] + length < reached.get(other, math.inf):
+                reached[other] = reached[one] + length
+    held = {name: at.support for name, at in network.nodes.items() if at.support.along and at.support.across}
+    return min(
+        (way + math.hypot(*held[at].displacement[:2]) for at, way in reached.items() if at in held), default=math.inf
+    )
 
 
 def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:

@@ -111,13 +111,15 @@ def within(solution: OnCurve, low: float, high: float) -> Any:
 
 
 def ranges(solution: OnCurve) -> dict[str, float | None]:
-    """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
+    """Return what Lan says about the range that ends at d; nothing on a curve that turns back or has no point."""
     x, force = solution.motion, solution.effort
-    end = window_of(solution)[1]
     numbers: dict[str, float | None] = dict.fromkeys(
         ("nominal_force", "range_start", "range_fraction", "strict_range_start", "strict_range_fraction"),
     )
     numbers |= dict.fromkeys(("stress_at_end", "stress_limit_displacement"))
+    if not len(x):
+        return numbers
+    end = window_of(solution)[1]
     if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12) or not np.isfinite(force).all():
         return numbers
     law = solution.everywhere
