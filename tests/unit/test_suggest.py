@@ -16,11 +16,13 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
+from cfmkit.results import Status
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
+from cfmkit.studies.executors import Lost
 from cfmkit.studies.suggest import figures, good_parts, search
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
@@ -49,6 +51,36 @@ def test_a_feasible_wish_is_in_reach_of_its_own_family(path):
     asked = wish_of(str(WISHES / path.name), {}).wish()
     offer = function_named(family(spec.family).propose)(asked, Run())
     assert offer.candidates, offer.reason
+
+
+FATIGUE = "{points: [[1000, 50 MPa], [1000000, 25 MPa]], ultimate_strength: 70 MPa}"
+LASTING = f"{{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 40 MPa, fatigue: {FATIGUE}}}"
+
+
+def test_more_cycles_than_a_material_is_known_for_are_refused_in_one_line():
+    with pytest.raises(SpecError, match=r"'cycles' is 2e.06, more than the 1e.06 at which 'points' end") as error:
+        wish(material=f"[pom, {LASTING}]", cycles="2000000")
+    assert len(error.value.problems) == 1
+    assert wish(material=f"[pom, {LASTING}]", cycles="1000000").cycles == 1_000_000
+
+
+def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_known_to_last():
+    keys = {"force": "11.14 N", "travel": "3.23 mm", "room": "[110 mm, 80 mm, 8 mm]", "cycles": "10000"}
+    asked, candidates = offered("vcfm", **keys, material=LASTING)
+    coiled = next(one for one in candidates if one.variant == "2 Vs, catalogue springs")
+    one = made(ProposalJob("vcfm", coiled, asked, 0))
+    assert one.good, one.missed or one.message
+    assert "fatigue_life" in {requirement.metric for requirement in one.spec.requirements}
+    assert one.numbers["life"] is None
+
+
+def test_a_family_that_fails_to_answer_does_not_look_as_if_the_time_were_up():
+    def crashed(work, jobs, stopping):
+        yield from ((job, Lost(Status.CRASHED, "a bug in cfmkit: oh")) for job in jobs)
+
+    found = suggest(wish(), Run(executor=crashed))
+    assert not found.late
+    assert {one.offer.reason for one in found.answers} == {"a bug in cfmkit: oh"}
 
 
 def test_options_replace_keys_of_a_file(tmp_path):

@@ -32,6 +32,9 @@ LONGEST = 15.0
 OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
+LIVES = ("fatigue_life", "spring_life")
+"""Metrics that say how many cycles the material, and bought springs, last."""
+
 SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
 
@@ -200,9 +203,10 @@ def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]
     if wish.hysteresis is not None and "unload" in result.curve.branches:
         lost = wish.hysteresis * wish.target * wish.travel
         yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
-    life = found.get("fatigue_life")
-    if wish.cycles is not None and life is not None and life.value is not None:
-        yield {"metric": "fatigue_life", "min": f"{wish.cycles}"}
+    for name in LIVES:
+        life = found.get(name)
+        if wish.cycles is not None and life is not None and life.value is not None:
+            yield {"metric": name, "min": f"{wish.cycles}"}
     if wish.adjustable is not None and "force_change_max" in found:
         most = max(abs(end - wish.target) for end in wish.adjustable)
         yield {"metric": "force_change_max", "min": format_short(0.99 * most, "force", 12)}
@@ -310,10 +314,19 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         "along": None if space is None else space.along,
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
-        "life": None if (life := found.get("fatigue_life")) is None else life.value,
+        "life": _life(found),
         "yield": None,
         "finer_deviation": None,
     }
+
+
+def _life(found: Mapping[str, Any]) -> float | None:
+    """Return the life of what lasts shortest; None where that of the material, or of a bought spring, is not known."""
+    lives = [found[name].value for name in LIVES if name in found]
+    known = [life for life in lives if life is not None]
+    if len(known) < len(lives) or ("wire_stress_max" in found and "spring_life" not in found):
+        return None
+    return min(known, default=None)
 
 
 def _notes(space: Room | None, result: Result) -> Iterator[str]:

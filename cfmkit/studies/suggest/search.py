@@ -25,6 +25,7 @@ from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.identity import code_stamp, stable_hash
+from cfmkit.studies.executors import Lost
 from cfmkit.studies.pool import until
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from cfmkit.families.wishes import Candidate, Wish
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.executors import Lost
-
 
 ENOUGH, ENOUGH_WITH_PARTS = 3, 2
 """Proposals of a family after which no more of its candidates are made; fewer where parts of each are drawn."""
@@ -46,6 +45,8 @@ ROUNDS = (3, 4, 6, 12)
 
 ASKING, LAST = 0.5, 0.05
 """Shares of the time budget in which families answer, and which are left where nothing is found."""
+
+UNANSWERED = "the time budget ended before it had answered"
 
 RESERVE = 14.0
 """Seconds that figures of a dozen proposals take on two cores."""
@@ -259,13 +260,15 @@ def _answers(wish: Wish, run: Run, deadline: float | None) -> tuple[list[Answere
     asked = list(names())
     plain = Run(run.seed)
     found = dict(until(run.executor, deadline)(partial(_asked, wish, plain), iter(asked), lambda: False))
-    offers = {name: offer for name, offer in found.items() if isinstance(offer, FamilyOffer)}
-    lost = [name for name in asked if name not in offers]
-    answers = [
-        Answered(name, offers.get(name, FamilyOffer(reason="the time budget ended before it had answered")))
-        for name in asked
-    ]
-    return [one for one in answers if one.offer.candidates or one.offer.reason], bool(lost)
+    answers, late = [], False
+    for name in asked:
+        outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED)
+        if not isinstance(outcome, FamilyOffer):
+            timed_out = outcome.status is Status.TIMEOUT
+            late |= timed_out
+            outcome = FamilyOffer(reason=UNANSWERED if timed_out else outcome.message)
+        answers.append(Answered(name, outcome))
+    return [one for one in answers if one.offer.candidates or one.offer.reason], late
 
 
 def _asked(wish: Wish, run: Run, name: str) -> FamilyOffer:

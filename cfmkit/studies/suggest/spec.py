@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfmkit.families.base import article
 from cfmkit.families.wishes import Wish
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.processes import PROCESSES, ProcessName
-from cfmkit.stock.spec import MaterialField  # noqa: TC001 - read by pydantic
+from cfmkit.stock.spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
@@ -111,6 +111,24 @@ class WishBlock(Model):
                 refuse("Wish", {("adjustable",): "the force wished is not in this range"})
         return self
 
+    @model_validator(mode="after")
+    def _lasts_as_long_as_materials_are_known(self) -> Self:
+        for material in self._materials:
+            fatigue = material.fatigue
+            if self.cycles is None or fatigue is None:
+                continue
+            try:
+                type(fatigue).model_validate(fatigue.model_dump(exclude_unset=True) | {"cycles": float(self.cycles)})
+            except ValidationError as error:
+                refuse("Wish", {("cycles",): error.errors()[0]["msg"].removeprefix("Value error, ")})
+        return self
+
+    @property
+    def _materials(self) -> tuple[MaterialSpec, ...]:
+        if self.material is None:
+            return ()
+        return self.material if isinstance(self.material, tuple) else (self.material,)
+
     @property
     def ends(self) -> tuple[float, float]:
         """The band in which every force has to lie, or of what the mean may be [N or N m]."""
@@ -122,8 +140,7 @@ class WishBlock(Model):
         value: Any = self.force if self.force is not None else self.torque
         thinnest = PROCESSES[self.process].least_feature if self.process else None
         usual = USUAL[self.process] if self.process else ()
-        given = self.material if isinstance(self.material, tuple) else () if self.material is None else (self.material,)
-        blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in given)
+        blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in self._materials)
         for block in blocks:
             if self.cycles is not None and block.get("fatigue"):
                 block["fatigue"]["cycles"] = float(self.cycles)
