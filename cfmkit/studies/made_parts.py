@@ -18,7 +18,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, Problem, SpecError
 from cfmkit.families import family
-from cfmkit.metrics import split_name
+from cfmkit.metrics import split_name, windows_judged
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
@@ -103,12 +103,15 @@ class JudgedParts:
         Which parts have no result, or one that ends early.
     why : str
         What became of the first of those.
+    lacking : tuple of int and str
+        How many others have no value for a requirement, and why the first has none.
     """
 
     met: NDArray[np.bool_]
     trimmed: NDArray[np.bool_]
     failed: NDArray[np.bool_]
     why: str = ""
+    lacking: tuple[int, str] = (0, "")
 
     def share(self, met: NDArray[np.bool_] | None = None) -> YieldShare:
         """Return the share of parts that meet every requirement."""
@@ -158,7 +161,19 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         failed[indices] = ~complete
         met[indices] = rows.met & complete[:, None]
         found[indices] = rows.values
-    return JudgedParts(met, _trimmed(spec, nominal, metrics, found, met), failed, why)
+    lacking = np.flatnonzero(np.isnan(found[:, 1:]).any(axis=1) & ~failed)
+    about = (len(lacking), _why_lacking(made, values[lacking[0]], run) if len(lacking) else "")
+    return JudgedParts(met, _trimmed(spec, nominal, metrics, found, met), failed, why, about)
+
+
+def _why_lacking(made: DesignTolerances, values: FloatArray, run: Run) -> str:
+    """Return what a part's analysis says of a window beyond its curve; empty where something else is the matter."""
+    part = made.spec.replace(dict(zip(made.paths, values.tolist(), strict=True)))
+    try:
+        result = windows_judged(family(part.family).analyze(part, run))
+    except CfmError as error:
+        return str(error)
+    return next((one.message for one in result.warnings if one.name == "window_outside"), "")
 
 
 def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
@@ -280,6 +295,8 @@ class Yields:
         Of the specification that the design began with.
     why : str
         Why there is no yield of that.
+    lacking : tuple of int and str
+        How many of the parts have a curve, but no value for a requirement, and why the first has none.
     """
 
     made: DesignTolerances
@@ -290,6 +307,7 @@ class Yields:
     each: tuple[YieldShare, ...]
     before: YieldShare | None
     why: str = ""
+    lacking: tuple[int, str] = (0, "")
 
     def quantities(self) -> dict[str, Quantity]:
         """Return the metrics of many parts."""
@@ -330,6 +348,10 @@ class Yields:
             told += f"; {_percent(self.before.value)} of the specification as given"
         if self.after.failed:
             told += f"; {self.after.failed} have no complete result and count as bad (the first: {self.after.why})"
+        count, reason = self.lacking
+        if count:
+            first = f" (the first: {reason})" if reason else ""
+            told += f"; {count} have no value for a requirement and count as bad{first}"
         if self.frozen is not None:
             told += f"; {_percent(self.frozen.value)} without the errors of the whole part ({', '.join(self.common)})"
         told += f"; {_percent(self.trimmed.value)} after a trim of the force"
@@ -378,7 +400,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     before, why = _before(given, block, run)
     each = tuple(judged.share(judged.met[:, [k]]) for k in range(judged.met.shape[1]))
     paths = tuple(made.paths[k] for k in shared)
-    return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why)
+    return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why, judged.lacking)
 
 
 def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShare | None, str]:

@@ -39,6 +39,7 @@ from cfmkit.studies.requirement_constraints import (
     places_of,
     rows_of,
     sampled_of,
+    states_places,
 )
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.sensitivity.inverse import LimitsAlong
@@ -117,6 +118,14 @@ class Sight:
             return numbers_of(self.variant(x, errors), self.rows, self.run)
         except CfmError:
             return None
+
+    def is_good(self, x: FloatArray, errors: FloatArray) -> bool:
+        """Return whether a part keeps every row, over all of the windows."""
+        try:
+            numbers = numbers_of(self.variant(x, errors), self.rows, self.run, whole=states_places(self.spec))
+        except CfmError:
+            return False
+        return numbers is not None and bool((self.rows.matrix @ numbers + self.rows.constant >= 0).all())
 
     def slopes(self, x: FloatArray, errors: FloatArray) -> PartSlopes | None:
         """Return the exact derivatives of the numbers of a part, as far as its family knows them; None of none."""
@@ -319,12 +328,28 @@ def _largest(
 
 def checked(sight: Sight, x: FloatArray) -> int:
     """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
-    errors = sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal
-    good = 0
-    for one in errors:
-        numbers = sight(x, one)
-        good += numbers is not None and bool((sight.rows.matrix @ numbers + sight.rows.constant >= 0).all())
-    return good
+    return sum(sight.is_good(x, one) for one in _errors(sight))
+
+
+def _ends_early(sight: Sight, x: FloatArray) -> int:
+    """Return how many of the parts that are solved have numbers, but not over all of the stated windows."""
+    if not states_places(sight.spec):
+        return 0
+    places, run = sight.rows.places, sight.run
+    parts = [sight.variant(x, one) for one in _errors(sight)]
+    short = 0
+    for part in parts:
+        try:
+            found = sampled_of(part, places, run)
+            short += found is not None and sampled_of(part, places, run, whole=True) is None
+        except CfmError:
+            continue
+    return short
+
+
+def _errors(sight: Sight) -> FloatArray:
+    """Return the errors of the parts that are solved, (n, d)."""
+    return np.asarray(sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal)
 
 
 def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> RobustProblem:
@@ -389,5 +414,10 @@ def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Ro
         f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
         f"make it tighter, {cure} or require less"
     )
+    if short := _ends_early(sight, np.array([float(sight.spec.at(path)) for path in sight.free])):
+        told += (
+            f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
+            "the travel, such as [1 %, 100 %], which are those of each part"
+        )
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
     return Design(None, Status.INFEASIBLE, told, nearest_feasible=nearest, search=design.search, tables=design.tables)

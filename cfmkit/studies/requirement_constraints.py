@@ -17,6 +17,7 @@ from cfmkit.families.base import Run, Sampled, function_named
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
+from cfmkit.specs.units import Share
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.study import Study
 
@@ -252,6 +253,16 @@ def _window(nominal: Result, over: Any) -> tuple[float, float]:
     return (found.lo, found.hi) if found else (float(motion.min()), float(motion.max()))
 
 
+def states_places(spec: Spec) -> bool:
+    """Return whether some window of a requirement ends at stated places, which a shorter part does not reach.
+
+    Shares of the travel, and windows that are not stated, are those of each part.
+    """
+    usual = getattr(getattr(spec, "analysis", None), "window", None)
+    windows = [one.over or usual for one in spec.part_requirements]
+    return any(not isinstance(end, Share) for window in windows if window for end in window)
+
+
 def places_of(nominal: Result) -> FloatArray:
     """Return the poses at which a part is looked at: those of the windows of all requirements."""
     wanted: list[FloatArray] = []
@@ -274,8 +285,11 @@ def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementR
     return builder.rows_of()
 
 
-def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
-    """Return effort and stress of a part at places: by the family's quick way, else from its analysis."""
+def sampled_of(spec: Spec, places: FloatArray, run: Run, whole: bool = False) -> Sampled | None:
+    """Return effort and stress of a part at places: by the family's quick way, else from its analysis.
+
+    Where its curve ends a little earlier they are those at its end; None then, if the whole range is needed.
+    """
     quick = family(spec.family).sampled
     if quick is not None:
         found: Sampled | None = function_named(quick)(spec, places)
@@ -290,6 +304,9 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
         motion, order = curve.motion[on], np.argsort(curve.motion[on], kind="stable")
         if len(motion) < 2 or not (np.diff(motion[order]) > 0).all():
             return None
+        slack = 1e-9 * float(places[-1] - places[0])
+        if whole and not motion.min() - slack <= places[0] <= places[-1] <= motion.max() + slack:
+            return None
         effort[branch] = np.interp(places, motion[order], curve.effort[on][order])
         if "max_stress" in curve.extra:
             values = np.asarray(curve.extra["max_stress"].values, dtype=float)[on]
@@ -302,9 +319,9 @@ def numbers_in(seen: Sampled) -> FloatArray:
     return np.concatenate([*seen.effort.values(), *seen.stress])
 
 
-def numbers_of(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
-    """Return what rows look at of a part, (q,); None where it has no such numbers."""
-    found = sampled_of(spec, rows.places, run)
+def numbers_of(spec: Spec, rows: RequirementRows, run: Run, whole: bool = False) -> FloatArray | None:
+    """Return what rows look at of a part, (q,); None where it has no such numbers; `whole`: see `sampled_of`."""
+    found = sampled_of(spec, rows.places, run, whole)
     if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
         return None
     numbers = [numbers_in(found)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
+from cfmkit.specs.units import Share
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.made_parts import common, judge
+from cfmkit.studies.made_parts import common, judge, yields_of
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.study import Study
 
@@ -44,6 +46,21 @@ def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
     assert [one.metric for one in missed.requirements][-1] == "yield"
     assert int(missed.exit_code) == 5
     assert int(designed(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
+
+
+def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says_so():
+    """A cam cut for 240 mm ends a few micrometres earlier with a larger roller: half the parts had no value, unsaid."""
+    tolerances = {"mechanism.roller_radius": {"normal": "0.05 mm"}}
+    design = cfmkit.design("configs/cam.yaml").spec.replace({"design.tolerances": tolerances, "design.samples": 40})
+    found = yields_of(replace(cfmkit.analyze(design), spec=design), None, Run())
+    count, reason = found.lacking
+    assert count == 40 - found.after.good > 10
+    assert "the window 2 ... 240 mm is not within the curve" in reason
+    assert f"{count} have no value for a requirement and count as bad (the first: " in found.sentence()
+    shares = [one.model_copy(update={"over": (Share(0.02), Share(1.0))}) for one in design.requirements[:2]]
+    of_each = design.replace({"requirements": tuple(shares), "analysis.window": None})
+    found = yields_of(replace(cfmkit.analyze(of_each), spec=of_each), None, Run())
+    assert (found.lacking, found.after.good) == ((0, ""), 40)
 
 
 def test_an_analysis_does_not_judge_a_yield():

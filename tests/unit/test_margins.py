@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,10 +14,11 @@ from cfmkit.cli.main import main
 from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families.base import Run
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
+from cfmkit.specs.units import Share
 from cfmkit.studies import margins
 from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.margins import with_design_margins
-from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of
+from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of, states_places
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 
@@ -28,6 +30,22 @@ def rows_and_numbers(spec):
     rows = rows_of(result, seen, places)
     numbers = np.concatenate([*seen.effort.values(), *seen.stress])
     return result, rows, rows.matrix @ numbers + rows.constant
+
+
+def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_the_yield():
+    design = cfmkit.design("configs/cam.yaml").spec
+    design = design.replace({"design.tolerances": {"mechanism.roller_radius": {"normal": "0.05 mm"}}})
+    nominal = cfmkit.analyze(design)
+    places = places_of(nominal)
+    rows = rows_of(nominal, sampled_of(design, places, Run()), places)
+    sight = margins.Sight(design, (), tolerances_of(design, design.design, 0), rows, Run())
+    larger, smaller = np.array([5e-5]), np.array([-5e-5])
+    assert [sight.is_good(np.empty(0), one) for one in (larger, smaller)] in ([False, True], [True, False])
+    assert all(sight(np.empty(0), one) is not None for one in (larger, smaller))
+    end = Share(1.0)
+    shares = tuple(one.model_copy(update={"over": (Share(0.02), end)}) for one in design.requirements[:2])
+    sight = replace(sight, spec=design.replace({"requirements": shares}))
+    assert not states_places(sight.spec)
 
 
 @pytest.mark.parametrize("name", ["beam_lan2010_yield", "slider_crank_strip_yield"])
@@ -199,6 +217,9 @@ class TwoLimits:
     def __call__(self, x, errors):
         left = 1.0 - 0.4 * x[0]
         return np.array([left + 2.0 * errors[0], left - 2.0 * errors[0], x[0] - 0.5 + 0.2 * errors[1]])
+
+    def is_good(self, x, errors):
+        return bool((self(x, errors) >= 0).all())
 
 
 def test_the_largest_yield_is_found_where_the_worst_parts_cannot_be_helped():
