@@ -9,6 +9,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.families.slider_crank.printed.solid import part_of
+from cfmkit.plots.style import is_to_scale
 from cfmkit.results import Status
 
 QUICK = ("analysis.fidelity=solid", "analysis.solid.poses=7", "analysis.points=41")
@@ -78,6 +79,12 @@ def test_the_stress_map_numbers_each_fillet_once_beside_it_as_the_table_does(str
         place = np.array([table["x"][row], table["y"][row]]) - way * (table["place"][row] == "slider")
         stands = ax.transData.inverted().transform(text.get_transform().transform(text.get_position()))
         assert np.hypot(*(stands - place)) < 10.0  # mm of a part that is 125 mm long
+
+
+def test_the_stress_map_is_to_scale_so_that_a_narrow_figure_does_not_squeeze_the_part(strip):
+    figure = api.figures(strip["solid"])["stress_map"]()
+    assert is_to_scale(figure)
+    assert [ax.get_aspect() for ax in figure.axes][:-1] == [1.0] * (len(figure.axes) - 1)
 
 
 def test_a_mirrored_pair_has_twice_the_force(strip):
