@@ -83,6 +83,13 @@ def test_a_family_that_fails_to_answer_does_not_look_as_if_the_time_were_up():
     assert {one.offer.reason for one in found.answers} == {"a bug in cfmkit: oh"}
 
 
+def test_a_comparison_that_the_time_ends_does_not_ask_for_the_option_that_was_given():
+    asked, candidates = offered("beam")
+    one = made(ProposalJob("beam", candidates[0], asked, 0))
+    compared = search.with_better_models(search.Suggestions(asked, (one,), (), ()), Run(time_budget=0.0), True)
+    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {search.NOT_VERIFIED}"
+
+
 def test_options_replace_keys_of_a_file(tmp_path):
     file = tmp_path / "wish.yaml"
     file.write_text("cfmkit: 1\nwish: {force: 10 N, travel: 3 mm, room: [80 mm, 60 mm]}\n")

@@ -232,7 +232,7 @@ def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions
     executor = until(run.executor, clock.deadline)
     done = dict(executor(partial(_verified_of, found.proposals), iter(range(len(found.proposals))), clock.late))
     kept = [
-        one if isinstance(one := done.get(index), Proposal) else unverified(old)
+        one if isinstance(one := done.get(index), Proposal) else unverified(old, NOT_VERIFIED)
         for index, old in enumerate(found.proposals)
     ]
     return replace(found, proposals=tuple(kept))
@@ -410,10 +410,13 @@ def verified(proposal: Proposal) -> Proposal:
     )
 
 
-def unverified(proposal: Proposal) -> Proposal:
-    """Return a proposal that says which better model was not run."""
+NOT_VERIFIED = "it had not ended when the time budget did"
+
+
+def unverified(proposal: Proposal, why: str = "--verify") -> Proposal:
+    """Return a proposal that says which better model was not run, and why or how it is."""
     found = better(proposal)
-    return proposal if found is None else _noted(proposal, f"not compared with the model {found[0]!r}: --verify", None)
+    return proposal if found is None else _noted(proposal, f"not compared with the model {found[0]!r}: {why}", None)
 
 
 def _noted(proposal: Proposal, note: str, deviation: float | None) -> Proposal:
