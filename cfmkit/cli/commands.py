@@ -107,8 +107,20 @@ def _plain(command: Any) -> Any:
 
     command.get_help_option = help_option
     for item in command.params:
-        _untyped(item)
+        _convert_if_given(_untyped(item))
     return command
+
+
+def _convert_if_given(item: Any) -> None:
+    """Let an option that is not given be None at once: to convert nothing typer makes a validator for every option."""
+    convert, several = item.process_value, item.nargs == -1 or getattr(item, "multiple", False)
+
+    def process_value(ctx: Any, value: Any) -> Any:
+        if value is None and not item.required and item.callback is None:
+            return () if several else None
+        return convert(ctx, value)
+
+    item.process_value = process_value
 
 
 def _untyped(item: Any) -> Any:

@@ -6,8 +6,8 @@ Arcs are arcs (`A` commands), so that nothing is lost against the DXF.
 from __future__ import annotations
 
 import math
+from html import escape
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def _texts(labels: Sequence[EngravedText]) -> list[str]:
         turn = f"translate({_text(x)} {_text(-y)}) rotate({_text(-math.degrees(one.angle))})"
         # capitals are 0.7 of a font's size high
         look = f'y="{_text(0.5 * size)}" font-size="{_text(size / 0.7)}"'
-        found.append(f'<text transform="{turn}" {look}>{escape(one.text)}</text>')
+        found.append(f'<text transform="{turn}" {look}>{escape(one.text, quote=False)}</text>')
     return [*found, "</g>"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -223,6 +224,21 @@ def function_named(name: str) -> Any:
     """
     module, _, function = name.partition(":")
     return getattr(import_module(module), function)
+
+
+def when_called(name: str) -> Callable[..., Any]:
+    """Return the function that ``"module:function"`` names, without its module: that is imported at the first call.
+
+    Examples
+    --------
+    >>> when_called("math:hypot")(3.0, 4.0)
+    5.0
+    """
+    return partial(_call, name)
+
+
+def _call(name: str, /, *given: Any, **named: Any) -> Any:
+    return function_named(name)(*given, **named)
 
 
 _SPELT = "aefhilmnorsx"

@@ -6,8 +6,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from cfmkit.cli.commands import _convert_if_given
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PROBE = """
@@ -32,6 +35,7 @@ RADII = "mechanism.roller_radius=8 mm:16 mm:3"
 FEW = ("--samples", "10", "-j", "1")
 DRAWING = {"matplotlib", "PIL"}
 CUTTING = {"ezdxf", "shapely"}
+NETWORK = {"ssl", "http"}
 
 
 @pytest.mark.parametrize(
@@ -40,11 +44,14 @@ CUTTING = {"ezdxf", "shapely"}
         (("--help",), {"numpy", "pydantic", "pint", "yaml", "scipy"} | DRAWING | CUTTING),
         (("--version",), {"numpy", "pint", "yaml", "scipy", "rich"} | DRAWING | CUTTING),
         (("analyze", "--help"), {"numpy", "pint", "yaml", "scipy"} | DRAWING | CUTTING),
-        (("check", str(CONFIGS / "cam.yaml")), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("check", str(CONFIGS / "cam.yaml")), {"scipy", "pint"} | DRAWING | CUTTING | NETWORK),
         (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots"), {"scipy", "pint"} | DRAWING | CUTTING),
         (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "-q"), {"scipy", "rich"} | DRAWING | CUTTING),
         (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "--json"), {"scipy", "rich"} | DRAWING | CUTTING),
-        (("design", str(CONFIGS / "cam.yaml"), "--no-plots"), DRAWING),  # scipy.special draws the parts of 'bench'
+        (
+            ("design", str(CONFIGS / "cam.yaml"), "--no-plots"),
+            DRAWING | NETWORK,
+        ),  # scipy.special draws the parts of 'bench'
         (("sweep", str(CONFIGS / "cam.yaml"), "--vary", RADII, "--no-plots"), {"scipy"} | DRAWING | CUTTING),
         (("sensitivity", str(CONFIGS / "studies/cam_tolerance.yaml"), *FEW, "--no-plots"), DRAWING | CUTTING),
         (("batch", str(CONFIGS / "cam.yaml"), "--verb", "analyze", "-j", "1", "--no-plots"), DRAWING | CUTTING),
@@ -59,6 +66,31 @@ CUTTING = {"ezdxf", "shapely"}
 )
 def test_a_command_does_not_import_what_it_does_not_need(tmp_path, arguments, forbidden):
     assert not imported(tmp_path, *arguments) & forbidden
+
+
+@pytest.mark.parametrize(
+    ("spec", "rooms"),
+    [
+        ("cam", ("cam.design", "cam.many_designs")),
+        ("vcfm_ding2022", ("vcfm.design", "vcfm.many_designs")),
+        ("slider_crank_li2019", ("slider_crank.dispatch", "slider_crank.springs.many_designs")),
+        ("beam_lan2010", ("beam.design", "beam.shaping.design")),
+    ],
+)
+def test_a_check_does_not_import_what_only_designs_and_sweeps_need(tmp_path, spec, rooms):
+    code = "import sys; from cfmkit.cli.main import main; main(sys.argv[1:]); print(*sys.modules)"
+    command = [sys.executable, "-c", code, "check", str(CONFIGS / f"{spec}.yaml")]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert not {f"cfmkit.families.{room}" for room in rooms} & set(done.stdout.split())
+
+
+@pytest.mark.parametrize(("nargs", "nothing"), [(1, None), (-1, ())])
+def test_an_option_that_is_not_given_is_not_converted(nargs, nothing):
+    """Typer makes a validator for each option that is converted."""
+    option = SimpleNamespace(nargs=nargs, required=False, callback=None, process_value=lambda _ctx, value: [value])
+    _convert_if_given(option)
+    assert option.process_value(None, None) == nothing
+    assert option.process_value(None, "3") == ["3"]
 
 
 def test_import_cfmkit_imports_nothing_heavy():

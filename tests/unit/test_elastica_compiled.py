@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import gc
 import io
 import logging
 import os
@@ -23,12 +24,13 @@ import pytest
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
 from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, march, packing
 from cfmkit.elastica.kernels.compiled import reported
+from cfmkit.elastica.kernels.compiler import OPTIONS
 from cfmkit.elastica.kernels.packing import HEAD, objects
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
 from cfmkit.store.private_folder import trusted
 
-_count, _solve, _predict = dense.positive_count, dense.lu_solve, march._predict
+_count, _solve, _swap, _predict = dense.positive_count, dense.lu_solve, dense._swap, march._predict
 
 
 @numba.njit
@@ -286,6 +288,54 @@ def test_code_does_not_follow_from_what_its_process_compiled_before() -> None:
     assert here == alone
 
 
+_USUAL = """
+import sys
+import numba
+from numba.core.compiler import Compiler
+from cfmkit.elastica.kernels import build
+from cfmkit.elastica.kernels.compiler import KERNELS, OPTIONS
+build._call_type = lambda function, *given: super(numba.types.Function, function).get_call_type(*given)
+OPTIONS["pipeline_class"] = Compiler
+for each in KERNELS:
+    each._compiler.pipeline_class = Compiler
+sys.stdout.buffer.write(build.compiled("states").content)
+"""
+
+
+@pytest.mark.usefixtures("usual_door")
+def test_what_is_left_out_and_remembered_while_compiling_does_not_change_the_code() -> None:
+    """Three seconds. All passes of numba, and every call typed anew; one door, all six were compared by hand."""
+    from cfmkit.elastica.kernels import build
+
+    usual = subprocess.run([sys.executable, "-P", "-c", _USUAL], capture_output=True, check=True).stdout
+    assert build.compiled("states").content == usual
+
+
+def test_a_kernel_is_not_compiled_once_more_for_an_argument_that_is_a_constant() -> None:
+    from cfmkit.elastica.kernels import build
+
+    @numba.njit(**OPTIONS)
+    def clear_both(a):  # type: ignore[no-untyped-def]
+        _swap(a, 0, 1)
+        for k in range(2):
+            _swap(a, k, k)
+
+    with build._drafting():
+        clear_both.compile((numba.types.float64[:, ::1],))
+        made = [each for each in _swap.overloads if each[0].layout == "C"]
+    assert [each[1:] for each in made] == [(numba.int64, numba.int64)]
+
+
+def test_garbage_is_collected_again_after_a_compilation_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cfmkit.elastica.kernels import build
+
+    monkeypatch.setattr(build, "_typed", lambda _name: pytest.fail("no types") if gc.isenabled() else 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        build.compiled("states")
+    assert gc.isenabled()
+    assert "get_call_type" not in vars(numba.types.Function)
+
+
 _MIXED = """
 import numba
 from cfmkit.elastica.kernels import build
@@ -470,7 +520,7 @@ def test_who_watches_a_compilation_sees_how_far_it_is(monkeypatch: pytest.Monkey
     with reported("solver") as report:
         report(0.5)
     shown = screen.getvalue().split("\r")
-    assert shown[1].endswith("equilibria and paths, about 12 s: 0 %")
+    assert shown[1].endswith("equilibria and paths, about 8 s: 0 %")
     assert shown[2].endswith("50 %")
     assert shown[3].strip() == "" == shown[4]
 

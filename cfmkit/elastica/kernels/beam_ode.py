@@ -25,7 +25,7 @@ from cfmkit.elastica.kernels.splitting import ROWS
 from cfmkit.elastica.kernels.wide_strip import strip_drift
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
-FORCE = 20  # of a segment's outcome: h and v at its end; before them what `flow` says
+FORCE, DRIVEN = 20, 22  # of a segment's outcome: h and v at its end, derivatives by the drive; see `flow`
 ANGLE, LENGTH, TURN, PULL, SLIDE, RUN = range(6)  # columns of the table
 _CLOSING = ROWS - 1
 
@@ -68,7 +68,10 @@ def _carry(q, by, dm, dx, dy):
 
 @inlined
 def _kick(table, step, i, h, v, a):
-    """Return a segment's state and derivatives after the kick of a row, and how M, x and y change with the rotation."""
+    """Return a segment's state and derivatives after the kick of a row, and what `_carry` needs for further ones.
+
+    That is how M, x and y change with the rotation, and how x and y change with the force: by h, by both, by v.
+    """
     phi, moment, px, py = a[0]
     s, c = sincos(table[step, i, 0] + phi)
     length, pull, slide = table[step, i, 1], table[step, i, 3], table[step, i, 4]
@@ -85,7 +88,7 @@ def _kick(table, step, i, h, v, a):
         _carry(a[2], by, -yt, hv, vv),
         _carry(a[3], by, 0.0, 0.0, 0.0),
     )
-    return after, by
+    return after, by, (hh, hv, vv)
 
 
 @inlined
@@ -107,16 +110,23 @@ def _end(h, v, a, out):
     out[FORCE], out[FORCE + 1] = h, v
 
 
+@inlined
+def _acts(load):
+    """Tell whether there is a line load, or will be one as the drive grows."""
+    return load[0] != 0.0 or load[1] != 0.0 or load[2] != 0.0 or load[3] != 0.0
+
+
 @kernel
 def flow(table, steps, starts, loads, outs):
     """Integrate over two segments with derivatives, side by side: each waits for its own results half of the time.
 
     steps: the first of each and how many both have; starts: rotation, h, v, M at the start of each; loads: (wx, wy)
-    of the line load on each. The outcome of each goes to its row of outs (2 of 22): phi, M, X, Y in rows of 5: value,
-    then derivatives by rotation, h, v, M; then the force h, v at the end. X and Y count from the start.
+    of the line load on each, and by how much it grows with the drive. The outcome of each goes to its row of outs
+    (2 of 28): phi, M, X, Y in rows of 5: value, then derivatives by rotation, h, v, M; then the force h, v at the
+    end, and the derivatives of X, Y, phi, h, v, M by the drive. X and Y count from the start.
     """
     (one, other), (p, q) = starts, loads
-    if table.shape[2] > TABLE_COLUMNS or p[0] != 0.0 or p[1] != 0.0 or q[0] != 0.0 or q[1] != 0.0:
+    if table.shape[2] > TABLE_COLUMNS or _acts(p) or _acts(q):
         _loaded(table, steps[0], steps[2], one, p, outs[0])
         _loaded(table, steps[1], steps[2], other, q, outs[1])
         return
@@ -125,8 +135,8 @@ def flow(table, steps, starts, loads, outs):
         for i in range(_CLOSING):
             a = _drift_all(table[steps[0] + step, i, 2], a)
             b = _drift_all(table[steps[1] + step, i, 2], b)
-            a, _ = _kick(table, steps[0] + step, i, one[1], one[2], a)
-            b, _ = _kick(table, steps[1] + step, i, other[1], other[2], b)
+            a, _, _ = _kick(table, steps[0] + step, i, one[1], one[2], a)
+            b, _, _ = _kick(table, steps[1] + step, i, other[1], other[2], b)
         a = _drift_all(table[steps[0] + step, _CLOSING, 2], a)
         b = _drift_all(table[steps[1] + step, _CLOSING, 2], b)
     _end(one[1], one[2], a, outs[0])
@@ -150,21 +160,27 @@ def _wide_drift(table, step, i, a):
 @kernel
 def _loaded(table, first, count, start, load, out):
     """Integrate over one segment, a wide strip or one under a line load, with derivatives; loads keep direction."""
-    a, turned = _begin(start), (1.0, 0.0, 0.0, 0.0)  # the latter is the derivative by the rotation at the start
-    h, v = start[1], start[2]
+    # the latter two are the derivatives by the rotation at the start and by the drive
+    a, turned, driven = _begin(start), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
+    h, v, dh, dv = start[1], start[2], 0.0, 0.0
     for step in range(first, first + count):
         for i in range(_CLOSING):
             run = table[step, i, 5]
             a, w = _wide_drift(table, step, i, a)
-            a, by = _kick(table, step, i, h - load[0] * run, v - load[1] * run, a)
+            a, by, (hh, hv, vv) = _kick(table, step, i, h - load[0] * run, v - load[1] * run, a)
             turned = _carry(_drift(w, turned), by, 0.0, 0.0, 0.0)
+            p, q = dh - load[2] * run, dv - load[3] * run
+            driven = _carry(_drift(w, driven), by, -by[1] * p - by[2] * q, hh * p + hv * q, hv * p + vv * q)
         run = table[step, _CLOSING, 5]
         a, w = _wide_drift(table, step, _CLOSING, a)
-        turned = _drift(w, turned)
+        turned, driven = _drift(w, turned), _drift(w, driven)
         h, v = h - load[0] * run, v - load[1] * run
+        dh, dv = dh - load[2] * run, dv - load[3] * run
     _end(h, v, a, out)
     for k in range(4):
         out[5 * k + 1] = turned[k]
+    out[DRIVEN], out[DRIVEN + 1], out[DRIVEN + 2] = driven[2], driven[3], driven[0]
+    out[DRIVEN + 3], out[DRIVEN + 4], out[DRIVEN + 5] = dh, dv, driven[1]
 
 
 @kernel
@@ -211,4 +227,4 @@ def _set_row(row, phi, moment, x, y, h, v, energy):
     row[0], row[1], row[2], row[3], row[4], row[5], row[6] = phi, moment, x, y, h, v, energy
 
 
-__all__ = ["COLUMNS", "FORCE", "flow", "plain_flow", "sincos"]
+__all__ = ["COLUMNS", "DRIVEN", "FORCE", "flow", "plain_flow", "sincos"]

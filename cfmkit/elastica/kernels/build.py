@@ -8,6 +8,7 @@ door, when all the code is there: half of the time.
 from __future__ import annotations
 
 import contextlib
+import gc
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, codegen, compiler_lock, cpu, event
+from numba.core import cgutils, codegen, compiler_lock, cpu, errors, event
 from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
 from numba.core.typing.context import Context
@@ -79,6 +80,42 @@ def link(library: Any) -> Any:
     return library._final_module
 
 
+class _Inference(Context):
+    """Numba's typing of calls, each done once.
+
+    Constants count as numbers of their type: else a function is compiled once more for each constant argument.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.known: dict[Any, Any] = {}
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """Return the signature of a call."""
+        if isinstance(func, types.Dispatcher):
+            args = tuple(map(types.unliteral, args))
+        return super().resolve_function_type(func, args, kws)
+
+
+def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Return the signature of a call of one of numba's own functions, operators among them.
+
+    To find it numba tries a dozen templates, for the sum of two numbers as well, and several times for each sum.
+    """
+    usual = super(types.Function, function).get_call_type
+    if kws or not isinstance(context, _Inference):
+        return usual(context, args, kws)
+    key = function, *args
+    if key not in context.known:
+        try:
+            context.known[key] = usual(context, args, kws)
+        except errors.TypingError as error:
+            context.known[key] = error
+    if isinstance(context.known[key], Exception):
+        raise context.known[key]
+    return context.known[key]
+
+
 @dataclass
 class _World:
     """What compilations have in common: the contexts of numba, and what has been made of each kernel."""
@@ -102,7 +139,7 @@ class _World:
 @lru_cache(maxsize=1)
 def _world_of_drafts() -> _World:
     rtsys.initialize(cpu_target.target_context)  # the first context that compiles makes it for the whole process
-    types_known = Context()
+    types_known = _Inference()
     target = cpu.CPUContext(types_known, cpu_target.target_context.target_name)
     target._internal_codegen = _Drafting("cfmkit")
     return _World(target, types_known, [type(each.overloads)() for each in KERNELS])
@@ -118,9 +155,12 @@ def _drafting() -> Iterator[Any]:
     """
     usual = _World.present()
     _world_of_drafts().enter()
+    function: Any = types.Function
+    function.get_call_type = _call_type
     try:
         yield _world_of_drafts().target.codegen()
     finally:
+        del function.get_call_type
         usual.enter()
 
 
@@ -229,6 +269,18 @@ def _optimising() -> Iterator[None]:
         settings.LOOP_VECTORIZE, settings.SLP_VECTORIZE = before
 
 
+@contextlib.contextmanager
+def _uncollected() -> Iterator[None]:
+    """Compile without looking for garbage: of millions of objects that numba makes most are in use to the end."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
+
+
 class _Listener(event.Listener):
     """Tells the share of a compilation that is done, by the functions that are typed."""
 
@@ -243,14 +295,14 @@ class _Listener(event.Listener):
         self.report(_TYPED * min(1.0, self.done / self.all))
 
 
-_FUNCTIONS = {"solver": 95, "slopes": 70}  # compiled for each, about
-_TYPED = 0.65  # share of the time until all functions are typed; then they are optimised and translated as a whole
-_OPTIMISED = 0.9  # share of the time until they are optimised: 0.90 of the solver's, 0.89 of the slopes'
+_FUNCTIONS = {"solver": 91, "slopes": 68}  # compiled for each, about
+_TYPED = 0.55  # share of the time until all functions are typed; then they are optimised and translated as a whole
+_OPTIMISED = 0.85  # share of the time until they are optimised: 0.82 to 0.87 of the solver's, 0.86 of the slopes'
 
 
 def compiled(name: str, report: Callable[[float], None] = lambda _share: None) -> Code:
     """Return the machine code of a door; `report` is told the share that is done."""
-    with compiler_lock.global_compiler_lock, _optimising(), _drafting() as drafting:
+    with compiler_lock.global_compiler_lock, _uncollected(), _optimising(), _drafting() as drafting:
         with event.install_listener("numba:compile", _Listener(name, report)):
             done = _typed(name)
         library = done.library

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica.kernels.beam_ode import FORCE, flow, plain_flow
+from cfmkit.elastica.kernels.beam_ode import DRIVEN, FORCE, flow
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
@@ -45,28 +45,13 @@ def pose_of(places, values, i, pose):
     return ox, oy
 
 
-@kernel
-def _drive_column(m, e, steps, start, load, dp, states):
-    """Set the derivative of a segment's end pose and force by the drive, where a line load grows with it.
-
-    states (1, 7): complex room for the segment's end.
-    """
-    h = 1e-30
-    stepped = (load[0] + 1j * h * m.line_load[e, 1, 0], load[1] + 1j * h * m.line_load[e, 1, 1])
-    begin = (start[0] + 0j, start[1] + 0j, start[2] + 0j, start[3] + 0j)
-    plain_flow(m.table, steps, begin, stepped, states)
-    last = states[0]
-    dp[0], dp[1], dp[2] = last[2].imag / h, last[3].imag / h, last[0].imag / h
-    dp[3], dp[4], dp[5] = last[4].imag / h, last[5].imag / h, last[1].imag / h
-
-
 @inlined
 def _start_of(m, j, e, y, n, drive):
-    """Return rotation, h, v and M at the start of segment j, which is on beam e, and the line load on it."""
+    """Return rotation, h, v and M at the start of segment j, on beam e, the line load on it, and how that grows."""
     at = n + 6 * j
-    wx = m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0]
-    wy = m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1]
-    return (y[at + 2], y[at + 3], y[at + 4], y[at + 5]), (wx, wy)
+    gx, gy = m.line_load[e, 1, 0], m.line_load[e, 1, 1]
+    load = (m.line_load[e, 0, 0] + drive * gx, m.line_load[e, 0, 1] + drive * gy, gx, gy)
+    return (y[at + 2], y[at + 3], y[at + 4], y[at + 5]), load
 
 
 @inlined
@@ -88,7 +73,7 @@ def flows(m, y, n, drive, work):
 
 
 @inlined
-def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
+def sweep(m, e, y, first_slot, ends, rel, store, work):
     """Set the relation `rel` of beam e from its segments' outcomes and keep in `store` what `unfold` needs.
 
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
@@ -96,8 +81,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     a^2 the thrust of a segment times its length over its bending rigidity that is the smallest cos a, or TENSION/cosh a
     in tension. The equations of a straight segment have dM1/dM0 = cos a; a step that is too long for its load has not.
     """
-    drv, outs = work[0][2, 4], work[3]
-    grows = m.line_load[e, 1, 0] != 0.0 or m.line_load[e, 1, 1] != 0.0
+    outs = work[3]
     for k in range(6):
         for i in range(3):
             for j in range(3):
@@ -105,16 +89,11 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     for k in range(3):
         rel[E, k, k] = 1.0
         rel[E2, k, k] = 1.0
-    for k in range(6):
-        drv[k] = 0.0
     index, least = 0, 1.0
     begin, end = m.beam_segment[e], m.beam_segment[e + 1]
     for j in range(begin, end):
         at, out = first_slot[1] + 6 * j, outs[j]
         h, v = out[FORCE], out[FORCE + 1]
-        if grows:
-            start, load = _start_of(m, j, e, y, first_slot[1], drive)
-            _drive_column(m, e, (m.segment_step[j], m.segment_step[j + 1]), start, load, drv, work[4])
         if j + 1 < end:
             qx, qy, qr = y[at + 6], y[at + 7], y[at + 8]
             ph, pv, pm = y[at + 9], y[at + 10], y[at + 11]
@@ -124,7 +103,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
             ph, pv, pm = y[b], y[b + 1], y[b + 2]
         rq = (y[at] + out[10] - qx, y[at + 1] + out[15] - qy, out[0] - qr)
         rp = (h - ph, v - pv, out[5] - pm)
-        pivot = _append(rel, store, j, out, rq, rp, drv)
+        pivot = _append(rel, store, j, out, rq, rp)
         own = out[9]
         pulled = m.segment_turn[j] * (y[at + 3] * out[10] + y[at + 4] * out[15])
         if pulled < 0.0:
@@ -139,7 +118,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
 
 
 @kernel
-def _append(rel, store, n, out, rq, rp, drv):
+def _append(rel, store, n, out, rq, rp):
     """Append segment n to the relation; return the scalar pivot of the elimination.
 
     The pivot vanishes where the beam up to here is critical as a cantilever. From a pin to where the moment is
@@ -171,15 +150,15 @@ def _append(rel, store, n, out, rq, rp, drv):
     b0, b1 = -rp[0], -rp[1]
     store[n, E2, 0, 0], store[n, E2, 1, 0] = b0, b1
     store[n, E2, 2, 0] = k0 * b0 + k1 * b1 - k2 * (rp[2] + turn * rel[C_D, 2, 0])
-    b0, b1 = -drv[3], -drv[4]
+    b0, b1 = -out[DRIVEN + 3], -out[DRIVEN + 4]
     store[n, E2, 0, 1], store[n, E2, 1, 1] = b0, b1
-    store[n, E2, 2, 1] = k0 * b0 + k1 * b1 - k2 * (drv[5] + turn * rel[C_D, 2, 1])
-    _propagate(rel, store, n, out, rq, drv)
+    store[n, E2, 2, 1] = k0 * b0 + k1 * b1 - k2 * (out[DRIVEN + 5] + turn * rel[C_D, 2, 1])
+    _propagate(rel, store, n, out, rq)
     return pivot
 
 
 @kernel
-def _propagate(rel, store, n, out, rq, drv):
+def _propagate(rel, store, n, out, rq):
     """Replace the relation by that after segment n."""
     ax, ay, ar = out[11], out[16], out[1]  # dX, dY, dphi by the start's rotation
     store[n, E2, 0, 2], store[n, E2, 1, 2], store[n, E2, 2, 2] = ax, ay, ar
@@ -197,7 +176,8 @@ def _propagate(rel, store, n, out, rq, drv):
             moved = own * store[n, E, r, i] + along * store[n, E, 2, i]
             rel[E, r, i] = moved + last * store[n, SMALL, 1, i]
         for col in range(2):
-            moved = own * store[n, C_D, r, col] + along * store[n, C_D, 2, col] + (rq[r] if col == 0 else drv[r])
+            closes = rq[r] if col == 0 else out[DRIVEN + r]
+            moved = own * store[n, C_D, r, col] + along * store[n, C_D, 2, col] + closes
             for i in range(3):
                 moved += store[n, G, r, i] * store[n, E2, i, col]
                 rel[SMALL, r, col] += rel[E2, r, i] * store[n, E2, i, col]

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 import numba
+from numba.core.compiler import Compiler
 
 _ARRAYS = "numba.np.arraymath"
 
@@ -45,7 +46,32 @@ def _uncounted() -> dict[str, Any]:
     return {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 
+class _Pipeline(Compiler):
+    """Numba's passes over a function but those for what no kernel has: closures, expressions of whole arrays, None."""
+
+    def define_pipelines(self) -> Any:
+        """Return the passes."""
+        (passes,) = super().define_pipelines()
+        passes.passes = [each for each in passes.passes if each[0].__name__ not in _NEEDLESS]
+        passes.finalize()
+        return [passes]
+
+
+_NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "DeadBranchPrune",
+    "RewriteDynamicRaises",
+    "MakeFunctionToJitFunction",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "NopythonRewrites",
+    "DumpParforDiagnostics",
+}
+
+
 OPTIONS: dict[str, Any] = {
+    "pipeline_class": _Pipeline,
     "error_model": "numpy",
     "fastmath": {"contract"},  # fused multiply and add: NaN stays NaN
     "no_cpython_wrapper": True,

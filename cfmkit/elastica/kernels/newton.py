@@ -52,7 +52,7 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
         arm_a, arm_b = pose_of(places, values, ia, ends[0]), pose_of(places, values, ib, ends[1])
         jacobian(m.place_frame, ia, arm_a, ja)
         jacobian(m.place_frame, ib, arm_b, jb)
-        change, short = sweep(m, e, y, (n_free, n), drive, ends, rel[e], store, work)
+        change, short = sweep(m, e, y, (n_free, n), ends, rel[e], store, work)
         index += change
         least = min(least, short)
         own = n + 6 * m.beam_segment[e] + 3
@@ -209,7 +209,7 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
                 state[5] = _log_determinant(h2, tangent[n])
             state[1] = tangent_index(h, n_free, index, h2)
             if m.load_follows.shape[0] > 0 and state[1] > 0.0:
-                state[1] = diverging(m, h, int(state[1]), h2, rhs, residual, work[5])
+                state[1] = diverging(m, h, int(state[1]), h2, rhs, residual, work[4])
             state[2], state[3] = least, size
             return SOLVED, iteration + 1
         before = size

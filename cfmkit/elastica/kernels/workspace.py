@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.packing import Packed, complexes, floats, objects
+from cfmkit.elastica.kernels.packing import Packed, floats, objects
 from cfmkit.elastica.kernels.status_codes import KEPT
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ SOLVING = (
     floats(2),  # poses of a beam's ends
     floats(4),  # relations of the beams, see `cfmkit.elastica.kernels.chain`
     floats(4),  # what is kept of each segment
-    # small vectors and matrices, Jacobians, a block, outcomes of the segments, a complex state, what loads act on that
-    # turn with their node
-    (floats(3), floats(3), floats(2), floats(2), complexes(2), floats(2)),
+    # small vectors and matrices, Jacobians, a block, outcomes of the segments, what loads act on that turn with their
+    # node
+    (floats(3), floats(3), floats(2), floats(2), floats(2)),
     floats(1),  # increments of all unknowns
 )
 
@@ -91,8 +91,7 @@ def work_space(n: int, beams: int, dofs: int, segments: int) -> WorkSpace:
                 np.zeros((11, 12, 20)),
                 np.zeros((2, 3, 4)),
                 np.zeros((3, 3)),
-                np.zeros((segments, 22)),
-                np.zeros((1, 7), np.complex128),
+                np.zeros((segments, 28)),
                 np.empty((dofs, dofs)),
             ),
             np.zeros(n + 6 * segments),

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family, Search
+from cfmkit.families.base import Family, Search, when_called
 from cfmkit.families.beam.build import resolve
-from cfmkit.families.beam.design import design
 from cfmkit.families.beam.findings import FINDINGS
-from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.scalar_results import DEFINITIONS
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
@@ -16,10 +14,10 @@ FAMILY = Family(
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,
     models={
-        **dict.fromkeys(("inextensible", "extensible", "reissner"), analyze),
+        **dict.fromkeys(("inextensible", "extensible", "reissner"), "cfmkit.families.beam.model:analyze"),
         "solid": "cfmkit.families.beam.solid:analyze",
     },
-    design=design,
+    design=when_called("cfmkit.families.beam.design:design"),
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,
     resolve=resolve,

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family, Search
+from cfmkit.families.base import Family, Search, when_called
 from cfmkit.families.cam.build import resolve
-from cfmkit.families.cam.design import design
 from cfmkit.families.cam.findings import FINDINGS
-from cfmkit.families.cam.many_designs.model import analyze_block
-from cfmkit.families.cam.model import analyze
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
 
@@ -15,15 +12,15 @@ FAMILY = Family(
     name="cam",
     summary="two rollers on a cam, pulled together by springs and up by braces",
     spec_type=CamSpec,
-    models={"quasi-static": analyze, "dynamic": "cfmkit.families.cam.dynamics:analyze"},
-    design=design,
+    models={"quasi-static": "cfmkit.families.cam.model:analyze", "dynamic": "cfmkit.families.cam.dynamics:analyze"},
+    design=when_called("cfmkit.families.cam.design:design"),
     search=Search(findings=("overwritten", "plate_incomplete")),
     values=DEFINITIONS,
     resolve=resolve,
     attribution="cfmkit.families.cam.deviation_causes",
     draw="cfmkit.families.cam.figures",
     scheme="cfmkit.families.cam.parameter_sketch",
-    analyze_block=analyze_block,
+    analyze_block=when_called("cfmkit.families.cam.many_designs.model:analyze_block"),
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.proposals_for_wish:propose",
     room="cfmkit.families.cam.bounding_box:room",

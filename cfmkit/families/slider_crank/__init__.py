@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family, Search
+from cfmkit.families.base import Family, Search, when_called
 from cfmkit.families.slider_crank.build import resolve
-from cfmkit.families.slider_crank.dispatch import design
 from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
-from cfmkit.families.slider_crank.springs.model import analyze, gradient
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES
 
@@ -23,9 +20,14 @@ FAMILY = Family(
     name="slider-crank",
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
-    models={"prb": analyze, "lumped": PRINTED, "beam": PRINTED, "solid": SOLID},
-    analyze_block=analyze_block,
-    design=design,
+    models={
+        "prb": "cfmkit.families.slider_crank.springs.model:analyze",
+        "lumped": PRINTED,
+        "beam": PRINTED,
+        "solid": SOLID,
+    },
+    analyze_block=when_called("cfmkit.families.slider_crank.springs.many_designs.model:analyze_block"),
+    design=when_called("cfmkit.families.slider_crank.dispatch:design"),
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
     values=OF_SPRINGS | OF_PARTS,
     words={"stiffness_class": CLASSES},
@@ -33,7 +35,7 @@ FAMILY = Family(
     errors="cfmkit.families.slider_crank.force_at_few_poses:errors",
     sampled="cfmkit.families.slider_crank.force_at_few_poses:sampled",
     free="cfmkit.families.slider_crank.force_at_few_poses:free",
-    gradient=gradient,
+    gradient=when_called("cfmkit.families.slider_crank.springs.model:gradient"),
     draw="cfmkit.families.slider_crank.dispatch",
     scheme="cfmkit.families.slider_crank.parameter_sketch",
     outline="cfmkit.families.slider_crank.dispatch",

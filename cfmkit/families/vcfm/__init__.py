@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family
-from cfmkit.families.vcfm.design import design
+from cfmkit.families.base import Family, when_called
 from cfmkit.families.vcfm.findings import FINDINGS
-from cfmkit.families.vcfm.many_designs import analyze_block
-from cfmkit.families.vcfm.model import analyze
 from cfmkit.families.vcfm.scalar_results import DEFINITIONS
 from cfmkit.families.vcfm.spec import VcfmSpec
 
@@ -17,12 +14,12 @@ FAMILY = Family(
     errors="cfmkit.families.vcfm.yield_parameters:errors",
     free="cfmkit.families.vcfm.yield_parameters:free",
     models={
-        "truss": analyze,
-        "analytic": analyze,
+        "truss": "cfmkit.families.vcfm.model:analyze",
+        "analytic": "cfmkit.families.vcfm.model:analyze",
         "exact": "cfmkit.families.vcfm.exact_model:analyze",
         "solid": "cfmkit.families.vcfm.solid:analyze",
     },
-    design=design,
+    design=when_called("cfmkit.families.vcfm.design:design"),
     values=DEFINITIONS,
     draw="cfmkit.families.vcfm.figures",
     scheme="cfmkit.families.vcfm.parameter_sketch",
@@ -32,7 +29,7 @@ FAMILY = Family(
     levels=("design.force",),
     propose="cfmkit.families.vcfm.proposals_for_wish:propose",
     room="cfmkit.families.vcfm.bounding_box:room",
-    analyze_block=analyze_block,
+    analyze_block=when_called("cfmkit.families.vcfm.many_designs:analyze_block"),
     headline=(
         "constant_force",
         "positive_stiffness",
