@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.examples import Example, examples
     from cfmkit.runs.measure_and_calibrate import calibrate, measure
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.outcome import StudyResult
+    from cfmkit.studies.study_result import StudyResult
 
 _HOMES = {
     "cfmkit.api": (
@@ -99,7 +99,7 @@ _HOMES = {
     "cfmkit.runs.measure_and_calibrate": ("calibrate", "measure"),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
-    "cfmkit.studies.outcome": ("StudyResult",),
+    "cfmkit.studies.study_result": ("StudyResult",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Design, Quantity, Result
     from cfmkit.runs.analysis_view import AnalysisView
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.outcome import StudyResult
+    from cfmkit.studies.study_result import StudyResult
     from cfmkit.studies.suggest.search import Suggestions
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
@@ -236,7 +236,7 @@ def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
     [36.232, 72.464]
     """
-    from cfmkit.studies.outcome import swept
+    from cfmkit.studies.study_result import swept
 
     return swept(spec_of(spec), jobs, block)
 
@@ -272,7 +272,7 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     >>> found.summary["yield"]["value"]
     0.8
     """
-    from cfmkit.studies.outcome import examined
+    from cfmkit.studies.study_result import examined
 
     return examined(spec_of(spec), jobs, block)
 
@@ -313,7 +313,7 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    from cfmkit.runs.wish_file import wish_of
+    from cfmkit.runs.read_wish import wish_of
     from cfmkit.studies.executors import serial
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.suggest.search import suggest as searched

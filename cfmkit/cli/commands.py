@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
-    from cfmkit.cli.answer import Answer
     from cfmkit.cli.options import Common
     from cfmkit.cli.output import Terminal
+    from cfmkit.cli.verb_result import Answer
 
 _STYLE: dict[str, Any] = {
     "rich_markup_mode": "rich",

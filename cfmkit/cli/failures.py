@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import typer
 
 from cfmkit import errors
-from cfmkit.cli.answer import Answer, document
+from cfmkit.cli.verb_result import Answer, document
 from cfmkit.errors import ExitCode, OutputError, SpecError, shortened
 
 if TYPE_CHECKING:

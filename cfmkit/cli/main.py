@@ -16,10 +16,10 @@ import typer
 
 from cfmkit._version import __version__
 from cfmkit.cli import streams
-from cfmkit.cli.answer import document
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
+from cfmkit.cli.verb_result import document
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit import api
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.output import MARGIN
 from cfmkit.cli.page_blocks import (
     BAD,
@@ -23,6 +22,7 @@ from cfmkit.cli.page_blocks import (
     verdict,
     whole_line,
 )
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of

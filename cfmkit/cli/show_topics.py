@@ -10,8 +10,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, line, listed
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.edge_rings import Ring
+    from cfmkit.solid.boundary_and_element_sizes import Ring
     from cfmkit.solid.meshed_part import MeshSolution
 
 ROUND = 0.02

@@ -19,7 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.edge_rings import GRADING, Ring, Sizes, place_text, sizes
+from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes, place_text, sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

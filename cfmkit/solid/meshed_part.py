@@ -21,7 +21,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.edge_rings import Ring
+from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh

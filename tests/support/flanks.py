@@ -9,7 +9,7 @@ import numpy as np
 from cam_support import cam
 
 from cfmkit.families.cam.build import assemble
-from cfmkit.families.cam.geometry.flank import DesignFlank
+from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank
 from cfmkit.numerics.registration import turned
 
 if TYPE_CHECKING:

@@ -123,7 +123,7 @@ ALLOWED = {
     "yaml": lambda path: room_of(path) == "specs.yamlio",
     "ezdxf": lambda path: unit_of(path) == "export",
     "shapely": lambda path: unit_of(path) in ("export", "solid"),
-    "pandas": lambda path: path.name in ("results.py", "outcome.py"),
+    "pandas": lambda path: path.name in ("results.py", "study_result.py"),
 }
 
 
@@ -150,7 +150,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
             "main",
             "commands",
             "options",
-            "answer",
+            "verb_result",
             "failures",
             "page_blocks",
             "output",

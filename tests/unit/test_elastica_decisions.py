@@ -17,7 +17,7 @@ from cfmkit.elastica.continuation import (
     limit_point,
     points_at_bifurcation,
 )
-from cfmkit.elastica.continuation.decisions import decided
+from cfmkit.elastica.continuation.decisions_after_march import decided
 from cfmkit.elastica.continuation.state import BranchEnd, Leg, PathProblem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Spot

@@ -12,7 +12,7 @@ from shoulder_fillets import handbook
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import contours
-from cfmkit.solid.edge_rings import Ring
+from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import TriangleMesh, mesh

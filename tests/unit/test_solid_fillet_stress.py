@@ -9,7 +9,7 @@ import pytest
 from vee_leaf import VEE
 
 import cfmkit
-from cfmkit.solid.edge_rings import Ring
+from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.fillet_stress import FilletStress, arcs
 
 SHORT = {

@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.solid.edge_rings import Ring
+from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.motions_and_reactions import MaterialPoint

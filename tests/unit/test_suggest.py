@@ -17,8 +17,8 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.results import Status
+from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
-from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length

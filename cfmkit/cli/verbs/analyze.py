@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.cli.answer import Answer
     from cfmkit.cli.output import Terminal
+    from cfmkit.cli.verb_result import Answer
     from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.families.base import Run
     from cfmkit.runs.run_outcome import Report

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import (
     Changing,
     Fidelity,
@@ -22,6 +21,7 @@ from cfmkit.cli.options import (
     option,
 )
 from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, CellGrid, Paragraph, Span, TextLine, Written, columns
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, visible
 
 if TYPE_CHECKING:

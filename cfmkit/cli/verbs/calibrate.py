@@ -10,8 +10,8 @@ from cfmkit.cli import completion
 from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_record, option, read_measured
 
 if TYPE_CHECKING:
-    from cfmkit.cli.answer import Answer
     from cfmkit.cli.output import Terminal
+    from cfmkit.cli.verb_result import Answer
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.families.base import Run

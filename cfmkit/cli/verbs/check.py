@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
 from cfmkit.cli.page_blocks import BAD, GOOD, Span, whole_line, within
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:

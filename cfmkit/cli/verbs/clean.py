@@ -6,9 +6,9 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Quiet, argument, flag
 from cfmkit.cli.page_blocks import Verbatim, whole_line
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
 
 if TYPE_CHECKING:

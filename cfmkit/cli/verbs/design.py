@@ -11,8 +11,8 @@ from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, WithReport
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from cfmkit.cli.answer import Answer
     from cfmkit.cli.output import Terminal
+    from cfmkit.cli.verb_result import Answer
     from cfmkit.families.base import Run
     from cfmkit.store import RunFolder
 

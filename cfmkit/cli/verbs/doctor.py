@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
 from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, listed
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

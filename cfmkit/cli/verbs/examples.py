@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, GOOD, Paragraph, command_line, field, listed
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.cli.page_blocks import line, whole_line
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal

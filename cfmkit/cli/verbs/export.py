@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import OneSpec, Quiet, option
 from cfmkit.cli.page_blocks import Paragraph, Written
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, option
 from cfmkit.cli.page_blocks import Written
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, argument, flag, option
 from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import OutputError, UsageError, visible
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, argument, flag
 from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, Field, Paragraph, Span, TextLine, field, line, listed
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode
 from cfmkit.runs.papers import VERDICTS
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_blocks import JsonText
+from cfmkit.cli.verb_result import Answer, told_of
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
     BAD,
@@ -26,6 +25,7 @@ from cfmkit.cli.page_blocks import (
     title,
     verdict,
 )
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.cli.page_blocks import BLANK, GOOD, Paragraph, field, listed
+from cfmkit.cli.verb_result import Answer, told_of
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:

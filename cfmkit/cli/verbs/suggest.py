@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, WithReport, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written, line
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -110,8 +110,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.designing.starts import Clock
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestion_files
+    from cfmkit.runs.read_wish import wish_of
     from cfmkit.runs.run import long_run
-    from cfmkit.runs.wish_file import wish_of
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import cores
     from cfmkit.studies.pool import Pool

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
     BAD,
@@ -24,6 +23,7 @@ from cfmkit.cli.page_blocks import (
     title,
     within,
 )
+from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import CfmError, ExitCode, UsageError, lines_of
 
 if TYPE_CHECKING:

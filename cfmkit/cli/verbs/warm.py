@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Quiet
 from cfmkit.cli.page_blocks import Verbatim
+from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal

@@ -165,6 +165,6 @@ def _next(problem: PathProblem, leg: Leg, fresh: bool) -> Move:
     if leg.code == DONE and trail.requested == len(problem.values) and not (fresh and trail.events):
         return Resume(trail, leg.spot)
     # most paths end with their first march: what decides on the others takes a tenth of a run to load
-    from cfmkit.elastica.continuation.decisions import decided
+    from cfmkit.elastica.continuation.decisions_after_march import decided
 
     return decided(problem, leg, fresh)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica.kernels.beam_ode_slopes import flow_slopes
+from cfmkit.elastica.kernels.beam_ode_derivatives import flow_slopes
 from cfmkit.elastica.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, lu_solve

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.elastica.vibration.mass_properties import NetworkMasses
+from cfmkit.elastica.vibration.network_masses import NetworkMasses
 
 if TYPE_CHECKING:
     from cfmkit.elastica.vibration.modes import Frequencies, frequencies

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.linearised import Linearised
-    from cfmkit.elastica.vibration.mass_properties import NetworkMasses
+    from cfmkit.elastica.vibration.network_masses import NetworkMasses
 
 _AT_ONCE = 16  # points whose matrices are in memory together: some megabytes
 _TIED = 1e-10  # share of the largest row from which a constraint counts: a straight beam's along itself is rounding

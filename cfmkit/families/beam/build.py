@@ -26,7 +26,7 @@ import numpy as np
 from cfmkit import elastica as engine
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.vibration.mass_properties import NetworkMasses
+from cfmkit.elastica.vibration.network_masses import NetworkMasses
 from cfmkit.families.beam.parts.spec import HELD
 from cfmkit.specs.units import between
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.solution import ForceBand, Sides
 
 if TYPE_CHECKING:

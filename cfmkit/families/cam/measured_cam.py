@@ -29,7 +29,7 @@ from cfmkit.errors import DataError
 from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
-from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
     curve_cut_for,

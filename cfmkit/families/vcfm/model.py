@@ -20,7 +20,7 @@ from cfmkit.families.vcfm.findings import findings_of, spring_closed
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_of
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
-from cfmkit.numerics.bracketing import last_places
+from cfmkit.numerics.last_places import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import listed

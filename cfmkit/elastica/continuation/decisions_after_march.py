@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation import (
-    bifurcation,
     branch_end,
     critical_start,
+    decisions_at_bifurcation,
     ending,
     limit_point,
     points_at_bifurcation,
@@ -53,12 +53,14 @@ def _after(problem: PathProblem, leg: Leg, requested: int) -> Move:
         message = f"stability is lost at {trail.drive * problem.unit:.6g}: the path ends there"
         return Stop(trail.stopped(PathStatus.JUMPS, message))
     if code == INERTIA:
-        return limit_point.back_to_the_drive(problem, bifurcation.crossed(problem, trail))
+        return limit_point.back_to_the_drive(problem, decisions_at_bifurcation.crossed(problem, trail))
     if code == DONE:
         return branch_end.rejoined(problem, trail, spot, leg.toward)
     if code == DENIED:
         behind = points_at_bifurcation.passed(problem, trail, float(trail.stretch.targets[requested]))
-        return Resume(trail, spot, patient=True) if behind is None else bifurcation.crossed(problem, behind)
+        return (
+            Resume(trail, spot, patient=True) if behind is None else decisions_at_bifurcation.crossed(problem, behind)
+        )
     if code == STALLED and trail.stretch.natural and len(trail.points):
         return _got_over(problem, trail, spot, requested)
     return ending.stop(problem, trail, code)
@@ -76,7 +78,7 @@ def _got_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int) ->
     if any(name != PRIMARY for name in trail.branches):
         move = branch_end.stepped_over(problem, trail, spot, requested)
     if move is None:
-        trail, move = bifurcation.past_corner(problem, trail, spot, requested)
+        trail, move = decisions_at_bifurcation.past_corner(problem, trail, spot, requested)
     if move is not None:
         return move
     if problem.control.through_folds:
