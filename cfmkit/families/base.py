@@ -440,12 +440,16 @@ class Family:
         """The mechanism with its article: ``a cam mechanism``."""
         return f"{article(self.name)} {self.name} mechanism"
 
-    def analyze(self, spec: Spec, run: Run) -> Result:
-        """Return what the model that a specification picks, or else the only one, makes of it."""
+    def model_of(self, spec: Spec) -> Analyzer:
+        """Return the model that a specification picks, or else the only one; it is imported with this."""
         (only, *_) = self.models
         model = self.models[spec.fidelity or only]
         function: Analyzer = function_named(model) if isinstance(model, str) else model
-        return function(spec, run)
+        return function
+
+    def analyze(self, spec: Spec, run: Run) -> Result:
+        """Return what the model that a specification picks makes of it."""
+        return self.model_of(spec)(spec, run)
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""

@@ -7,6 +7,7 @@ import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit import api
@@ -159,6 +160,7 @@ def carry_out(
     """
     start = time.perf_counter()
     document, spec = read(wanted)
+    _make_ready(spec)
     with RunFolder(wanted.out) as folder:
         folder.check(*FIRST, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
@@ -171,6 +173,14 @@ def carry_out(
         kept = dict(folder.kept)
     seconds = time.perf_counter() - start
     return FinishedRun(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
+
+
+def _make_ready(spec: Spec) -> None:
+    """Import what an analysis of a specification needs, so that nobody interrupts an import once there is a folder."""
+    from cfmkit.families import family
+
+    import_module("cfmkit.runs.analysis_view")
+    family(spec.family).model_of(spec)
 
 
 def spec_of(wanted: RunRequest) -> Spec:

@@ -520,7 +520,7 @@ def test_who_watches_a_compilation_sees_how_far_it_is(monkeypatch: pytest.Monkey
     with reported("solver") as report:
         report(0.5)
     shown = screen.getvalue().split("\r")
-    assert shown[1].endswith("equilibria and paths, about 8 s: 0 %")
+    assert shown[1].endswith("equilibria and paths, about 10 s: 0 %")
     assert shown[2].endswith("50 %")
     assert shown[3].strip() == "" == shown[4]
 

@@ -159,7 +159,7 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("versions", versions, (field("name"), field("version", wraps=True)))
     yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
     yield from listed("folders", found["folders"], (field("name"), Field("", _access), field("path", wraps=True)))
-    compiled = found["solver"]["folder"] or "not yet: about half a minute at the first use, or `cfmkit warm`"
+    compiled = found["solver"]["folder"] or "not yet: some 15 seconds at the first use, or `cfmkit warm`"
     yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
     fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is not whole"}
     yield from listed("font of the figures", [fonts], (field("name"), field("path", wraps=True)))

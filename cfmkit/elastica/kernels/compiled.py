@@ -35,7 +35,7 @@ _PARTS = {
     "row_slopes": "derivatives of states",
     "held_slopes": "derivatives of forces",
 }
-_LASTS = {"solver": "about 8 s", "slopes": "about 5 s"}
+_LASTS = {"solver": "about 10 s", "slopes": "about 5 s"}
 
 
 @contextlib.contextmanager
