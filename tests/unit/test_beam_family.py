@@ -529,7 +529,8 @@ def test_a_travel_that_only_beams_of_several_times_their_length_could_follow_is_
         InputError, match=r"to more than twice their length: from 'eye' .* 35.26 mm .* 105.8 mm at most"
     ):
         solved("beam_v_bifurcation", "analysis.travel=8600 mm")
-    assert solved("beam_v_bifurcation", "analysis.travel=40 mm").status is Status.COMPLETE
+    near = solved("beam_v_bifurcation", "analysis.travel=40 mm", "analysis.modes=1", "analysis.points=5")
+    assert near.status is Status.COMPLETE
 
 
 def test_a_network_without_any_equilibrium_cannot_be_rescaled():
