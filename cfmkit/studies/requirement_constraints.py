@@ -307,7 +307,11 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, whole: bool = False) ->
         slack = 1e-9 * float(places[-1] - places[0])
         if whole and not motion.min() - slack <= places[0] <= places[-1] <= motion.max() + slack:
             return None
-        effort[branch] = np.interp(places, motion[order], curve.effort[on][order])
+        between = np.interp(places, motion[order], curve.effort[on][order])
+        if result.closed is not None:  # points may be few, and a force begins steeply
+            exact = result.closed.effort(branch, np.clip(places, motion.min(), motion.max()))
+            between = np.where(np.isfinite(exact), exact, between)
+        effort[branch] = between
         if "max_stress" in curve.extra:
             values = np.asarray(curve.extra["max_stress"].values, dtype=float)[on]
             stress.append(np.interp(places, motion[order], values[order]))

@@ -48,6 +48,15 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     assert not states_places(sight.spec)
 
 
+def test_a_part_with_few_points_is_looked_at_on_its_closed_form():
+    """Between 31 points the force of a cam's start was a straight line, and hardly any part seemed to be good."""
+    design = cfmkit.design("configs/cam.yaml").spec
+    places = np.array([0.002, 0.005, 0.1])
+    few, many = (sampled_of(design.replace({"analysis.points": points}), places, Run()) for points in (31, 20001))
+    for branch in ("load", "unload"):
+        assert few.effort[branch] == pytest.approx(many.effort[branch], rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["beam_lan2010_yield", "slider_crank_strip_yield"])
 def test_what_is_seen_quickly_is_what_the_analysis_finds(name):
     spec = cfmkit.load(f"configs/studies/{name}.yaml")
