@@ -335,13 +335,11 @@ def _ends_early(sight: Sight, x: FloatArray) -> int:
     """Return how many of the parts that are solved have numbers, but not over all of the stated windows."""
     if not states_places(sight.spec):
         return 0
-    places, run = sight.rows.places, sight.run
-    parts = [sight.variant(x, one) for one in _errors(sight)]
-    short = 0
-    for part in parts:
+    places, run, short = sight.rows.places, sight.run, 0
+    for one in _errors(sight):
         try:
-            found = sampled_of(part, places, run)
-            short += found is not None and sampled_of(part, places, run, whole=True) is None
+            part = sight.variant(x, one)
+            short += sampled_of(part, places, run, whole=True) is None and sampled_of(part, places, run) is not None
         except CfmError:
             continue
     return short
