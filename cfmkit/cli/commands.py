@@ -145,7 +145,7 @@ def _place(field: dataclasses.Field[Any]) -> int:
     return int(field.name in {item.name for item in dataclasses.fields(Common)})
 
 
-ALONE = ("--figure",)
+ALONE = ("--figure", "--show-completion", "--install-completion")
 """Options whose value may be left out; typer has none of that kind, so an empty value is written for it."""
 
 
@@ -179,6 +179,8 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
 
 def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:
     """Return the program: the group of all verbs, with what stands before them as `callback`."""
-    app = typer.Typer(cls=Verbs, **(_STYLE | {"add_completion": True}))
+    # makes typer's shells known; it does so itself only where its own options, which take no shell, are added
+    typer.completion.get_completion_inspect_parameters()
+    app = typer.Typer(cls=Verbs, **_STYLE)
     app.callback(invoke_without_command=True, help=text, epilog=epilog)(callback)
     return app

@@ -1,9 +1,50 @@
-"""What a shell may complete: names of families and topics, and files with specifications or data."""
+"""What a shell may complete: names of families and topics, and files with specifications or data; and its script."""
 
 from __future__ import annotations
 
 import os
 from typing import Any
+
+import typer
+
+SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")
+"""Those that typer has scripts for."""
+
+
+def shells(incomplete: str) -> list[str]:
+    """Return the names of shells that begin so."""
+    return [name for name in SHELLS if name.startswith(incomplete)]
+
+
+def show(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
+    """Print the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
+    if value is not None and not ctx.resilient_parsing:
+        typer.completion.show_callback(ctx, param, _shell(value))
+
+
+def install(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
+    """Install the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
+    if value is None or ctx.resilient_parsing:
+        return
+    shell = _shell(value)
+    try:
+        typer.completion.install_callback(ctx, param, shell)
+    except FileNotFoundError as error:  # the profile of a PowerShell is where it says
+        raise typer.BadParameter(f"there is no program {shell!r} to be asked where its profile is") from error
+
+
+def _shell(named: str) -> str:
+    """Return the shell that is named, or that in which this runs."""
+    import shellingham
+
+    if not named:
+        try:
+            named = shellingham.detect_shell()[0]
+        except shellingham.ShellDetectionFailure:
+            raise typer.BadParameter(f"this runs in no known shell; name one: {', '.join(SHELLS)}") from None
+    if named not in SHELLS:
+        raise typer.BadParameter(f"there is no completion for {named!r}; there is one for {', '.join(SHELLS)}")
+    return named
 
 
 def families(incomplete: str) -> list[str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit._version import __version__
-from cfmkit.cli import streams
+from cfmkit.cli import completion, streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
@@ -173,9 +173,22 @@ def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], 
     timer.start()
 
 
+def _of_shell(verb: str, text: str) -> Any:
+    """Return the declaration of an option that takes a shell, or finds out in which it runs."""
+    return typer.Option(
+        f"--{verb}-completion",
+        metavar="[SHELL]",
+        help=f"{text}: {', '.join(completion.SHELLS)}; default: the shell this runs in.",
+        callback=getattr(completion, verb),
+        autocompletion=completion.shells,
+    )
+
+
 def _before_the_verb(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    show_completion: Annotated[str | None, _of_shell("show", "Print what makes a shell complete commands")] = None,
+    install_completion: Annotated[str | None, _of_shell("install", "Make a shell complete commands")] = None,
 ) -> Any:
     if version:
         streams.put(f"cfmkit {__version__}\n")

@@ -389,6 +389,20 @@ def test_the_completion_of_a_shell_can_be_shown_and_installed(cli, shell):
     assert {"--install-completion", "--show-completion"} <= set(cli("--help").out.split())
     script = cli(**{"_CFMKIT_COMPLETE": f"source_{shell}"})
     assert "_CFMKIT_COMPLETE" in script.out
+    shown = cli("--show-completion", shell, SHELL="/bin/bash")
+    assert (shown.out.strip(), shown.code) == (script.out.strip(), 0)
+
+
+def test_completion_is_installed_for_the_shell_that_is_named(cli):
+    done = cli("--install-completion", "fish", HOME=str(cli.folder))
+    assert done.code == 0
+    assert "_CFMKIT_COMPLETE" in (cli.folder / ".config/fish/completions/cfmkit.fish").read_text()
+
+
+def test_a_shell_without_completion_is_refused_in_one_line(cli):
+    done = cli("--show-completion", "tcsh")
+    assert (done.code, len(done.err.splitlines())) == (2, 1)
+    assert "tcsh" in done.err
 
 
 def test_the_beam_engine_can_be_compiled_ahead(cli):
