@@ -23,7 +23,7 @@ from cfmkit.studies.requirement_constraints import (
     places_of,
     rows_of,
     sampled_of,
-    states_places,
+    stated_places,
 )
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def _thinned(result: Result) -> Spec | None:
 def _numbers(spec: Spec, rows: RequirementRows, run: Run, whole: bool = True) -> FloatArray:
     """Return what rows look at of a part, all of it or metrics alone; a part without it ends the estimate."""
     try:
-        found = numbers_of(spec, rows, run, whole=states_places(spec)) if whole else metrics_of_part(spec, rows, run)
+        found = numbers_of(spec, rows, run, stated_places(spec)) if whole else metrics_of_part(spec, rows, run)
     except CfmError as error:
         raise YieldUnknown(str(error)) from None
     if found is None or not np.isfinite(found).all():

@@ -39,7 +39,7 @@ from cfmkit.studies.requirement_constraints import (
     places_of,
     rows_of,
     sampled_of,
-    states_places,
+    stated_places,
 )
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.sensitivity.inverse import LimitsAlong
@@ -122,7 +122,7 @@ class Sight:
     def is_good(self, x: FloatArray, errors: FloatArray) -> bool:
         """Return whether a part keeps every row, over all of the windows."""
         try:
-            numbers = numbers_of(self.variant(x, errors), self.rows, self.run, whole=states_places(self.spec))
+            numbers = numbers_of(self.variant(x, errors), self.rows, self.run, stated_places(self.spec))
         except CfmError:
             return False
         return numbers is not None and bool((self.rows.matrix @ numbers + self.rows.constant >= 0).all())
@@ -333,13 +333,14 @@ def checked(sight: Sight, x: FloatArray) -> int:
 
 def _ends_early(sight: Sight, x: FloatArray) -> int:
     """Return how many of the parts that are solved have numbers, but not over all of the stated windows."""
-    if not states_places(sight.spec):
+    stated = stated_places(sight.spec)
+    if not stated:
         return 0
     places, run, short = sight.rows.places, sight.run, 0
     for one in _errors(sight):
         try:
             part = sight.variant(x, one)
-            short += sampled_of(part, places, run, whole=True) is None and sampled_of(part, places, run) is not None
+            short += sampled_of(part, places, run, stated) is None and sampled_of(part, places, run) is not None
         except CfmError:
             continue
     return short

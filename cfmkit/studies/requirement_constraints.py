@@ -253,14 +253,14 @@ def _window(nominal: Result, over: Any) -> tuple[float, float]:
     return (found.lo, found.hi) if found else (float(motion.min()), float(motion.max()))
 
 
-def states_places(spec: Spec) -> bool:
-    """Return whether some window of a requirement ends at stated places, which a shorter part does not reach.
+def stated_places(spec: Spec) -> tuple[float, ...]:
+    """Return the places at which windows of requirements are stated to end, which a shorter part may not reach.
 
     Shares of the travel, and windows that are not stated, are those of each part.
     """
     usual = getattr(getattr(spec, "analysis", None), "window", None)
     windows = [one.over or usual for one in spec.part_requirements]
-    return any(not isinstance(end, Share) for window in windows if window for end in window)
+    return tuple(float(end) for window in windows if window for end in window if not isinstance(end, Share))
 
 
 def places_of(nominal: Result) -> FloatArray:
@@ -285,10 +285,10 @@ def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementR
     return builder.rows_of()
 
 
-def sampled_of(spec: Spec, places: FloatArray, run: Run, whole: bool = False) -> Sampled | None:
+def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, ...] = ()) -> Sampled | None:
     """Return effort and stress of a part at places: by the family's quick way, else from its analysis.
 
-    Where its curve ends a little earlier they are those at its end; None then, if the whole range is needed.
+    Where its curve ends a little earlier they are those at its end; None where it does not get to what must be reached.
     """
     quick = family(spec.family).sampled
     if quick is not None:
@@ -305,7 +305,7 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, whole: bool = False) ->
         if len(motion) < 2 or not (np.diff(motion[order]) > 0).all():
             return None
         slack = 1e-9 * float(places[-1] - places[0])
-        if whole and not motion.min() - slack <= places[0] <= places[-1] <= motion.max() + slack:
+        if any(not motion.min() - slack <= place <= motion.max() + slack for place in reached):
             return None
         between = np.interp(places, motion[order], curve.effort[on][order])
         if result.closed is not None:  # points may be few, and a force begins steeply
@@ -323,9 +323,9 @@ def numbers_in(seen: Sampled) -> FloatArray:
     return np.concatenate([*seen.effort.values(), *seen.stress])
 
 
-def numbers_of(spec: Spec, rows: RequirementRows, run: Run, whole: bool = False) -> FloatArray | None:
-    """Return what rows look at of a part, (q,); None where it has no such numbers; `whole`: see `sampled_of`."""
-    found = sampled_of(spec, rows.places, run, whole)
+def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
+    """Return what rows look at of a part, (q,); None where it has no such numbers; `reached`: see `sampled_of`."""
+    found = sampled_of(spec, rows.places, run, reached)
     if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
         return None
     numbers = [numbers_in(found)]

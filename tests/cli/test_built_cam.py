@@ -13,7 +13,7 @@ def built(cli, cam):
     """The published cam with measured points beside its spec."""
     text = (cli.folder / cam).read_text()
     text = text.replace("stroke: 240 mm}", "stroke: 240 mm, file: points.csv, noise: 0.002 mm}", 1)
-    (cli.folder / "built.yaml").write_text(text.replace("window: [2 mm, 240 mm]", "window: [40 mm, 120 mm]"))
+    (cli.folder / "built.yaml").write_text(text.replace("window: [2 mm, 100 %]", "window: [40 mm, 120 mm]"))
     points = measured(Errors(waviness=0.01e-3, noise=0.002e-3))
     rows = [
         f"{side};{x:.6f};{y:.6f}" for side, item in zip(("right", "left"), points, strict=True) for x, y in item * 1e3

@@ -28,7 +28,7 @@ def write(folder, points, head="side;x [mm];y [mm]"):
 
 def spec_of(folder, noise="0.002 mm", window="[40 mm, 120 mm]", file="measured.csv"):
     text = CONFIG.replace("stroke: 240 mm}", f"stroke: 240 mm, file: {file}, noise: {noise}}}", 1)
-    (folder / "cam.yaml").write_text(text.replace("window: [2 mm, 240 mm]", f"window: {window}"))
+    (folder / "cam.yaml").write_text(text.replace("window: [2 mm, 100 %]", f"window: {window}"))
     return cfmkit.load(folder / "cam.yaml")
 
 

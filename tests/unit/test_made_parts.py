@@ -51,7 +51,9 @@ def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
 def test_parts_whose_travel_ends_before_a_window_have_no_value_and_the_page_says_so():
     """A cam cut for 240 mm ends a few micrometres earlier with a larger roller: half the parts had no value, unsaid."""
     tolerances = {"mechanism.roller_radius": {"normal": "0.05 mm"}}
+    to_the_end = {"metric": "force_ripple", "max": "5 %", "over": ("2 mm", "240 mm")}
     design = cfmkit.design("configs/cam.yaml").spec.replace({"design.tolerances": tolerances, "design.samples": 40})
+    design = design.replace({"requirements": (to_the_end, *design.requirements[1:])})
     found = yields_of(replace(cfmkit.analyze(design), spec=design), None, Run())
     count, reason = found.lacking
     assert count == 40 - found.after.good > 10

@@ -18,7 +18,7 @@ from cfmkit.specs.units import Share
 from cfmkit.studies import margins
 from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.margins import with_design_margins
-from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of, states_places
+from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of, stated_places
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 
@@ -34,6 +34,8 @@ def rows_and_numbers(spec):
 
 def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_the_yield():
     design = cfmkit.design("configs/cam.yaml").spec
+    to_the_end = tuple(one.model_copy(update={"over": (0.005, 0.24)}) for one in design.requirements[:2])
+    design = design.replace({"requirements": (*to_the_end, *design.requirements[2:])})
     design = design.replace({"design.tolerances": {"mechanism.roller_radius": {"normal": "0.05 mm"}}})
     nominal = cfmkit.analyze(design)
     places = places_of(nominal)
@@ -45,7 +47,12 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     end = Share(1.0)
     shares = tuple(one.model_copy(update={"over": (Share(0.02), end)}) for one in design.requirements[:2])
     sight = replace(sight, spec=design.replace({"requirements": shares}))
-    assert not states_places(sight.spec)
+    assert stated_places(sight.spec) == ()
+    assert all(sight.is_good(np.empty(0), one) for one in (larger, smaller))
+    inner = tuple(one.model_copy(update={"over": (0.002, end)}) for one in shares)  # every part gets to 2 mm
+    sight = replace(sight, spec=design.replace({"requirements": inner}))
+    assert stated_places(sight.spec) == (0.002, 0.002)
+    assert all(sight.is_good(np.empty(0), one) for one in (larger, smaller))
 
 
 def test_a_part_with_few_points_is_looked_at_on_its_closed_form():
