@@ -181,7 +181,6 @@ def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], 
     for ax, title in zip(found, titles, strict=True):
         ax.set_title(title, fontsize=SMALL)
         ax.locator_params("x", nbins=4)
-        ax.ticklabel_format(axis="x", style="plain")
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.plots import parts
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.style import VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import VERMILLION, axes_mm, color_bar, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def stress_map_figure(result: Result, views: Sequence[StressView], subject: str)
         ax.set_axis_off()
         place_labels(ax, list(view.numbers(moved[number])), NUMBERS)
     bar = axes_mm(figure, (30.0, 10.0, 100.0, 3.0))
-    figure.colorbar(shades, cax=bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
+    color_bar(shades, bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
     return figure
 
 

@@ -17,8 +17,9 @@ from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.line_chart import padded
 from cfmkit.plots.rounding_noise import is_level, levelled
 from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
-from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, color_bar, new_figure, styled
 from cfmkit.plots.text import finite_range
+from cfmkit.plots.tick_numbers import digits_that_differ, widen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -135,8 +136,7 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
             axes.plot(motion, effort, color=colormaps[COLOURS](scale(line.parameter)), linewidth=1.0)
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, lines)
-    bar = figure.colorbar(ScalarMappable(scale, COLOURS), cax=axes_mm(figure, (133, 14, 4, 82)))
-    bar.set_label(parameter.axis)
+    bar = color_bar(ScalarMappable(scale, COLOURS), axes_mm(figure, (133, 14, 4, 82)), parameter.axis)
     if parameter.words:
         bar.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
     head(figure, found, f"curves, coloured by {parameter.plain}")
@@ -190,14 +190,14 @@ def _clear_of_poles(axes: Axes, lines: Sequence[StudyCurve]) -> None:
 def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over the only parameter."""
     figure = new_figure(120, 75 + HEAD)
-    axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (18, 13, 96, 56))
+    axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (20, 13, 94, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
     x, y = parameter.values[order], levelled(metric.values)[order]
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
     axes.set(xlabel=parameter.axis, ylabel="" if metric.words else metric.label)
-    axes.ticklabel_format(axis="y", useOffset=True)
+    widen(axes, y)
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)
     best = found.best
@@ -264,8 +264,9 @@ def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
         if not len(known):
             continue
         ends = ((0.0, known.min()), (1.0, known.max()))
+        digits = digits_that_differ(known.min(), known.max())
         for height, value in ends if not is_level(known) else ends[1:]:
-            text = scale.words[int(value)] if scale.words else f"{value:.4g}"
+            text = scale.words[int(value)] if scale.words else f"{value:.{digits}g}"
             below = height == 0.0
             place = (k, -0.02 if below else 1.02)
             axes.annotate(
@@ -303,7 +304,7 @@ def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
     else:
         mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
         _level_lines(axes, up, along, values)
-        figure.colorbar(mesh, cax=axes_mm(figure, box)).set_label(metric.label)
+        color_bar(mesh, axes_mm(figure, box), metric.label)
     if not meets.all():
         _hatch_cells(axes, x, y, ~meets)
     axes.set(xlabel=across.axis, ylabel=down.axis)
@@ -329,7 +330,7 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
     colours = ListedColormap([colormaps[COLOURS](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
     last = len(there) - 0.5
     mesh = axes.pcolormesh(across, up, np.ma.masked_invalid(shown), cmap=colours, vmin=-0.5, vmax=last, rasterized=True)
-    bar = key.figure.colorbar(mesh, cax=key)
+    bar = color_bar(mesh, key)
     bar.set_ticks(range(len(there)), labels=[metric.words[k] for k in there])
     bar.ax.tick_params(length=0)
 
@@ -419,7 +420,7 @@ def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArra
     # white is read on the dark end of the colours only; a dark outline carries it over the light end
     outline: list[patheffects.AbstractPathEffect] = [patheffects.withStroke(linewidth=1.6, foreground=INK)]
     lines.set_path_effects(outline)
-    for label in axes.clabel(lines, fontsize=SMALL, fmt="%.4g"):
+    for label in axes.clabel(lines, fontsize=SMALL, fmt=f"%.{digits_that_differ(low, high)}g"):
         label.set_path_effects(outline)
 
 

@@ -30,11 +30,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cfmkit.plots.figure_resizing import current
+from cfmkit.plots.tick_numbers import WholeNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import SubFigure
     from numpy.typing import NDArray
 
@@ -76,8 +78,6 @@ _SETTINGS: dict[str, Any] = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 6),
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
     "xtick.labelsize": SMALL,
@@ -226,4 +226,15 @@ def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: A
     width, height = size_mm(figure)
     layout = current()
     left, bottom, across, up = box if layout is None else layout.placed(box)
-    return figure.add_axes((left / width, bottom / height, across / width, up / height), **options)
+    axes = figure.add_axes((left / width, bottom / height, across / width, up / height), **options)
+    axes.xaxis.set_major_formatter(WholeNumbers())
+    axes.yaxis.set_major_formatter(WholeNumbers())
+    return axes
+
+
+@styled
+def color_bar(shades: Any, axes: Axes, label: str = "", **options: Any) -> Colorbar:
+    """Fill axes with the key of colours, whose ticks are written like those of every other axis."""
+    bar = axes.figure.colorbar(shades, cax=axes, format=WholeNumbers(), **options)
+    bar.set_label(label)
+    return bar

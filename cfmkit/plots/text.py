@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, room_above, size_mm, styled
+from cfmkit.plots.tick_numbers import WholeNumbers, brief
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
 
@@ -142,12 +143,8 @@ def plain_ticks(axis: Axis) -> None:
     low, high = sorted(float(value) for value in axis.get_view_interval())
     few = high < 1e3 * low
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
-    axis.set_major_formatter(FuncFormatter(_plain))
+    axis.set_major_formatter(FuncFormatter(lambda value, _position: brief(value)))
     axis.set_minor_formatter(NullFormatter())
-
-
-def _plain(value: float, _position: Any = None) -> str:
-    return f"{value:g}" if 1e-3 < abs(value) < 1e6 else f"{value:.0e}"
 
 
 @styled
@@ -180,7 +177,7 @@ def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> No
             taken = place
     top = ax.twiny()
     top.set_xlim(low, high)
-    top.set_xticks(np.interp(chosen, values, places).tolist(), [f"{value:g}" for value in chosen])
+    top.set_xticks(np.interp(chosen, values, places).tolist(), [brief(value) for value in chosen])
     top.set_xlabel(label)
     top.spines["top"].set_visible(True)
     top.grid(False)
@@ -190,6 +187,7 @@ def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> No
 def right_axis(ax: Axes, factor: float, label: str) -> None:
     """Add an axis at the right for a quantity that is `factor` times the left one, in border units."""
     right = ax.twinx()
+    right.yaxis.set_major_formatter(WholeNumbers())
     right.set_ylim(*(factor * value for value in ax.get_ylim()))
     right.set_ylabel(label)
     right.spines["right"].set_visible(True)

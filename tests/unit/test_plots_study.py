@@ -254,3 +254,46 @@ def test_parameters_of_the_same_last_name_are_told_apart():
     assert [one.label for one in seen.varied] == ["bistable width [mm]", "positive width [mm]"]
     title = next(text for text in _texts(figures(seen)["force_ripple"]()) if text.startswith("ding-2022: "))
     assert " ".join(title.split()).endswith("force ripple over positive width and bistable width")
+
+
+def of_one_parameter(values):
+    x = np.linspace(7.0, 9.0, 11)
+    varied, metric = DrawnScale("roller_radius", "length", x), DrawnScale("force_mean", "force", values(x))
+    return StudyMarks((varied,), (metric,), (11,), np.ones(11, bool))
+
+
+@pytest.mark.parametrize(
+    ("values", "shown"),
+    [
+        (lambda x: 50.66 + 4e-4 * x, "50.6630"),
+        (lambda x: 12345678.0 + x, "12345700"),
+        (lambda x: 1e-9 * x, "8e−9"),
+        (lambda x: 1e9 * x, "8e9"),
+        (lambda x: -2e-5 * x, "−1.6e−4"),
+    ],
+)
+def test_a_tick_is_the_whole_value_however_little_it_varies_and_however_small_it_is(values, shown):
+    (draw,) = figures(of_one_parameter(values), [], ("", "")).values()
+    figure = draw()
+    png(figure)
+    axis = figure.axes[0].yaxis
+    assert axis.get_offset_text().get_text() == ""
+    assert shown in [label.get_text() for label in axis.get_ticklabels()]
+    assert axis.get_tightbbox().x0 > -0.2 / 25.4 * figure.dpi
+
+
+def test_the_colours_of_a_map_that_hardly_varies_have_whole_values():
+    case = found(2, (5, 4), metric=50.66 + 1e-4 * X * Y)
+    (draw,) = figures(case, [], ("", "")).values()
+    figure = draw()
+    png(figure)
+    bar = figure.axes[1].yaxis
+    assert bar.get_offset_text().get_text() == ""
+    assert "50.6604" in [label.get_text() for label in bar.get_ticklabels()]
+
+
+def test_the_ends_of_an_axis_of_parallel_axes_are_told_apart_by_their_numbers():
+    case = found(3, (5, 2, 2), metric=50.66 + 1e-4 * X * Y)
+    (draw,) = figures(case, [], ("", "")).values()
+    texts = [text.get_text() for text in draw().axes[0].texts]
+    assert {"50.6601", "50.6612"} <= set(texts)
