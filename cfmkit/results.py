@@ -157,6 +157,23 @@ class ClosedForm(Protocol):
         ...
 
 
+class WindingPath(Protocol):
+    """A path whose motion turns back, at every place of its way: what `ClosedForm` is of others."""
+
+    @property
+    def ways(self) -> FloatArray:
+        """Increasing places of the way, (n,): neither motion nor effort nor stress turns between two of them."""
+        ...
+
+    def states(self, ways: FloatArray, /) -> tuple[FloatArray, FloatArray]:
+        """Return motion [m or rad] and effort [N or N m] at places of the way of any shape."""
+        ...
+
+    def stress(self, ways: FloatArray, /) -> FloatArray:
+        """Return the largest stress [Pa] at places of the way of any shape."""
+        ...
+
+
 @dataclass(frozen=True)
 class Result:
     """The outcome of one analysis.
@@ -194,6 +211,8 @@ class Result:
         in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
     closed : ClosedForm, optional
         The nominal curve at every place, where the model is so cheap.
+    winding : WindingPath, optional
+        The nominal curve at every place of its way, where its motion turns back; it has one branch.
     ends : Curve, optional
         Points of the nominal curve beside its own: where windows end between two of these.
     tables : mapping
@@ -216,6 +235,7 @@ class Result:
     allowable_stress: float | None = None
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = None
+    winding: WindingPath | None = None
     ends: Curve | None = None
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None

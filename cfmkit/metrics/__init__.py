@@ -5,8 +5,9 @@
 curve, `requirements` compares with bounds, `metrics_json` writes border units.
 """
 
-from cfmkit.metrics.branch_views import Branch, Cycle, MeasuringFrame
+from cfmkit.metrics.branch_views import Branch, MeasuringFrame
 from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window, restrict, traces
+from cfmkit.metrics.cycles import Cycle
 from cfmkit.metrics.evaluation import (
     Survey,
     evaluate,

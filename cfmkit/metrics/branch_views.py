@@ -1,4 +1,4 @@
-"""What a metric looks at: one branch, or the whole cycle, in its frame of reference.
+"""What a metric looks at: one branch in its frame of reference.
 
 Everything that several metrics need is computed once, when it is first needed.
 """
@@ -7,23 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.metrics import continuous_curves, ranges_many
+from cfmkit.metrics import continuous_curves, winding_branches
 from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
-    from cfmkit.results import ClosedForm
+    from cfmkit.results import ClosedForm, WindingPath
     from cfmkit.specs.target_function import TargetCurve
 
 
@@ -51,6 +49,8 @@ class MeasuringFrame:
         Whose stress counts beside the curve's own.
     closed : ClosedForm or None
         The model at every place, for metrics that are places.
+    winding : WindingPath or None
+        The same of a branch whose motion turns back.
     durability : Durability or None
         Fatigue and relaxation of the material.
     curve : TargetCurve or None
@@ -65,6 +65,7 @@ class MeasuringFrame:
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = field(default=None, compare=False)
     ends: Curve | None = field(default=None, compare=False)
+    winding: WindingPath | None = field(default=None, compare=False)
     durability: Durability | None = None
     curve: TargetCurve | None = None
 
@@ -142,6 +143,11 @@ class Branch:
     def ends(self) -> tuple[float, float]:
         """Ends of the window, or of the branch where there is no window."""
         return (self.window.lo, self.window.hi) if self.window else self.extent
+
+    @property
+    def ends_on_way(self) -> tuple[float, float]:
+        """Ends of the window; without one, of everything: a motion that turns back may do so between two points."""
+        return (self.window.lo, self.window.hi) if self.window else (-inf, inf)
 
     @cached_property
     def _inside(self) -> BranchTrace | str:
@@ -222,7 +228,9 @@ class Branch:
     @property
     def _extremes(self) -> tuple[float, float]:
         """Largest and smallest effort in the window: of its points, or of the model next to them."""
-        model, part = self.frame.closed, self.inside
+        model, path, part = self.frame.closed, self.frame.winding, self.inside
+        if path is not None:
+            return winding_branches.extremes(path, *self.ends_on_way)
         if model is None:
             return float(part.effort.max()), float(part.effort.min())
         motion, effort, (low, high) = part.motion, part.effort, self.ends
@@ -250,10 +258,12 @@ class Branch:
     @cached_property
     def level(self) -> float:
         """Mean effort in the window: over its points, or over the way where the model gives it at every place."""
-        model = self.frame.closed
+        model, path = self.frame.closed, self.frame.winding
+        self.inside  # noqa: B018  (raises where the window is not covered)
+        if path is not None:
+            return winding_branches.mean(path, *self.ends_on_way)
         if model is None:
             return float(level(self.spread))
-        self.inside  # noqa: B018  (raises where the window is not covered)
         return continuous_curves.mean(partial(model.effort, self.name), model.places, *self.ends)
 
     @cached_property
@@ -353,148 +363,3 @@ def span_text(lo: float, hi: float, kind: Kind) -> str:
 
     dimension = "length" if kind == "force" else "angle"
     return f"{float(to_border(lo, dimension)):.6g} ... {float(to_border(hi, dimension)):.6g} {border_unit(dimension)}"
-
-
-@dataclass(frozen=True, eq=False)
-class Cycle:
-    """All branches of a curve together."""
-
-    branches: tuple[Branch, ...]
-    frame: MeasuringFrame
-
-    @property
-    def closed(self) -> tuple[ManyBranches, ...]:
-        """All branches at every place; empty where the model does not give them."""
-        return tuple(branch.closed for branch in self.branches if branch.closed is not None)
-
-    @cached_property
-    def usable(self) -> tuple[float, float] | None:
-        """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
-        return usable_interval(self)
-
-
-def cycle(curve: Curve, frame: MeasuringFrame, window: Window | None = None) -> Cycle:
-    """Return a curve as metrics see it."""
-    return Cycle(tuple(Branch(trace, curve.kind, frame, window) for trace in traces(curve)), frame)
-
-
-Interval = tuple[float, float]
-
-
-def usable_interval(cycle: Cycle) -> Interval | None:
-    """Return the largest interval in which force and stress of every branch keep their limits.
-
-    A place counts only if every state of the path at that place keeps them, so
-    that a branch that folds back needs no sorting.
-    """
-    cycle = _levelled(cycle)
-    reference = cycle.frame.target or _mean(cycle)
-    travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
-    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
-        return _solved_interval(cycle, reference, (cycle.frame.valid or (travel,))[0][0])
-    bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference))
-    allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
-    gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
-    longest = max((high - low for low, high in gaps), default=0.0)
-    # the first of those that are equally long but for rounding
-    return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
-
-
-def _levelled(cycle: Cycle) -> Cycle:
-    """Return a cycle that follows a curve as one that is to be level: its offsets from it, on its largest effort."""
-    curve = cycle.frame.curve
-    if curve is None:
-        return cycle
-    low, high = max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches)
-    low, high = max(low, curve.extent[0]), min(high, curve.extent[1])
-    if not (low < high and (size := curve.largest(low, high))):
-        raise Undefined("the target curve is not defined for this travel")
-    valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
-    model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
-    frame = replace(
-        cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b) or None
-    )
-    branches = (
-        replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.at(b.trace.motion) + size))
-        for b in cycle.branches
-    )
-    return Cycle(tuple(branches), frame)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelledModel:
-    """A model less a curve, on a constant effort (a `cfmkit.results.ClosedForm`)."""
-
-    model: ClosedForm
-    curve: TargetCurve
-    size: float
-
-    @property
-    def places(self) -> FloatArray:
-        """Those of the model [m or rad]."""
-        return self.model.places
-
-    @property
-    def peaks(self) -> FloatArray:
-        """Those of the model [m or rad]."""
-        return self.model.peaks
-
-    def effort(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return the effort less the curve, plus the constant [N or N m]."""
-        return np.asarray(self.model.effort(branch, places) - self.curve.at(places) + self.size)
-
-    def stress(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return that of the model [Pa]."""
-        return self.model.stress(branch, places)
-
-
-def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
-    """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
-    start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
-    return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
-
-
-def _mean(cycle: Cycle) -> float:
-    """Return the mean of the branches' means, each over its points in the window, or the window where it is solved."""
-    value = sum(branch.level for branch in cycle.branches) / len(cycle.branches)
-    if value == 0:
-        raise Undefined("there is no target, and the mean is zero")
-    return value
-
-
-def _gaps(lo: float, hi: float, bad: Iterable[Interval]) -> Iterable[Interval]:
-    """Yield what the sorted bad intervals leave of [lo, hi]."""
-    for start, end in bad:
-        if start > lo and min(start, hi) > lo:
-            yield lo, min(start, hi)
-        lo = max(lo, end)
-    if hi > lo:
-        yield lo, hi
-
-
-def _bad(branch: Branch, reference: float) -> list[Interval]:
-    """Return the intervals of the motion in which a branch breaks a limit."""
-    frame, trace = branch.frame, branch.trace
-    ratio = trace.effort / reference - 1
-    band = frame.band * (1 + ROUNDING)
-    # two one-sided limits: the absolute value has a kink that linear interpolation would miss
-    broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
-    for one in (trace, *branch.beside):
-        if frame.allowable_stress is not None and one.stress is not None:
-            broken += _excess(one, one.stress - frame.allowable_stress * (1 + ROUNDING))
-    return broken
-
-
-def _excess(trace: BranchTrace, height: FloatArray) -> list[Interval]:
-    """Return the intervals of the motion over which a piecewise linear height is positive, or no number."""
-    bad = ~(height <= 0)
-    if not bad.any():
-        return []
-    motion, edges = trace.motion, (bad[1:] != bad[:-1]).nonzero()[0]
-    places = motion[edges] - height[edges] * (motion[edges + 1] - motion[edges]) / (height[edges + 1] - height[edges])
-    places = np.where(np.isfinite(places), places, motion[edges + bad[edges]])
-    ends = np.concatenate((motion[: int(bad[0])], places, motion[len(motion) - int(bad[-1]) :])).reshape(-1, 2).tolist()
-    if not trace.way:  # between its ends, a run of bad points may reach farther than they do
-        runs = np.split(motion, edges + 1)[int(not bad[0]) :: 2]
-        ends = [[*pair, float(run.min()), float(run.max())] for pair, run in zip(ends, runs, strict=True)]
-    return [(min(pair), max(pair)) for pair in ends]

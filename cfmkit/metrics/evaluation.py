@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.errors import UsageError
-from cfmkit.metrics.branch_views import Cycle, MeasuringFrame, cycle, span_text
+from cfmkit.metrics.branch_views import MeasuringFrame, span_text
 from cfmkit.metrics.branch_windows import Undefined, Window, covers, traces
+from cfmkit.metrics.cycles import Cycle, cycle
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.metric_definitions import (
     Definition,
@@ -173,6 +174,7 @@ def frame_of(result: Result) -> MeasuringFrame:
         result.valid,
         result.load_cases,
         result.closed,
+        winding=result.winding,
         durability=getattr(result.spec, "durability", None),
         ends=result.ends,
         curve=result.target_curve or getattr(result.spec, "target_curve", None),

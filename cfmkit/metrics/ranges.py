@@ -17,7 +17,8 @@ from cfmkit.metrics.branch_windows import Undefined
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.branch_views import Branch, Cycle, Interval
+    from cfmkit.metrics.branch_views import Branch
+    from cfmkit.metrics.cycles import Cycle, Interval
     from cfmkit.metrics.ranges_many import ManyBranches
 
 

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics import ranges_many, spread
+from cfmkit.metrics import ranges_many, spread, winding_branches
 from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.branch_views import Branch, Cycle
+    from cfmkit.metrics.branch_views import Branch
+    from cfmkit.metrics.cycles import Cycle
 
 
 def mean(branch: Branch) -> float:
@@ -153,10 +154,13 @@ def stress_max(branch: Branch) -> float:
 def stress_range(branch: Branch) -> tuple[float, float]:
     """Return the least and the largest stress of a branch in the window, its own load case only [Pa]."""
     own, model = _stress(branch.inside), branch.frame.closed
+    if (path := branch.frame.winding) is not None:
+        top, bottom = winding_branches.stress_extremes(path, *branch.ends_on_way)
+        return bottom, top
     if model is None:
         return float(own.min()), float(own.max())
-    top, bottom = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
-    return float(bottom[0]), float(top[0])
+    tops, bottoms = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
+    return float(bottoms[0]), float(tops[0])
 
 
 def safety_factor(branch: Branch) -> float:

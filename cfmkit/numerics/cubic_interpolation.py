@@ -5,6 +5,7 @@ Error: the fourth power of the spacing. The first argument increases; nothing he
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -101,6 +102,24 @@ def crossing(x: FloatArray, y: FloatArray, level: float) -> float | None:
     if index == 0:
         return float(x[0])
     return bisect(lambda place: value_at(x, y, place) >= level, float(x[index - 1]), float(x[index]))
+
+
+def crossings(x: FloatArray, y: FloatArray, level: float) -> list[float]:
+    """Return where the function passes a level between two samples, in either direction, increasing.
+
+    Examples
+    --------
+    >>> x = np.array([-3.0, -1.0, 1.0, 3.0, 4.0])
+    >>> np.round(crossings(x, x**2, 4.0), 12).tolist()
+    [-2.0, 2.0]
+    """
+    above = y >= level
+
+    def passed(place: float, up: bool) -> bool:
+        return (value_at(x, y, place) >= level) == up
+
+    steps = np.flatnonzero(above[1:] != above[:-1])
+    return [bisect(partial(passed, up=bool(above[k + 1])), float(x[k]), float(x[k + 1])) for k in steps.tolist()]
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
-from cfmkit.metrics.branch_views import Branch, cycle
+from cfmkit.metrics.cycles import cycle
 from cfmkit.plots.line_chart import Limit
 from cfmkit.plots.text import value_text
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.metrics import Outcome
+    from cfmkit.metrics.branch_views import Branch
     from cfmkit.metrics.spread import Spread
     from cfmkit.results import Result
 

@@ -2,9 +2,9 @@
 
 What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
 solved from the polynomial through the nearest four, on the branch that these are on: a hundredth of a millisecond. A
-stress takes ten times as long, and is solved at its extremes only; elsewhere the polynomial is taken, for each beam by
-itself, since the largest of all has a kink where it passes from one beam to another. At a bifurcation, where the path
-has a corner, everything is parted.
+stress takes ten times as long, and is solved at its extremes and where it passes the allowable one; elsewhere the
+polynomial is taken, for each beam by itself, since the largest of all has a kink where it passes from one beam to
+another. At a bifurcation, where the path has a corner, everything is parted.
 
 Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
 an extreme there.
@@ -25,7 +25,7 @@ from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.outcome.corners import Corner, SmoothStretch
-from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
+from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -58,7 +58,9 @@ KNOWN = 1e-12
 """Share of the drive's range within which a place is that of a point."""
 
 
-def between_points(path: Path, unit: float = 1.0, axial: bool = True) -> BetweenPoints | None:
+def between_points(
+    path: Path, unit: float = 1.0, axial: bool = True, allowed: float | None = None
+) -> BetweenPoints | None:
     """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.
 
     Parameters
@@ -69,13 +71,15 @@ def between_points(path: Path, unit: float = 1.0, axial: bool = True) -> Between
         What the effort is multiplied by: parts side by side.
     axial : bool
         Whether the stress has its axial part.
+    allowed : float or None
+        Stress [Pa]; where it is passed is solved for.
     """
     if isinstance(path.layout.drive, Loading) or len(path) < FEWEST or not np.all(path.accurate):
         return None
     steps = np.diff(path.points.drive)
     if not ((steps > 0).all() or (steps < 0).all()):
         return None
-    return BetweenPoints(path, unit, axial)
+    return BetweenPoints(path, unit, axial, allowed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +94,14 @@ class BetweenPoints:
         What its effort is multiplied by.
     axial : bool
         Whether the stress has its axial part.
+    allowed : float or None
+        Stress [Pa] that is solved for where it is passed.
     """
 
     path: Path
     unit: float
     axial: bool
+    allowed: float | None
 
     @cached_property
     def _order(self) -> Any:
@@ -172,7 +179,8 @@ class BetweenPoints:
     def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
         """Of each stretch between corners, and there of each beam, smooth variables and stresses.
 
-        They are those of the path and its corners, and extremes between them that may be the largest.
+        They are those of the path and its corners, extremes between them that may be the largest, and where the
+        allowable stress is passed.
         """
         corners = list(self._corners.values())
         numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
@@ -194,19 +202,41 @@ class BetweenPoints:
     def _with_tops(
         self, stretch: SmoothStretch, x: FloatArray, rows: FloatArray
     ) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """Return smooth variables and stresses of each beam on a stretch, with the extremes that may be the largest."""
+        """Return smooth variables and stresses of each beam on a stretch, with the places that are solved for."""
         t, largest, found = stretch.smooth(x), rows.max(axis=0), []
         for name, row in zip(self.path.layout.network.beams, rows, strict=True):
-            top = inner_extremes(t, row)
-            beside = np.searchsorted(t, top)
-            more = top[np.maximum(row[beside - 1], row[beside]) >= NEARLY * largest[beside]]
-            if len(more):
-                there = self.at(self._scale * stretch.drive(more))
-                solved = np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(t, row, more))
-                found.append(_inserted(t, row, more, solved))
-            else:
-                found.append((t, row))
+            own, values = t, row
+            for _ in range(ROUNDS):
+                top = inner_extremes(own, values)
+                beside = np.searchsorted(own, top)
+                more = top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
+                if not len(more):
+                    break
+                own, values = _inserted(own, values, more, self._stress_at(name, stretch, more, own, values))
+            found.append(self._with_passes(name, stretch, own, values))
         return tuple(found)
+
+    def _with_passes(
+        self, name: str, stretch: SmoothStretch, t: FloatArray, row: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same with the places where the stress of a beam passes the allowable one.
+
+        The last of some rounds only: knots that nearly coincide spoil a cubic.
+        """
+        own, values = t, row
+        for _ in range(ROUNDS if self.allowed is not None else 0):
+            passed = np.setdiff1d(crossings(own, values, self.allowed or 0.0), t)
+            if not len(passed):
+                break
+            own, values = _inserted(t, row, passed, self._stress_at(name, stretch, passed, own, values))
+        return own, values
+
+    def _stress_at(
+        self, name: str, stretch: SmoothStretch, places: FloatArray, t: FloatArray, row: FloatArray
+    ) -> FloatArray:
+        """Return the stress of a beam at places of a stretch [Pa]: solved, or on the cubic where that fails."""
+        there = self.at(self._scale * stretch.drive(places))
+        return np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(t, row, places))
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
@@ -413,7 +443,7 @@ class BetweenLoads(BetweenPoints):
 
 
 def between_loads(
-    path: Path, node: str, along: float | None, unit: float = 1.0, axial: bool = True
+    path: Path, node: str, along: float | None, unit: float = 1.0, axial: bool = True, allowed: float | None = None
 ) -> BetweenLoads | None:
     """Return a path under loads at every place of a node's motion.
 
@@ -432,6 +462,8 @@ def between_loads(
         What the load is multiplied by: parts side by side.
     axial : bool
         Whether the stress has its axial part.
+    allowed : float or None
+        Stress [Pa]; where it is passed is solved for.
     """
     layout, solver = path.layout, path.solver
     if len(path) < FEWEST or not np.all(path.accurate):
@@ -454,7 +486,7 @@ def between_loads(
     steps = np.diff(motion)
     if not row.any() or np.ptp(rest) > KNOWN * np.ptp(motion) or not ((steps > 0).all() or (steps < 0).all()):
         return None
-    return BetweenLoads(path, unit, axial, read_only(row), scale, float(rest.mean()))
+    return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))
 
 
 def _inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

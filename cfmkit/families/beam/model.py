@@ -85,6 +85,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
         closed=solution.everywhere,
+        winding=solution.winding,
         ends=_ends(solution),
         state=solution,
     )

@@ -278,11 +278,36 @@ def extremes(solution: OnCurve) -> dict[str, float | None]:
     if solution.everywhere is not None:
         x, force = solution.everywhere.knots
         corners = solution.everywhere.corners
-    peak = first_extreme(x, force, corners=corners)
+    peak = _turn(solution, first_extreme(x, force, corners=corners))
     if peak is None:
         return numbers
-    valley = first_extreme(x, force, -1, after=peak[0], corners=corners)
+    valley = _turn(solution, first_extreme(x, force, -1, after=peak[0], corners=corners))
     return dict(zip(names, (*peak, *(valley or (None, None))), strict=True))
+
+
+_BESIDE = 0.1 * np.arange(-2.0, 3.0)
+"""Where equilibria are solved for around an extreme, as shares of the way to the next point: wide enough that what the
+solver leaves does not move the place, close enough that a polynomial of degree four does not either."""
+
+
+def _turn(solution: OnCurve, found: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return place and value of an extreme from equilibria around it, where the model can be asked; else as found."""
+    law = solution.everywhere
+    if law is None or found is None or found[0] in law.corners:
+        return found
+    place, value = found
+    clear = np.concatenate([solution.motion[[0, -1]], law.corners])
+    step = min(float(np.abs(np.diff(solution.motion)).max()), float(np.abs(clear - place).min()) / _BESIDE[-1])
+    for _ in range(2):
+        powers = np.polynomial.polynomial.polyfit(_BESIDE, law.effort("", place + step * _BESIDE), 4)
+        rates = np.polynomial.polynomial.polyder(powers)
+        turns = np.roots(rates[::-1])
+        real = turns.real[np.isreal(turns)]
+        if not len(real) or np.abs(real).min() > _BESIDE[-1]:
+            return found
+        at = float(real[np.abs(real).argmin()])
+        place, value = place + step * at, float(np.polynomial.polynomial.polyval(at, powers))
+    return place, value
 
 
 def _events(solution: Solution) -> dict[str, float | None]:

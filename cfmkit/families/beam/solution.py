@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.arrays import distinct, read_only
+from cfmkit.elastica.outcome.along_the_way import along_the_way
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.build import Assembly, mirror_axis, thickest_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
+    from cfmkit.elastica.outcome.along_the_way import AlongTheWay
     from cfmkit.elastica.outcome.between_points import BetweenPoints
     from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.beam.spec import BeamSpec
@@ -80,10 +82,18 @@ class Solution:
     def everywhere(self) -> BetweenPoints | None:
         """The equilibria between the points of the path; None of paths whose motion turns back."""
         kind, axial = self.spec.mechanism.drive.kind, self.spec.stress == "total"
+        unit, allowed = self.assembly.effort_unit, self.assembly.allowable_stress
         if kind not in ("displacement", "rotation"):
             along = None if kind == "moment" else self.assembly.direction
-            return between_loads(self.path, self.assembly.driven, along, self.assembly.effort_unit, axial)
-        return between_points(self.path, self.assembly.effort_unit, self.spec.stress == "total")
+            return between_loads(self.path, self.assembly.driven, along, unit, axial, allowed)
+        return between_points(self.path, unit, axial, allowed)
+
+    @cached_property
+    def winding(self) -> AlongTheWay | None:
+        """The equilibria at every place of the way of a path whose motion turns back."""
+        if self.everywhere is not None:
+            return None
+        return along_the_way(self.path, lambda path: replace(self, path=path, keep=np.arange(len(path))))
 
     @cached_property
     def with_ends(self) -> Solution:

@@ -119,7 +119,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
-        closed=solution.course or between_points(pressed.path, float(solution.legs)),
+        closed=solution.course
+        or between_points(pressed.path, float(solution.legs), allowed=solution.material.allowable_stress),
         state=solution,
     )
 

@@ -1,0 +1,198 @@
+"""A path whose motion turns back, at every place of its way: what is stated of it does not depend on its points.
+
+The way counts the points of the path: 2.5 is where the plane half-way between its points 2 and 3, across the line from
+one to the other, cuts the path. There the equilibrium is solved for, from the polynomial through the nearest four
+points of the branch.
+
+Assumes: points so dense that the path goes once through each of these planes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cfmkit.arrays import distinct, read_only
+from cfmkit.elastica.equilibrium.meshed_network import Points
+from cfmkit.elastica.outcome.between_points import FEWEST, LEAST, ROUNDS, STRAY
+from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.outcome.path import Path
+
+
+class Observed(Protocol):
+    """What is looked at on a path."""
+
+    @property
+    def motion(self) -> FloatArray:
+        """Motion at every point [m or rad]."""
+
+    @property
+    def effort(self) -> FloatArray:
+        """Force or torque at every point; NaN where the tolerance is not reached."""
+
+    @property
+    def stress(self) -> FloatArray:
+        """The largest stress at every point [Pa]; NaN likewise."""
+
+    @property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Of each beam, the largest stress [Pa] and its place."""
+
+
+@dataclass(frozen=True, eq=False)
+class AlongTheWay:
+    """Motion, effort and stress at every place of the way (a `cfmkit.results.WindingPath`).
+
+    Attributes
+    ----------
+    path : Path
+        Of at least four accurate points.
+    observe : callable
+        Returns what is looked at on equilibria of this network.
+    """
+
+    path: Path
+    observe: Callable[[Path], Observed]
+
+    @cached_property
+    def _seen(self) -> Observed:
+        return self.observe(self.path)
+
+    @cached_property
+    def ways(self) -> FloatArray:
+        """The points, and between them extremes of the motion, of the effort and of each beam's stress, increasing."""
+        seen, points = self._seen, np.arange(float(len(self.path)))
+        found = {*points.tolist()}
+        for number in range(2):
+            found |= self._turns(number)
+        largest = seen.stress.max()
+        for values, _ in seen.stresses.values():
+            turns = inner_extremes(self._arc, values)
+            near = np.interp(turns, self._arc, points)
+            found |= {*near[np.interp(near, points, values) > 0.5 * largest].tolist()}
+        return read_only(sorted(found))
+
+    def _turns(self, which: int) -> set[float]:
+        """Return where one of the states has extremes between points: of polynomials, with what is solved there."""
+        points = np.arange(float(len(self.path)))
+        ways, values = points, self._states_at_points[which]
+        for _ in range(ROUNDS):
+            extremes = inner_extremes(np.interp(ways, points, self._arc), values)
+            more = np.setdiff1d(np.interp(extremes, self._arc, points), ways)
+            if not len(more):
+                break
+            at = np.searchsorted(ways, more)
+            ways, values = np.insert(ways, at, more), np.insert(values, at, self.states(more)[which])
+        return {*ways.tolist()}
+
+    @cached_property
+    def _states_at_points(self) -> tuple[FloatArray, FloatArray]:
+        return self._seen.motion, self._seen.effort
+
+    def states(self, ways: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return motion [m or rad] and effort [N or N m] at places of the way of any shape."""
+        flat = np.ravel(ways)
+        known = self._known.get(flat.tobytes())
+        if known is None:
+            there = self.at(flat)
+            seen, points = self.observe(there), np.arange(float(len(self.path)))
+            rows = zip((seen.motion, seen.effort), self._states_at_points, strict=True)
+            known = [np.where(there.accurate, new, np.interp(flat, points, own)) for new, own in rows]
+            self._known[flat.tobytes()] = known
+        motion, effort = (one.reshape(np.shape(ways)) for one in known)
+        return motion, effort
+
+    @cached_property
+    def _known(self) -> dict[bytes, list[FloatArray]]:
+        """What was asked for: every metric asks for the same places."""
+        return {}
+
+    def stress(self, ways: FloatArray) -> FloatArray:
+        """Return the largest stress at places of the way of any shape [Pa]."""
+        flat, own = np.ravel(ways), self._seen.stress
+        stress = np.interp(flat, np.arange(float(len(self.path))), own)
+        between = np.flatnonzero(flat % 1.0)
+        there = self.at(flat[between])
+        stress[between] = np.where(there.accurate, self.observe(there).stress, stress[between])
+        return np.asarray(stress.reshape(np.shape(ways)))
+
+    def at(self, ways: FloatArray) -> Path:
+        """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
+        path, points = self.path, self.path.points
+        left = np.clip(ways.astype(np.int64), 0, len(path) - 2)
+        share = ways - left
+        y, drive = self._guesses(left, share)
+        near = np.where(share > 0.5, left + 1, left)
+        known = (share == 0.0) | (share == 1.0)
+        y[known], drive[known] = points.y[near[known]], points.drive[near[known]]
+        found = known.copy()
+        for number in np.flatnonzero(~known).tolist():
+            at = int(left[number])
+            step = self._places[at + 1] - self._places[at]
+            border = step * self._metric
+            goal = float(border @ (self._places[at] + share[number] * step))
+            spot = path.solver.solve(y[number], float(drive[number]), border, goal)
+            if spot is None or spot.unstable not in points.unstable[at : at + 2].tolist():
+                continue
+            moved = _largest(path, spot.y - y[number])
+            if moved <= max(LEAST, STRAY * _largest(path, points.y[at + 1] - points.y[at])):
+                y[number], drive[number], found[number] = spot.y, spot.drive, True
+        solved = Points(y, drive, points.info[near])
+        return replace(path, points=solved, branch=path.branch[near], accurate=read_only(found, np.bool_))
+
+    @cached_property
+    def _places(self) -> FloatArray:
+        """Free unknowns and drive of every point, (n, free + 1)."""
+        points = self.path.points
+        return np.column_stack([points.y[:, : self.path.solver.n], points.drive])
+
+    @cached_property
+    def _metric(self) -> FloatArray:
+        """What the square of each unknown and of the drive counts for: the ranges of both count alike, (free + 1,)."""
+        reach = np.ptp(self._places, axis=0)
+        weights = np.ones(len(reach))
+        weights[-1] = (reach[:-1] @ reach[:-1]) / reach[-1] ** 2 if reach[-1] else 1.0
+        return weights
+
+    @cached_property
+    def _arc(self) -> FloatArray:
+        """Length of the way up to every point, (n,)."""
+        steps = np.diff(self._places, axis=0)
+        return np.concatenate([[0.0], np.cumsum(np.sqrt(steps**2 @ self._metric))])
+
+    @cached_property
+    def _stretch(self) -> Any:
+        """The number of the branch that each point is on, in the order of the path, (n,)."""
+        branch = self.path.branch
+        return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
+
+    def _guesses(self, left: Any, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the polynomials through up to four points of the branch at shares of the way behind some points."""
+        near = np.where(share > 0.5, left + 1, left)
+        arc = self._arc[left] + share * (self._arc[left + 1] - self._arc[left])
+        rows = np.column_stack([self.path.points.y, self.path.points.drive])
+        found = np.empty((len(left), rows.shape[1]))
+        for number in distinct(self._stretch[near]).tolist():
+            own, here = self._stretch == number, self._stretch[near] == number
+            found[here] = values_at(self._arc[own], rows[own], arc[here])
+        return found[:, :-1].copy(), found[:, -1].copy()
+
+
+def _largest(path: Path, change: FloatArray) -> float:
+    """Return the largest change of positions and rotations in a change of the unknowns."""
+    solver = path.solver
+    inner = np.abs(change[solver.n :].reshape(solver.n_segments, 6)[:, :3])
+    return float(max(inner.max(initial=0.0), np.abs(change[: solver.n_free]).max(initial=0.0)))
+
+
+def along_the_way(path: Path, observe: Callable[[Path], Observed]) -> AlongTheWay | None:
+    """Return a path at every place of its way; None of one that is too short, or misses its tolerance."""
+    return AlongTheWay(path, observe) if len(path) >= FEWEST and np.all(path.accurate) else None

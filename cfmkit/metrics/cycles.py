@@ -1,0 +1,187 @@
+"""All branches of a curve together, and where all of them keep the limits of force and stress."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.metrics import ranges_many, winding_branches
+from cfmkit.metrics.branch_views import Branch, MeasuringFrame
+from cfmkit.metrics.branch_windows import ROUNDING, BranchTrace, Undefined, Window, traces
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
+    from cfmkit.metrics.ranges_many import ManyBranches
+    from cfmkit.results import ClosedForm, WindingPath
+    from cfmkit.specs.target_function import TargetCurve
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """All branches of a curve together."""
+
+    branches: tuple[Branch, ...]
+    frame: MeasuringFrame
+
+    @property
+    def closed(self) -> tuple[ManyBranches, ...]:
+        """All branches at every place; empty where the model does not give them."""
+        return tuple(branch.closed for branch in self.branches if branch.closed is not None)
+
+    @cached_property
+    def usable(self) -> tuple[float, float] | None:
+        """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
+        return usable_interval(self)
+
+
+def cycle(curve: Curve, frame: MeasuringFrame, window: Window | None = None) -> Cycle:
+    """Return a curve as metrics see it."""
+    return Cycle(tuple(Branch(trace, curve.kind, frame, window) for trace in traces(curve)), frame)
+
+
+def usable_interval(cycle: Cycle) -> Interval | None:
+    """Return the largest interval in which force and stress of every branch keep their limits.
+
+    A place counts only if every state of the path at that place keeps them, so
+    that a branch that folds back needs no sorting.
+    """
+    curve, cycle = cycle.frame.curve, _levelled(cycle)
+    reference = cycle.frame.target or _mean(cycle)
+    travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
+    if cycle.frame.winding is not None:
+        travel = winding_branches.reach(cycle.frame.winding)
+    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
+        return _solved_interval(cycle, reference, (cycle.frame.valid or (travel,))[0][0])
+    bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference, curve))
+    allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
+    gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
+    longest = max((high - low for low, high in gaps), default=0.0)
+    # the first of those that are equally long but for rounding
+    return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
+
+
+def _levelled(cycle: Cycle) -> Cycle:
+    """Return a cycle that follows a curve as one that is to be level: its offsets from it, on its largest effort."""
+    curve = cycle.frame.curve
+    if curve is None:
+        return cycle
+    low, high = max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches)
+    low, high = max(low, curve.extent[0]), min(high, curve.extent[1])
+    if not (low < high and (size := curve.largest(low, high))):
+        raise Undefined("the target curve is not defined for this travel")
+    valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
+    model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
+    frame = replace(
+        cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b) or None
+    )
+    branches = (
+        replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.at(b.trace.motion) + size))
+        for b in cycle.branches
+    )
+    return Cycle(tuple(branches), frame)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelledModel:
+    """A model less a curve, on a constant effort (a `cfmkit.results.ClosedForm`)."""
+
+    model: ClosedForm
+    curve: TargetCurve
+    size: float
+
+    @property
+    def places(self) -> FloatArray:
+        """Those of the model [m or rad]."""
+        return self.model.places
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Those of the model [m or rad]."""
+        return self.model.peaks
+
+    def effort(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the effort less the curve, plus the constant [N or N m]."""
+        return np.asarray(self.model.effort(branch, places) - self.curve.at(places) + self.size)
+
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return that of the model [Pa]."""
+        return self.model.stress(branch, places)
+
+
+def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
+    """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
+    start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
+    return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
+
+
+def _mean(cycle: Cycle) -> float:
+    """Return the mean of the branches' means, each over its points in the window, or the window where it is solved."""
+    value = sum(branch.level for branch in cycle.branches) / len(cycle.branches)
+    if value == 0:
+        raise Undefined("there is no target, and the mean is zero")
+    return value
+
+
+def _gaps(lo: float, hi: float, bad: Iterable[Interval]) -> Iterable[Interval]:
+    """Yield what the sorted bad intervals leave of [lo, hi]."""
+    for start, end in bad:
+        if start > lo and min(start, hi) > lo:
+            yield lo, min(start, hi)
+        lo = max(lo, end)
+    if hi > lo:
+        yield lo, hi
+
+
+def _bad(branch: Branch, reference: float, curve: TargetCurve | None) -> list[Interval]:
+    """Return the intervals of the motion in which a branch breaks a limit; `curve`: what its effort is to follow."""
+    frame, trace = branch.frame, branch.trace
+    if frame.winding is not None:
+        return _bad_on_way(frame.winding, frame, reference, curve)
+    ratio = trace.effort / reference - 1
+    band = frame.band * (1 + ROUNDING)
+    # two one-sided limits: the absolute value has a kink that linear interpolation would miss
+    broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
+    for one in (trace, *branch.beside):
+        if frame.allowable_stress is not None and one.stress is not None:
+            broken += _excess(one, one.stress - frame.allowable_stress * (1 + ROUNDING))
+    return broken
+
+
+def _bad_on_way(
+    path: WindingPath, frame: MeasuringFrame, reference: float, curve: TargetCurve | None
+) -> list[Interval]:
+    """Return the same of a branch that is known at every place of its way."""
+    band, allowed = frame.band * (1 + ROUNDING), frame.allowable_stress
+
+    def above(ways: FloatArray) -> FloatArray:
+        motion, effort = path.states(ways)
+        return np.asarray((effort if curve is None else effort - curve.at(motion) + reference) / reference - 1)
+
+    bad = winding_branches.broken(path, lambda ways: above(ways) - band)
+    bad += winding_branches.broken(path, lambda ways: -band - above(ways))
+    if allowed is not None:
+        bad += winding_branches.broken(path, lambda ways: path.stress(ways) / allowed - (1 + ROUNDING))
+    return bad
+
+
+def _excess(trace: BranchTrace, height: FloatArray) -> list[Interval]:
+    """Return the intervals of the motion over which a piecewise linear height is positive, or no number."""
+    bad = ~(height <= 0)
+    if not bad.any():
+        return []
+    motion, edges = trace.motion, (bad[1:] != bad[:-1]).nonzero()[0]
+    places = motion[edges] - height[edges] * (motion[edges + 1] - motion[edges]) / (height[edges + 1] - height[edges])
+    places = np.where(np.isfinite(places), places, motion[edges + bad[edges]])
+    ends = np.concatenate((motion[: int(bad[0])], places, motion[len(motion) - int(bad[-1]) :])).reshape(-1, 2).tolist()
+    if not trace.way:  # between its ends, a run of bad points may reach farther than they do
+        runs = np.split(motion, edges + 1)[int(not bad[0]) :: 2]
+        ends = [[*pair, float(run.min()), float(run.max())] for pair, run in zip(ends, runs, strict=True)]
+    return [(min(pair), max(pair)) for pair in ends]
