@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import polynomial
 
+from cfmkit.arrays import distinct
 from cfmkit.numerics.last_places import last_places
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def inside(path: WindingPath, low: float, high: float) -> FloatArray:
             return np.asarray(sense[ends] * (path.states(places)[0] - level) / (high - low))
 
         found.append(last_places(beyond, ways[at][:, None], ways[at + 1][:, None]).ravel())
-    return np.unique(np.concatenate(found))
+    return distinct(np.concatenate(found))
 
 
 def mean(path: WindingPath, low: float, high: float) -> float:

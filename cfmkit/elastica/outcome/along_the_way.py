@@ -86,7 +86,7 @@ class AlongTheWay:
         ways, values = points, self._states_at_points[which]
         for _ in range(ROUNDS):
             extremes = inner_extremes(np.interp(ways, points, self._arc), values)
-            more = np.setdiff1d(np.interp(extremes, self._arc, points), ways)
+            more = np.array(sorted({*np.interp(extremes, self._arc, points).tolist()} - {*ways.tolist()}))
             if not len(more):
                 break
             at = np.searchsorted(ways, more)

@@ -225,7 +225,7 @@ class BetweenPoints:
         """
         own, values = t, row
         for _ in range(ROUNDS if self.allowed is not None else 0):
-            passed = np.setdiff1d(crossings(own, values, self.allowed or 0.0), t)
+            passed = np.array(sorted({*crossings(own, values, self.allowed or 0.0)} - {*t.tolist()}))
             if not len(passed):
                 break
             own, values = _inserted(t, row, passed, self._stress_at(name, stretch, passed, own, values))
