@@ -440,6 +440,22 @@ def test_springs_at_pins_are_of_wire_that_bears_the_motion_and_fit_the_room(torq
             assert loaded_length(coil) < one.numbers["along"]
 
 
+def test_springs_at_pins_stay_within_the_depth_wished():
+    """Ground, crank and coupler are 1 mm thick each; the pivot's spring is below them and all others are above."""
+    keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "room": "[150 mm, 150 mm, 12 mm]"}
+    asked = wish_of(None, keys).wish()
+    offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
+    tried = (made(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
+    one = next(one for one in tried if one.good)
+    springs = one.spec.mechanism.springs
+    high = {
+        at: springs.coils_at(at)[0].body_length for at in ("pivot", "crank_pin", "slider_pin") if springs.coils_at(at)
+    }
+    assert one.numbers["depth"] == pytest.approx(3e-3 + high.pop("pivot", 0.0) + max(high.values()))
+    assert one.numbers["depth"] <= 12e-3
+    assert one.spec.mechanism.part.sheet == pytest.approx(1e-3)
+
+
 def test_a_torque_whose_springs_are_wider_than_the_linkage_is_refused():
     """The wire of springs for this work fills a hundredth of the room; but no coil of it goes between the pins."""
     found = pinned({"torque": "5 N*m", "angle": "10 deg"}, "[50 mm, 100 mm]")

@@ -8,18 +8,20 @@ import numpy as np
 
 from cfmkit.families.base import Room
 from cfmkit.families.slider_crank.dispatch import drawing
+from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.spec import Springs
     from cfmkit.results import Result
+    from cfmkit.stock.springs.helical import Wound
 
 POSES = 13
 """Places of the motion at which a printed part is looked at."""
 
-PIN = 0.05
-"""Half the width of a link around its pins, over the crank's length: taken, since none is known."""
+PLATES = 3
+"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's way."""
 
 
 def room(result: Result) -> Room | None:
@@ -69,9 +71,10 @@ def _widest(spec: SliderCrankSpec) -> float:
 
 def _linkage(result: Result) -> Room:
     """Return the box of links and pins, and of springs whose wire is known, over the motion of the curve."""
-    solution, springs = result.state, result.spec.at("mechanism.springs")
+    spec: Any = result.spec
+    solution, springs = result.state, spec.mechanism.springs
     link, units = solution.assembly.linkage, solution.units
-    half = PIN * link.crank
+    half, _ = eye_and_hole(spec)
     at = ("pivot",), ("crank_pin",), ("slider_pin", "slider")
     coils = [[coil for name in names for coil in springs.coils_at(name)] for names in at]
     around = [max([half, *(0.5 * coil.outer_diameter for coil in found)]) for found in coils]
@@ -82,13 +85,38 @@ def _linkage(result: Result) -> Room:
     high = np.max([pin.max(axis=0) + radius for pin, radius in pins], axis=0)
     along, across = high - low
     count = int(np.count_nonzero(solution.assembly.rates))
-    told = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}"
-    return Room(float(across), float(along), None, 3 + count, told, (float(low[0]), float(low[1])), True)
+    depth, why = _depth(spec, solution.assembly.rates)
+    told = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}{why}"
+    return Room(float(across), float(along), depth, 3 + count, told, (float(low[0]), float(low[1])), True)
+
+
+def _depth(spec: SliderCrankSpec, rates: np.ndarray) -> tuple[float | None, str]:
+    """Return the depth of links and springs [m], and what of it is taken; None, and why, where a part has no size.
+
+    Crank and coupler lie above each other, the crank on the ground. The pivot's spring is below, all others are above:
+    they stand beside each other.
+    """
+    springs, part = spec.mechanism.springs, spec.mechanism.part
+    if part is None or part.sheet is None:
+        return None, "; the depth of links is not known (mechanism.part.sheet)"
+    high = {}
+    for name in (name for name, rate in zip(JOINTS, rates, strict=True) if rate):
+        coils = springs.coils_at(name)
+        if not coils:
+            return None, f"; the spring at the {name.replace('_', ' ')} has no size"
+        high[name] = max(height_of(name, coil) for coil in coils)
+    below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
+    return PLATES * part.sheet + below + above, f"; {PLATES} sheets and the springs on both sides of them"
+
+
+def height_of(name: str, coil: Wound) -> float:
+    """Return how far the spring of a joint stands out from the links [m]: at a pin, or lying beside the coupler."""
+    return coil.outer_diameter if name == "slider" else coil.body_length
 
 
 def _sizes(springs: Springs) -> str:
     found = [coil for name in JOINTS[:3] for coil in springs.coils_at(name)]
     if not found:
-        return "springs at pins have no size, and no depth"
+        return "springs at pins have no size"
     wide, long = (1e3 * max(getattr(one, name) for one in found) for name in ("outer_diameter", "body_length"))
-    return f"torsion springs up to {wide:.3g} mm wide and {long:.3g} mm deep; the depth of links is not known"
+    return f"torsion springs up to {wide:.3g} mm wide and {long:.3g} mm deep"

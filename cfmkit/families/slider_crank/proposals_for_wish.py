@@ -15,19 +15,21 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
-from cfmkit.families.slider_crank.bounding_box import PIN
+from cfmkit.families.slider_crank.bounding_box import PLATES, height_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.spec import MaterialSpec
 from cfmkit.stock.springs.catalogue import BENDING_SHARE
 from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
-from cfmkit.stock.springs.made_to_measure import extension_spring, torsion_spring
+from cfmkit.stock.springs.made_to_measure import extension_spring, shortest_torsion_spring, torsion_spring
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.wishes import Wish
+    from cfmkit.stock.springs.helical import Wound
 
 
 @dataclass(frozen=True)
@@ -101,14 +103,17 @@ last three are the flattest of some thousands of random linkages over 40 to 90 d
 WOUND_UP = -math.radians(60.0)
 """Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
 
-SHRUNK = (0.96, 0.8)
-"""Sizes of linkages for a torque, over the largest that the room allows: the second leaves room for wider springs."""
+SHRUNK = (0.99, 0.9, 0.75)
+"""Sizes of linkages for a torque, over the largest that the room allows: smaller ones leave room for wider springs."""
 
 STILL = 1e-9
 """Share of the slider's travel that is none."""
 
 ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
 """What round wire in bending holds at most, over its volume [J/m^3]."""
+
+LINK_SHARE = 1.0 / 12.0
+"""Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
 
 OFFERED = 24
 
@@ -125,8 +130,6 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 
 
 def _of_torque(wish: Wish) -> FamilyOffer:
-    if wish.depth is not None:
-        return FamilyOffer(reason="the depth of links and pins is not known: wish a room without one")
     if (reason := _overfilled(wish)) is not None:
         return FamilyOffer(reason=reason)
     found = [_turned(wish, size, one, JOINTS) for size in SHRUNK for one in TURNED]
@@ -139,7 +142,7 @@ def _overfilled(wish: Wish) -> str | None:
     """Return what is wrong where springs at pins would fill more than the room, taken as deep as it is wide."""
     wire = wish.target * wish.travel / ENERGY
     deep = wire / (wish.room[0] * wish.room[1])
-    if deep <= max(wish.room[:2]):
+    if deep <= (wish.depth or max(wish.room[:2])):
         return None
     return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
 
@@ -159,14 +162,14 @@ def _turned(
     if (inside <= 0.0).any():
         return None
     x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
-    sides = np.ptp(x) + 2.0 * PIN * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * PIN * crank
+    sides = np.ptp(x) + 2.0 * EYE_SHARE * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * EYE_SHARE * crank
     size = share * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
     data = {
         "family": "slider-crank",
         "name": "suggested",
         "mechanism": {
             "crank_length": crank * size, "coupler_length": coupler * size, "offset": offset * size,
-            "unloaded_angle": low, "springs": {},
+            "unloaded_angle": low, "springs": {}, **_plates(wish),
         },
         "design": {
             "torque": wish.target, "tolerance": min(0.45 * wish.ripple, 0.2),
@@ -178,6 +181,11 @@ def _turned(
     return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:finish")
 
 
+def _plates(wish: Wish) -> dict[str, Any]:
+    """Return of which sheet links are, where their depth matters."""
+    return {} if wish.depth is None else {"part": {"sheet": max(LINK_SHARE * wish.depth, wish.thinnest)}}
+
+
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     """Return a designed linkage that is judged over the middle of the window found, as long as the travel wished."""
     return wound(_in_middle(spec, wish), wish)
@@ -187,7 +195,8 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     """Return a designed linkage with springs wound to measure of steel wire, which bear its motion.
 
     A torsion spring is no wider than the crank, or the coupler, is long, so that those of two pins stand beside each
-    other, and no deeper than the longer side of the room.
+    other, and no deeper than the longer side of the room, or than what the links and those on their other side leave of
+    its depth.
 
     Raises
     ------
@@ -201,25 +210,49 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     if solution is None:
         return spec
     link, (high, low) = solution.assembly.linkage, solution.extremes.turns
-    widest, longest = min(link.crank, link.coupler), max(wish.room[:2])
     # a spring at the slider lies beside the coupler and is stretched by a slider that leaves the pivot
     rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
-    rates, bought = spec.mechanism.springs.rates, []
-    for joint in np.flatnonzero(rates):
-        name, rate, turn = JOINTS[joint], rates[joint], float(max(high[joint], -low[joint]))
-        if name == "slider":
-            coil = extension_spring(rate, turn, rest) if low[joint] > -STILL * turn else None
-        else:
-            coil = torsion_spring(rate, turn, longest)
-        if coil is None or (name != "slider" and coil.outer_diameter > widest):
-            dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
-            told = f"{format_short(rate, dimension, 3)} over {format_short(turn, way, 3)}"
-            wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
-            raise SolutionError(f"no spring of steel wire fits at the {name.replace('_', ' ')}: {told}{wide}")
-        told = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
-        wire = {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}
-        bought.append({"at": name, "name": told, "wound": wire})
-    return spec.replace({"mechanism.springs.bought": tuple(bought)})
+    widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
+    turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
+    pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
+    deep = room = _left_of_depth(spec, wish)
+    if wish.depth is not None and "pivot" in turns:
+        # that of the pivot is on the other side of the links: first it takes as little as it can
+        least = shortest_torsion_spring(*turns["pivot"], widest)
+        deep = room - (0.0 if least is None else least.body_length)
+    bought: dict[str, Wound] = {}
+    for name in sorted(turns, key="pivot".__eq__):
+        if name == "pivot" and wish.depth is not None:
+            deep = room - max((height_of(other, coil) for other, coil in bought.items()), default=0.0)
+        coil = _coil(name, turns[name], deep, rest if pulled else 0.0)
+        if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
+            raise SolutionError(_no_spring(name, turns[name], coil))
+        bought[name] = coil
+    return spec.replace({"mechanism.springs.bought": tuple(_wound_to_measure(name, bought[name]) for name in turns)})
+
+
+def _coil(name: str, turn: tuple[float, float], deep: float, rest: float) -> Wound | None:
+    """Return the slimmest spring of a rate for a joint that can be turned, or stretched from its rest, so far."""
+    return extension_spring(*turn, rest) if name == "slider" else torsion_spring(*turn, deep)
+
+
+def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
+    dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
+    told = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
+    wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
+    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {told}{wide}"
+
+
+def _wound_to_measure(name: str, coil: Wound) -> dict[str, Any]:
+    told = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
+    return {"at": name, "name": told, "wound": {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}}
+
+
+def _left_of_depth(spec: SliderCrankSpec, wish: Wish) -> float:
+    """Return how far springs may stand out from the links, on both sides together [m]."""
+    if wish.depth is None:
+        return max(wish.room[:2])
+    return wish.depth - PLATES * (spec.at("mechanism.part.sheet") or 0.0)
 
 
 def _in_middle(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
@@ -245,7 +278,7 @@ def _of_force(wish: Wish) -> FamilyOffer:
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
         return FamilyOffer(reason=f"a strip would have to be about {mm(wide)} wide")
-    if wish.depth is None and (reason := _overfilled(wish)) is not None:
+    if (reason := _overfilled(wish)) is not None:
         return FamilyOffer(reason=reason)
     need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
     return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
@@ -254,8 +287,8 @@ def _of_force(wish: Wish) -> FamilyOffer:
 def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
     """Return the room that a linkage needs across and along the slider's way [m]."""
     pin = crank * np.sin(lengths.unloaded)
-    across = max(lengths.offset * crank, pin) + PADS[0] * pads + 2.0 * PIN * crank * (not pads)
-    along = lengths.stretched * crank + PADS[1] * pads + 2.0 * PIN * crank * (not pads)
+    across = max(lengths.offset * crank, pin) + PADS[0] * pads + 2.0 * EYE_SHARE * crank * (not pads)
+    along = lengths.stretched * crank + PADS[1] * pads + 2.0 * EYE_SHARE * crank * (not pads)
     return float(across), float(along)
 
 
@@ -267,8 +300,8 @@ def printed_size(wish: Wish, lengths: Proportions) -> float:
 def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
     """Return parts and linkages of some proportions at all sizes that fit."""
     printed = printed_size(wish, lengths)
-    pinned = min(wish.room[0] / (lengths.offset + 2 * PIN), wish.room[1] / (lengths.stretched + 2 * PIN))
-    pins = wish.depth is None and _overfilled(wish) is None
+    pinned = min(wish.room[0] / (lengths.offset + 2 * EYE_SHARE), wish.room[1] / (lengths.stretched + 2 * EYE_SHARE))
+    pins = _overfilled(wish) is None
     found = []
     for size in SIZES:
         for start in STARTS:
@@ -469,7 +502,7 @@ def _springs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float
         "name": "suggested",
         "mechanism": {
             "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-            "unloaded_offset": 4e-4, "springs": {},
+            "unloaded_offset": 4e-4, "springs": {}, **_plates(wish),
         },
         "design": {"force": wish.target, "travel": travel, "springs": ("pivot", "crank_pin", "slider_pin")},
         "analysis": _analysis(travel),

@@ -55,6 +55,15 @@ def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
     return min((one for one in found if one.body_length <= room), key=lambda one: one.outer_diameter, default=None)
 
 
+def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | None:
+    """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
+
+    None if there is none: the coil would be wider.
+    """
+    found = [_wound("torsion", index, rate, turn) for index in INDICES]
+    return min((one for one in found if one.outer_diameter <= widest), key=lambda one: one.body_length, default=None)
+
+
 def loaded_length(spring: Wound) -> float:
     """Return the length at rest with both loops [m]."""
     return spring.body_length + 2.0 * (spring.coil - spring.wire)

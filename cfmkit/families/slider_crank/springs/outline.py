@@ -18,19 +18,26 @@ KEY = "mechanism.part.sheet"
 """Says how thick the links are: without springs that are part of them, they have no width."""
 
 EYE_SHARE, HOLE_SHARE = 0.08, 0.04
-"""Radii of eyes and pin holes in lengths of the shorter link, where no pins are stated."""
+"""Radii of eyes, which are half as wide as links, and of pin holes in lengths of the shorter link, where no pins are
+stated."""
 
 EYE_OF_HOLE = 2.0
 """Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
 
 
-def drawing(spec: SliderCrankSpec) -> Drawing:
-    """Return crank and coupler of one leg, with a hole for each pin, beside each other."""
+def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
+    """Return the radii of the links' eyes and of their pin holes [m]."""
     linkage = linkage_of(spec.mechanism)
     short = min(linkage.crank, linkage.coupler)
     pins = spec.mechanism.pins
     hole = HOLE_SHARE * short if pins is None else 0.5 * pins.diameter
-    eye = max(EYE_SHARE * short, EYE_OF_HOLE * hole)
+    return max(EYE_SHARE * short, EYE_OF_HOLE * hole), hole
+
+
+def drawing(spec: SliderCrankSpec) -> Drawing:
+    """Return crank and coupler of one leg, with a hole for each pin, beside each other."""
+    linkage = linkage_of(spec.mechanism)
+    eye, hole = eye_and_hole(spec)
     contours: list[Contour] = []
     for number, length in enumerate((linkage.crank, linkage.coupler)):
         y = -3.0 * eye * number
