@@ -1,13 +1,29 @@
-"""Arrays as the whole package writes them: of numbers, in SI units, read-only once they are handed out."""
+"""Arrays as the whole package writes them: of numbers, in SI units, read-only once they are handed out.
+
+Whole results are a million letters: what holds arrays, and containers of such things, have a `repr` of a line or a few.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+LONGEST = 1500
+"""Letters of a `repr`."""
+
+LONGEST_ITEM = 100
+"""Letters of one thing in it."""
+
+PLAIN = (str, int, float, type(None))
+"""What has a text of its own that is short."""
+
+T = TypeVar("T")
 
 
 def read_only(values: Any, dtype: Any = np.float64) -> NDArray[Any]:
@@ -31,3 +47,70 @@ def distinct(values: Any) -> NDArray[Any]:
     keep = np.ones(len(ordered), dtype=np.bool_)
     np.not_equal(ordered[1:], ordered[:-1], out=keep[1:])
     return ordered[keep]
+
+
+class Named(dict[str, T]):
+    """Values by name, whose text is short."""
+
+    def __repr__(self) -> str:
+        """Return the first values by name, and how many more there are."""
+        return "{" + _joined([f"{name!r}: {brief(value)}" for name, value in self.items()]) + "}"
+
+
+class Several(tuple[T, ...]):
+    """Values in order, whose text is short."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """Return the first values, and how many more there are."""
+        return "(" + _joined([brief(value) for value in self]) + ")"
+
+
+class ShortRepr:
+    """Makes the text of a dataclass (with ``repr=False``) short, or says that its own is."""
+
+    def __repr__(self) -> str:
+        """Return the fields, each with a short text."""
+        told = [f"{item.name}={brief(getattr(self, item.name))}" for item in fields(self)]  # type: ignore[arg-type]
+        return f"<{type(self).__name__}: {_joined(told)}>"
+
+
+def named(values: Any) -> Any:
+    """Return values by name, and those within them, with short texts."""
+    return Named({name: named(value) for name, value in values.items()}) if isinstance(values, Mapping) else values
+
+
+def brief(value: Any) -> str:
+    """Return a text of at most a line.
+
+    Examples
+    --------
+    >>> brief(np.array([[3.0, np.nan], [1.0, 2.0]])), brief([1] * 30), brief(0.25)
+    ('array of 2 x 2: 1 ... 3', 'list of 30', '0.25')
+    """
+    if isinstance(value, np.ndarray):
+        text = _array(value)
+    elif isinstance(value, (Mapping, tuple, list)):
+        is_short = not isinstance(value, Mapping) and len(value) <= 4 and all(isinstance(one, PLAIN) for one in value)
+        text = repr(value) if is_short else f"{type(value).__name__} of {len(value)}"
+    elif is_dataclass(value) and not isinstance(value, ShortRepr):
+        is_short = all(isinstance(getattr(value, item.name), PLAIN) for item in fields(value))
+        text = str(value) if is_short or type(value).__str__ is not object.__str__ else f"<{type(value).__name__}>"
+    else:
+        text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= LONGEST_ITEM else text[: LONGEST_ITEM - 1] + "…"
+
+
+def _array(values: Any) -> str:
+    shape = " x ".join(map(str, values.shape))
+    known = values[np.isfinite(values)] if values.dtype.kind == "f" else np.empty(0)
+    return f"array of {shape}" + (f": {known.min():.4g} ... {known.max():.4g}" if len(known) else "")
+
+
+def _joined(texts: list[str]) -> str:
+    """Return texts in a row, as many as there is room for."""
+    ends = np.cumsum([len(text) + 2 for text in texts])
+    count = int(np.searchsorted(ends, LONGEST, side="right"))
+    more = len(texts) - count
+    return ", ".join(texts[:count]) + (f", ... and {more} more" if more else "")

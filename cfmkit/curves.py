@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, read_only
+from cfmkit.arrays import FloatArray, Named, ShortRepr, read_only
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 Kind = Literal["force", "torque"]
 
 
-@dataclass(frozen=True)
-class Column:
+@dataclass(frozen=True, repr=False)
+class Column(ShortRepr):
     """One more column of a curve: values in SI and the dimension that names their unit.
 
     `dimension` is a name of `cfmkit.specs.units` ("force", "length", "ratio", ...), or
@@ -40,7 +40,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(ShortRepr):
     """A force over a displacement, or a torque over an angle.
 
     Parameters
@@ -75,7 +75,7 @@ class Curve:
         """Freeze the arrays and check that they belong together."""
         for name, dtype in (("motion", float), ("effort", float), ("branch", np.str_), ("stable", bool)):
             object.__setattr__(self, name, read_only(getattr(self, name), dtype))
-        object.__setattr__(self, "extra", MappingProxyType(dict(self.extra)))
+        object.__setattr__(self, "extra", MappingProxyType(Named(self.extra)))
         object.__setattr__(self, "label", MappingProxyType(dict(self.label)))
         lengths = {self.motion.shape, self.effort.shape, self.branch.shape, self.stable.shape}
         lengths |= {column.values.shape for column in self.extra.values()}

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
+from cfmkit.arrays import Named, Several, ShortRepr
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -65,8 +66,8 @@ class Status(Enum):
         return codes.get(self, ExitCode.NO_SOLUTION)
 
 
-@dataclass(frozen=True)
-class Finding:
+@dataclass(frozen=True, repr=False)
+class Finding(ShortRepr):
     """Something about the mechanism that the user must know, by name.
 
     `name` is stable (scripts match it); `message` holds the numbers that decide
@@ -91,6 +92,14 @@ class Quantity:
     definition: str
     reason: str = ""
     words: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Return the value with its unit."""
+        from cfmkit.specs.units import format_short
+
+        if self.word is not None:
+            return self.word
+        return "None" if self.value is None else format_short(self.value, self.dimension)
 
     @property
     def word(self) -> str | None:
@@ -241,9 +250,12 @@ class Result:
     state: Any = None
 
     def __post_init__(self) -> None:
-        """Fall back to the status's sentence."""
+        """Fall back to the status's sentence, and keep the texts of what is inside short."""
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
+        for name in ("curves", "warnings", "load_cases"):
+            object.__setattr__(self, name, Several(getattr(self, name)))
+        object.__setattr__(self, "values", Named(self.values))
 
     def __repr__(self) -> str:
         """Return the result in a line: what of, how it ended, how much there is."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
@@ -92,8 +93,8 @@ class Bounds:
 _MOTION = {"force": "length", "torque": "angle"}
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, repr=False)
+class Outcome(ShortRepr):
     """What became of one requirement; SI throughout.
 
     Attributes

@@ -10,6 +10,7 @@ from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING
 
+from cfmkit.arrays import Named, Several
 from cfmkit.families import family
 from cfmkit.results import Result
 from cfmkit.specs.units import format_short
@@ -36,14 +37,14 @@ class AnalysisView(Result):
         """Every metric and scalar result by name, in SI: ``result.metrics["force_mean"].value``."""
         from cfmkit.metrics import evaluate
 
-        return evaluate(self)
+        return Named(evaluate(self))
 
     @cached_property
     def requirements(self) -> tuple[Outcome, ...]:
         """What became of each requirement of the specification."""
         from cfmkit.metrics import check, values_of_family
 
-        return check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values))
+        return Several(check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values)))
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""

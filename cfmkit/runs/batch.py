@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from cfmkit.arrays import Several, named
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
@@ -303,6 +304,11 @@ class BatchResult:
     files: tuple[str, ...]
     compared: BatchComparison | None = None
 
+    def __post_init__(self) -> None:
+        """Keep the texts of what is inside short."""
+        for name in ("entries", "files"):
+            object.__setattr__(self, name, Several(getattr(self, name)))
+
     def __repr__(self) -> str:
         """Return the batch in a line."""
         return f"<BatchResult in {self.folder!r}: exit code {int(self.exit_code)}; {self.table!r}>"
@@ -314,7 +320,8 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """What metrics.json says."""
-        return batch_files.data(self.entries, self.exit_code, self.compared)
+        found: Mapping[str, Any] = named(batch_files.data(self.entries, self.exit_code, self.compared))
+        return found
 
     @property
     def table(self) -> Table:

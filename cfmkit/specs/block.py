@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from cfmkit.arrays import LONGEST, Named
 from cfmkit.specs.units import Force, Length
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -15,6 +16,11 @@ PositiveForce = Annotated[Force, Field(gt=0)]
 
 class Model(BaseModel):
     """Base of every block: frozen, no unknown keys, no silent type changes."""
+
+    def __repr__(self) -> str:
+        """Return the block as it is built, or its fields where that is too long."""
+        text = super().__repr__()
+        return text if len(text) <= LONGEST else f"{type(self).__name__}({Named(self)!r})"
 
     # Blocks stand in others, and only the whole is validated: built with it, each is built once, and quicker to import.
     model_config = ConfigDict(

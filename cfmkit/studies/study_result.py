@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import named
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.units import format_quantity
 from cfmkit.studies.executors import serial
@@ -53,6 +54,10 @@ class StudyResult:
     convergence: Table | None = None
     varied: tuple[str, ...] = ()
     spec: Spec | None = None
+
+    def __post_init__(self) -> None:
+        """Keep the texts of what is inside short."""
+        object.__setattr__(self, "summary", named(self.summary))
 
     def __repr__(self) -> str:
         """Return the study in a line."""

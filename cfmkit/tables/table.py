@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import Several, ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import CfmError
 from cfmkit.specs.units.decimals import shift_decimal
@@ -33,8 +33,8 @@ HEADER = re.compile(r"(?P<name>[^\[\] ](?:[^\[\]]*[^\[\] ])?)(?: \[(?P<unit>[^\[
 _INT64 = range(-(2**63), 2**63)
 
 
-@dataclass(frozen=True, eq=False)
-class TableColumn:
+@dataclass(frozen=True, eq=False, repr=False)
+class TableColumn(ShortRepr):
     """One column: its name, its values, and its unit if it has one.
 
     Parameters
@@ -82,14 +82,14 @@ class TableColumn:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(ShortRepr):
     """Columns of one length, in order, with different headers."""
 
     columns: tuple[TableColumn, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze the columns and check that they belong together."""
-        object.__setattr__(self, "columns", tuple(self.columns))
+        object.__setattr__(self, "columns", Several(self.columns))
         headers = self.headers
         if twice := sorted({name for name in headers if headers.count(name) > 1}):
             raise CfmError(f"the columns of a table need different headers, but there are two of {', '.join(twice)}")

@@ -11,6 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.results import Design, Finding, Result, Status
+from cfmkit.tables import Table
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOSTILE = "<script>alert(1)</script>"
@@ -104,3 +105,31 @@ def test_a_design_shows_how_it_ended_and_its_file():
     assert all(word in shown for word in ("found", "thin", "made: 88 %", "roller_radius"))
     none = Design(None, Status.INFEASIBLE, "no design", nearest_feasible={"design.force": "12 N"})._repr_html_()
     assert "design.force: 12 N" in none
+
+
+def texts_that_are_long(one, path="", depth=3):
+    """Return what is reached from something by its public names, beside arrays, and has a text of 2 000 letters."""
+    names = [name for name in dir(type(one)) if not name.startswith(("_", "model_"))]
+    names += [name for name in getattr(one, "__dict__", {}) if not name.startswith("_")]
+    for name in sorted(set(names)):
+        inside = getattr(one, name, None)  # a force has no angle
+        if callable(inside) or isinstance(inside, np.ndarray):
+            continue
+        if len(repr(inside)) >= 2000:
+            yield f"{path}.{name}"
+        if depth and isinstance(inside, (cfmkit.Spec, cfmkit.Curve, Table)):
+            yield from texts_that_are_long(inside, f"{path}.{name}", depth - 1)
+
+
+@pytest.mark.parametrize("name", ["cam", "beam_lan2010", "slider_crank_bilancia2019", "slider_crank_strip"])
+def test_texts_of_whatever_is_in_a_result_are_short(name):
+    found = cfmkit.analyze(CONFIGS / f"{name}.yaml")
+    assert list(texts_that_are_long(found)) == []
+    assert repr(found.metrics).startswith(f"{{'force_mean': {found.metrics['force_mean']}, ")
+
+
+def test_texts_of_whatever_is_in_a_study_are_short():
+    found = cfmkit.sweep(CONFIGS / "cam.yaml", vary={"mechanism.roller_radius": "7mm:9mm:3"})
+    assert list(texts_that_are_long(found)) == []
+    assert all(len(repr(one)) < 2000 for one in found.summary.values())
+    assert "'metrics': Named of" in repr(found.summary)

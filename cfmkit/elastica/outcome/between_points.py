@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import distinct, read_only
+from cfmkit.arrays import ShortRepr, distinct, read_only
 from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
@@ -82,8 +82,8 @@ def between_points(
     return BetweenPoints(path, unit, axial, allowed)
 
 
-@dataclass(frozen=True, eq=False)
-class BetweenPoints:
+@dataclass(frozen=True, eq=False, repr=False)
+class BetweenPoints(ShortRepr):
     """The effort and the stress of a path at every place (a `cfmkit.results.ClosedForm`).
 
     Attributes

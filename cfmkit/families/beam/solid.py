@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from cfmkit.tables import Table
 
 
-@dataclass(frozen=True, eq=False)
-class SolidSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class SolidSolution(ShortRepr):
     """A part that was solved on two meshes.
 
     Attributes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.arrays import distinct, read_only
+from cfmkit.arrays import ShortRepr, distinct, read_only
 from cfmkit.elastica.outcome.along_the_way import along_the_way
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.path import most_stressed
@@ -34,8 +34,8 @@ _POSES = 7
 _FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(ShortRepr):
     """A solved mechanism, as checks, scalar values and pictures need it.
 
     Attributes

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
@@ -43,8 +44,8 @@ _ROWS = 201  # of the curve along a surface that is given by few points
 _BESIDE = 1e-9  # of the length: both sides of a corner are looked at
 
 
-@dataclass(frozen=True)
-class SurfaceCourse:
+@dataclass(frozen=True, repr=False)
+class SurfaceCourse(ShortRepr):
     """A surface between its ends.
 
     Attributes

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
@@ -223,8 +224,8 @@ def sides_at(tracks: tuple[BuiltTrack, BuiltTrack], slider: FloatArray) -> Sides
     return Sides((right_x, left_x), (right, left))
 
 
-@dataclass(frozen=True, eq=False)
-class LoopAsBuilt:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopAsBuilt(ShortRepr):
     """The loop of a measured cam at every place (a `cfmkit.results.ClosedForm`): its tracks are known between nodes."""
 
     built: Built

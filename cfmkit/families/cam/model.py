@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.cam.bought_parts import parts_of
@@ -259,8 +260,8 @@ def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
     return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class DenseLoop:
+@dataclass(frozen=True, eq=False, repr=False)
+class DenseLoop(ShortRepr):
     """The loop of a solved mechanism at every place (a `cfmkit.results.ClosedForm`)."""
 
     solution: Solution

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.statics import Forces, Loads, jams, levers
 
@@ -95,8 +96,8 @@ class ForceBand:
         return found
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(ShortRepr):
     """A solved mechanism, as the checks, the scalar values and the pictures need it.
 
     Attributes
@@ -188,8 +189,8 @@ class Sides:
         return pull, contacts[0], contacts[1]
 
 
-@dataclass(frozen=True)
-class Built:
+@dataclass(frozen=True, repr=False)
+class Built(ShortRepr):
     """A solved mechanism with a measured cam.
 
     Attributes

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.build import parts, spring_room
@@ -269,8 +270,8 @@ CROWDED = np.geomspace(1e-6, 1.0, 73)
 """Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
 
 
-@dataclass(frozen=True, eq=False)
-class DenseCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class DenseCurve(ShortRepr):
     """The force at the nominal preload (a `cfmkit.results.ClosedForm`), with the stress of all preloads."""
 
     solution: Solution

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.metrics.continuous_curves import extremes
@@ -108,8 +109,8 @@ class Push:
         return total
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(ShortRepr):
     """A solved mechanism: its parts, the model used, what characterises it, and one curve per preload."""
 
     spec: VcfmSpec

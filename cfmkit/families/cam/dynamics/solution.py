@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cfmkit.arrays import ShortRepr
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -79,8 +81,8 @@ class Build:
     lift: float
 
 
-@dataclass(frozen=True)
-class MotionSolution:
+@dataclass(frozen=True, repr=False)
+class MotionSolution(ShortRepr):
     """A mechanism that went through a motion, as checks, values and pictures need it.
 
     Attributes

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.families.fillet_table import fillet_table, largest_concentration
@@ -55,8 +55,8 @@ LARGEST = 4.0
 ELSEWHERE = "the model of the part as a solid does not compute it"
 
 
-@dataclass(frozen=True, eq=False)
-class SolidSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class SolidSolution(ShortRepr):
     """A part that was solved on two meshes.
 
     Attributes

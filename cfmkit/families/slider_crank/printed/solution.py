@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.printed.pressing import PressingEnd
@@ -44,8 +45,8 @@ HALVINGS = 12
 """At most so many: the stress has a kink where its place jumps, and a chain without a kink has a sharp corner."""
 
 
-@dataclass(frozen=True, eq=False)
-class ChainCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class ChainCurve(ShortRepr):
     """Force and stress of a chain at every travel (a `cfmkit.results.ClosedForm`).
 
     Attributes
@@ -160,8 +161,8 @@ class SecondOpinion:
     elements: int
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(ShortRepr):
     """A chain with its equilibria; forces of all legs together, stresses of one.
 
     Attributes

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.slider_crank.springs.assembly import reactions
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
@@ -223,8 +224,8 @@ def _summed(rates: FloatArray, unit: FloatArray) -> FloatArray:
     return total
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(ShortRepr):
     """A solved mechanism, as the checks, the scalar values and the pictures need it.
 
     Attributes
@@ -340,8 +341,8 @@ class Solution:
         return min(others, key=lambda item: abs(item.motion - start), default=None)
 
 
-@dataclass(frozen=True)
-class ClosedFormEffort:
+@dataclass(frozen=True, repr=False)
+class ClosedFormEffort(ShortRepr):
     """The effort at every place of the motion, for metrics that are places.
 
     Attributes
