@@ -188,7 +188,7 @@ def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes, near: floa
         det = np.where(steep, det, 1.0)
         share = (way[:, 0] * seam[1] - way[:, 1] * seam[0]) / det
         on_seam = (way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]) / det
-        slack = 1e-6  # ends of seams stand on edges, but for rounding
+        slack = max(1e-6, near / float(np.hypot(*seam)))  # ends of seams stand on edges, as closely as those are drawn
         met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
         found.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
         found.append(ring.places[:-1][_leaving(ring, start, end, near)])

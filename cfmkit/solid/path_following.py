@@ -18,6 +18,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from scipy.interpolate import CubicHermiteSpline
+
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.equilibrium import Balance, SolidProblem
 
@@ -91,13 +93,23 @@ class PosePath:
         """Of the poses, (k,) [m or rad]."""
         return np.array([pose.travel for pose in self.poses])
 
-    def effort(self, travel: FloatArray) -> FloatArray:
-        """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""
+    def law(self, sense: float = 1.0) -> CubicHermiteSpline:
+        """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign.
+
+        Parameters
+        ----------
+        sense : float
+            1 or -1: that of a travel to the negative side makes it increase along the path.
+        """
         from scipy.interpolate import CubicHermiteSpline
 
-        rising = sorted(self.poses, key=lambda pose: pose.travel)  # a travel may go to the negative side
+        rising = sorted(self.poses, key=lambda pose: sense * pose.travel)
         places, efforts, slopes = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in rising]).T
-        return np.asarray(CubicHermiteSpline(places, efforts, slopes)(travel))
+        return CubicHermiteSpline(sense * places, sense * efforts, slopes)
+
+    def effort(self, travel: FloatArray) -> FloatArray:
+        """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""
+        return np.asarray(self.law()(travel))
 
 
 def follow(

@@ -69,19 +69,18 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
 
 
 @pytest.mark.parametrize(
-    ("config", "said"),
+    ("config", "said", "changes"),
     [
-        (
-            "beam_cantilever",
-            "needs a drive of kind 'displacement' or 'rotation': move the node, and read its force off the curve",
-        ),
-        ("beam_end_effector", "does not know analysis.surface"),
-        ("beam_two_layers", "does not know copies.layers: leave that out, or take the beams, 'reissner'"),
+        ("beam_lee_frame", "does not know drive.follows", {"mechanism.drive.follows": True}),
+        ("beam_v_bifurcation", "does not know analysis.modes", {}),
+        ("beam_lan2010", "does not know analysis.through_folds of a motion", {"analysis.through_folds": True}),
+        ("beam_two_layers", "does not know copies.layers: leave that out, or take the beams, 'reissner'", {}),
     ],
 )
-def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said):
+def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said, changes):
+    poisson = {"mechanism.material.poisson_ratio": 0.3}
     with pytest.raises(SpecError, match=said) as caught:
-        cfmkit.load(CONFIGS / f"{config}.yaml").replace({"analysis.fidelity": "solid"})
+        cfmkit.load(CONFIGS / f"{config}.yaml").replace({"analysis.fidelity": "solid", **poisson, **changes})
     assert len(caught.value.problems) == 1
 
 

@@ -6,7 +6,7 @@ model of beams; an eye turns about its hole as one piece. No contact, no plastic
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,8 @@ from cfmkit.families.beam.output_columns import output_columns
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.families.beam.solid_nodes import SolidNodes
+from cfmkit.families.beam.solid_under_load import driven_by_load, load_of_one, moved_far_enough
+from cfmkit.families.beam.surface_following import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.fillet_table import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status, quantities
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
     from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
+    from cfmkit.solid.under_load import LoadPath
     from cfmkit.tables import Table
 
 
@@ -58,16 +61,24 @@ class SolidSolution(ShortRepr):
     meshes : TwoMeshes
     motion : (n,) array
         Travel of the points of the curve [m or rad].
+    reached : LoadPath or None
+        How far a load leads that drives the part; None where its motion is given.
     """
 
     assembly: Assembly
     meshes: TwoMeshes
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
+    reached: LoadPath | None = None
 
     @property
     def spec(self) -> BeamSpec:
-        """The specification."""
+        """The specification; that of a part under a load has its motion instead."""
         return self.assembly.spec
+
+    @property
+    def end(self) -> float:
+        """Where the travel was to end, or a load's did [m or rad]."""
+        return self.spec.extent if self.reached is None else self.reached.end
 
     @property
     def fine(self) -> MeshSolution:
@@ -100,6 +111,20 @@ class SolidSolution(ShortRepr):
         return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
 
     @property
+    def densely(self) -> SolidSolution:
+        """The same at many points: what is found along a surface does not depend on how many rows a curve has."""
+        return replace(self, motion=read_only(np.linspace(0.0, self.motion[-1], LOOKED_AT)))
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether the equilibrium of each point is stable; under a load also the drive gives way if its force falls."""
+        travel = self.fine.course.travel
+        at_pose = np.array([pose.unstable == 0 for pose in self.fine.course.poses])
+        before = np.clip(np.searchsorted(np.abs(travel), np.abs(self.motion) * (1 + 1e-12)) - 1, 0, None)
+        stable = at_pose[before]
+        return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
+
+    @property
     def everywhere(self) -> None:
         """Nothing: a pose between two of these takes seconds."""
 
@@ -111,7 +136,7 @@ class SolidSolution(ShortRepr):
     @property
     def window(self) -> tuple[float, float]:
         """Where stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
-        end, window = self.spec.extent, self.spec.analysis.window
+        end, window = self.end, self.spec.analysis.window
         low, high = sorted((0.0, end) if window is None else between(window, (0.0, end)))
         return low, high
 
@@ -147,7 +172,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Parameters
     ----------
     spec : BeamSpec
-        The mechanism; of drives, a displacement or a rotation.
+        The mechanism; its node is moved or turned, or a force or a moment acts on it.
     run : Run
         Its progress is reported.
 
@@ -156,11 +181,9 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Result
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
-    from cfmkit.solid.path_following import PathEnd
 
-    assembly = assemble(spec)
     try:
-        meshes = driven_part(spec, assembly).solved(run.progress)
+        assembly, meshes = _solved(spec, run)
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
@@ -168,25 +191,67 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
         message = f"no curve: {why}; look at mechanism.drive, {keys}, analysis.solid.mesh"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    asked = np.linspace(0.0, spec.extent, spec.analysis.points)
-    forwards = np.sign(spec.extent)
-    course = meshes.fine.course
-    reached = forwards * asked <= forwards * course.travel[-1] * (1 + 1e-12)
-    solution = SolidSolution(assembly, meshes, read_only(asked[reached]))
-    complete = course.ending is PathEnd.COMPLETE
+    solution = _under_load(spec, assembly, meshes) if driven_by_load(spec) else _moved(assembly, meshes)
+    message = _ended(solution)
+    if len(solution.motion) < 2:
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
+    curves: tuple[Curve, ...] = (_curve(solution),)
+    values, warnings = _values(solution), tuple(_findings(solution))
+    status = Status.PARTIAL if message else Status.COMPLETE
+    if (along := ride(solution.densely)) is not None:
+        curves += (curve_of(along),) if len(along.place) > 1 else ()
+        values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
+        if along.missing and status is Status.COMPLETE:
+            status, message = Status.PARTIAL, along.missing
     return Result(
         spec=resolve(spec),
-        status=Status.COMPLETE if complete else Status.PARTIAL,
-        message="" if complete else _ended(solution),
-        curves=(_curve(solution),),
-        values=_values(solution),
-        warnings=tuple(_findings(solution)),
-        travel=(0.0, spec.extent),
+        status=status,
+        message=message,
+        curves=curves,
+        values=values,
+        warnings=warnings,
+        travel=(0.0, solution.end),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
         tables={"fillets": partial(_fillet_table, solution)},
         state=solution,
     )
+
+
+def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, TwoMeshes]:
+    """Return the network that a part is drawn from and the part on two meshes, moved far enough where a load drives it.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the part cannot be meshed.
+    """
+    if driven_by_load(spec):
+        spec = moved_far_enough(spec, part_of, run.progress)
+    assembly = assemble(spec)
+    return assembly, driven_part(spec, assembly).solved(run.progress)
+
+
+def _moved(assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+    """Return the points of the curve of a part that is moved: even ones, as far as its path leads."""
+    spec, travel = assembly.spec, meshes.fine.course.travel
+    asked, forwards = np.linspace(0.0, spec.extent, spec.analysis.points), np.sign(spec.extent)
+    reached = forwards * asked <= forwards * travel[-1] * (1 + 1e-12)
+    return SolidSolution(assembly, meshes, read_only(asked[reached]))
+
+
+def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+    """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
+    from cfmkit.solid.under_load import travels_at, up_to_load, with_poses
+
+    load, through = load_of_one(spec), spec.analysis.through_folds
+    fine, reached = up_to_load(meshes.fine, load, through)
+    meshes = replace(meshes, fine=with_poses(fine, _ends_of_windows(spec, reached.end)))
+    if through:
+        motion = read_only(np.linspace(0.0, reached.end, spec.analysis.points))
+    else:
+        motion = travels_at(fine.course, np.linspace(0.0, load, spec.analysis.points))
+    return SolidSolution(assembly, meshes, motion, reached)
 
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
@@ -229,6 +294,8 @@ def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
 def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
     """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = spec.replace({"analysis.fidelity": "solid"})
+    if driven_by_load(spec):
+        spec = moved_far_enough(spec, part_of)
     return (driven_part(spec, assemble(spec)),)
 
 
@@ -252,14 +319,18 @@ def _thinnest(assembly: Assembly) -> float:
 def _stops(spec: BeamSpec) -> list[float]:
     """Return the travels to solve for [m or rad]: even ones, and the ends of every window."""
     end = spec.extent
-    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
-    ends = [place for window in windows if window is not None for place in between(window, (0.0, end))]
-    inside = [place for place in ends if 0.0 < place / end < 1.0]
+    inside = [place for place in _ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
     even = np.linspace(0.0, end, spec.analysis.solid.poses)
     found = np.unique(np.concatenate([even, inside]))
     # ends of windows that are an even pose but for rounding are that pose
     near = np.abs(np.diff(found)) < 1e-9 * abs(end)
     return [float(place) for place in np.delete(found, np.flatnonzero(near) + 1)[:: 1 if end > 0 else -1]]
+
+
+def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
+    """Return where every window starts and ends on a travel [m or rad]."""
+    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    return [place for window in windows if window is not None for place in between(window, (0.0, end))]
 
 
 def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
@@ -283,9 +354,20 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
 
 
 def _ended(solution: SolidSolution) -> str:
-    course = solution.fine.course
-    where = format_short(float(course.travel[-1]), "angle" if _turns(solution.spec) else "length")
-    return f"{course.ended}, at {where}"
+    """Return why the curve ends early, and where; empty if it does not."""
+    from cfmkit.solid.under_load import LoadEnd
+
+    course, turns = solution.fine.course, _turns(solution.spec)
+    where = format_short(solution.end if solution.reached else float(course.travel[-1]), "angle" if turns else "length")
+    if solution.reached is not None and solution.reached.how is LoadEnd.MAXIMUM:
+        largest = format_short(solution.copies * solution.reached.effort, "torque" if turns else "force")
+        told = f"the part snaps at {largest}, at {where}: the load cannot grow further"
+        return f"{told}; follow the curve beyond its maximum (analysis.through_folds)"
+    if course.ended:
+        return f"{course.ended}, at {where}"
+    if solution.reached is not None and solution.reached.how is LoadEnd.SHORT:
+        return f"the part does not carry the load within {where}"
+    return ""
 
 
 def _turns(spec: BeamSpec) -> bool:
@@ -295,14 +377,12 @@ def _turns(spec: BeamSpec) -> bool:
 def _curve(solution: SolidSolution) -> Curve:
     course, motion = solution.fine.course, solution.motion
     solved = np.isclose(motion[:, None], course.travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(axis=1)
-    stable = np.array([pose.unstable == 0 for pose in course.poses])
-    before = np.clip(np.searchsorted(np.abs(course.travel), np.abs(motion) * (1 + 1e-12)) - 1, 0, None)
     extra = {
         "max_stress": Column(solution.stress, "stress"),
         "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
     } | _outputs(solution)
     kind: Kind = "torque" if _turns(solution.spec) else "force"
-    return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), stable[before], extra, kind)
+    return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), solution.stable, extra, kind)
 
 
 def _outputs(solution: SolidSolution) -> dict[str, Column]:
@@ -328,14 +408,30 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
-        numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | ranges(solution)
+        numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | _limit(solution)
+        numbers |= ranges(solution) if solution.reached is None else {}
     return quantities(DEFINITIONS, numbers) | largest_concentration(solution.fillets)
+
+
+def _limit(solution: SolidSolution) -> dict[str, float | None]:
+    """Return the first maximum of a load; nothing of parts that are moved."""
+    from cfmkit.solid.under_load import LoadEnd, first_maximum
+
+    reached, course = solution.reached, solution.fine.course
+    if reached is None:
+        return {}
+    if reached.how is LoadEnd.MAXIMUM:
+        return {"limit_force": solution.copies * reached.effort}
+    sense = float(np.sign(reached.end))
+    first = first_maximum(course, sense)
+    law = course.law(sense)
+    return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
-    if course.ended:
-        yield finding("ends_early" if course.touching is None else "self_contact", _ended(solution))
+    if told := _ended(solution):
+        yield finding("ends_early" if course.touching is None else "self_contact", told)
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")

@@ -227,5 +227,9 @@ class OnCurve(Protocol):
         """Whether each point reaches the tolerance, (n,)."""
 
     @property
+    def stable(self) -> Any:
+        """Whether each point is a stable equilibrium, (n,)."""
+
+    @property
     def everywhere(self) -> BetweenPoints | None:
         """The model between the points of the curve, where it is so cheap."""

@@ -366,17 +366,18 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield what the model of the part as a solid cannot do."""
     mechanism, analysis = spec.mechanism, spec.analysis
-    if mechanism.drive.kind not in ("displacement", "rotation"):
+    by_load, verified = mechanism.drive.kind in ("force", "moment"), spec.design is not None and spec.design.verify
+    if mechanism.drive.kind == "loads" or (by_load and verified == "solid"):
         yield "needs a drive of kind 'displacement' or 'rotation': move the node, and read its force off the curve"
     things: dict[str, object] = {"springs": mechanism.springs, "loads": mechanism.loads}
     things["nodes that are moved"] = [name for name, node in mechanism.nodes.items() if node.moved is not None]
     things["pins between beams"] = [
         name for name, beam in mechanism.beams.items() if "pin" in (beam.start_joint, beam.end_joint)
     ]
-    things["analysis.modes"], things["analysis.surface"] = analysis.modes, analysis.surface
+    things["analysis.modes"], things["drive.follows"] = analysis.modes, getattr(mechanism.drive, "follows", False)
     things["analysis.outputs.cross_stiffness"] = analysis.outputs.cross_stiffness
     things["analysis.imperfection"] = analysis.imperfection
-    things["analysis.through_folds"] = analysis.through_folds
+    things["analysis.through_folds of a motion"] = analysis.through_folds and not by_load
     things["copies.layers"] = mechanism.copies is not None and mechanism.copies.layers > 1
     unknown = [name for name, thing in things.items() if thing]
     if unknown:

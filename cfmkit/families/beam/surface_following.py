@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.between_points import BetweenPoints
-    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.solution import OnCurve
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding
 
@@ -278,7 +278,7 @@ class Tip:
         )
 
 
-def ride(solution: Solution) -> Ride | None:
+def ride(solution: OnCurve) -> Ride | None:
     """Return what happens along the surface of the analysis; None where there is no surface."""
     surface = solution.spec.analysis.surface
     if surface is None:
@@ -306,7 +306,7 @@ def ride(solution: Solution) -> Ride | None:
     return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
 
 
-def _tip(solution: Solution, surface: Surface) -> Tip:
+def _tip(solution: OnCurve, surface: Surface) -> Tip:
     """Return the mechanism up to where its path turns back: the tip cannot follow it beyond."""
     x, effort, stress = solution.motion, solution.effort, solution.stress
     steps = np.sign(np.diff(x))

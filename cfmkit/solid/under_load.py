@@ -1,0 +1,162 @@
+"""A part under a force or a moment that grows: read off its path under a growing travel.
+
+On a path that is followed by its travel the effort is known everywhere, so the travel at a load is where the effort
+first reaches it. Up to there the effort rises: from its first maximum on the part would jump. The pose at the end is
+solved for, between poses efforts are those of the path's cubics, whose error is known (`meshed_part.refined`).
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.solid.path_following import PathEnd, advanced
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.solid.meshed_part import Meshed, MeshSolution
+    from cfmkit.solid.path_following import PosePath
+
+RANGES = (1.25, 2.5, 5.0, 10.0)
+"""Travels in which a load is looked for, in those that the beams need for it."""
+MARGIN = 1.05
+"""Travel of the finer mesh, in that of a coarse one: their forces differ by up to a few thousandths, the travels by a
+few per cent where the curve is flat."""
+ROUNDS = 4
+"""Of Newton's method for the travel at the load: two are usual, as the cubic is close."""
+CLOSE, SAME = 1e-9, 1e-6
+"""Differences from the load, in parts of it, at which it is found, and at which it is not missed: in long thin strips
+efforts are known to 1e-7 only."""
+HALVINGS = 60
+"""Of an interval between two poses: beyond them a travel has no more digits."""
+
+
+class LoadEnd(enum.Enum):
+    """How far a path leads under a load."""
+
+    REACHED = "the load is reached"
+    MAXIMUM = "the load has a maximum before: the part jumps there"
+    SHORT = "the path ends before"
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """What a path says of a load.
+
+    Attributes
+    ----------
+    end : float
+        Travel at the load, at its first maximum, or at the end of the path [m or rad].
+    effort : float
+        The effort there [N or N m].
+    how : LoadEnd
+    """
+
+    end: float
+    effort: float
+    how: LoadEnd
+
+    @classmethod
+    def of(cls, course: PosePath, load: float, through_maxima: bool) -> LoadPath:
+        """Return what a path says of a load of either sign [N or N m]; it may pass maxima if that is allowed."""
+        sense = float(np.sign(load))
+        law = course.law(sense)
+        last = float(law.x[-1] if through_maxima else first_maximum(course, sense))
+        there = law.solve(abs(load), extrapolate=False)
+        there = there[np.isfinite(there) & (there > 0.0) & (there <= last)]
+        if len(there):
+            return cls(sense * float(there.min()), load, LoadEnd.REACHED)
+        how = LoadEnd.MAXIMUM if last < law.x[-1] else LoadEnd.SHORT
+        return cls(sense * last, sense * float(law(last)), how)
+
+
+def first_maximum(course: PosePath, sense: float) -> float:
+    """Return up to which travel, times the sign of its direction, the effort rises: its end if it always does."""
+    law = course.law(sense)
+    flat = law.derivative().roots(extrapolate=False)
+    return float(flat[np.isfinite(flat) & (flat > 0.0)].min(initial=law.x[-1]))
+
+
+def travel_for(
+    meshed: Meshed, load: float, guess: float, poses: int, through_maxima: bool, report: Callable[[float], None]
+) -> float:
+    """Return the travel within which a part reaches a load, or a maximum before it, with a margin [m or rad].
+
+    Parameters
+    ----------
+    meshed : Meshed
+        The part, coarsely.
+    load : float
+        [N or N m]
+    guess : float
+        Travel at which it may be [m or rad].
+    poses : int
+        Solved for in the first range that is looked at.
+    through_maxima : bool
+        Whether maxima of the effort are passed.
+    report : callable
+        Is given the share that is done.
+    """
+    travel = guess
+    for times in RANGES:
+        course = meshed.followed(np.linspace(0.0, times * guess, poses).tolist(), report).course
+        if len(course.poses) < 2:
+            break
+        found = LoadPath.of(course, load, through_maxima)
+        travel = found.end
+        if found.how is not LoadEnd.SHORT or course.ended:
+            break
+    return MARGIN * travel
+
+
+def up_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple[MeshSolution, LoadPath]:
+    """Return the part's path up to a load [N or N m] or to where it leads, with a pose there, and what that is."""
+    course = solved.course
+    found = LoadPath.of(course, load, through_maxima)
+    if found.how is LoadEnd.SHORT:
+        return solved, found
+    poses = [pose for pose in course.poses if abs(pose.travel) < abs(found.end) * (1 - 1e-12)]
+    last, travel = None, found.end
+    for _ in range(ROUNDS):
+        last = advanced(solved.problem, poses[-1], travel)
+        if last is None or found.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= CLOSE * abs(load):
+            break
+        travel += (load - last.effort) / last.stiffness
+    if last is None:
+        ended = replace(course, poses=tuple(poses), ending=PathEnd.LOST)
+        return replace(solved, course=ended), LoadPath(poses[-1].travel, poses[-1].effort, LoadEnd.SHORT)
+    ended = replace(course, poses=(*poses, last.kept()), ending=PathEnd.COMPLETE, touching=None)
+    return replace(solved, course=ended), LoadPath(last.travel, last.effort, found.how)
+
+
+def with_poses(solved: MeshSolution, travels: Iterable[float]) -> MeshSolution:
+    """Return the part's path with poses at some travels inside it, too [m or rad]; without those that are not found."""
+    poses = list(solved.course.poses)
+    slack = 1e-9 * abs(poses[-1].travel)
+    for travel in travels:
+        after = next((k for k, pose in enumerate(poses) if abs(pose.travel) > abs(travel) - slack), 0)
+        if after and abs(poses[after].travel - travel) > slack:
+            found = advanced(solved.problem, poses[after - 1], travel)
+            poses[after:after] = [] if found is None else [found.kept()]
+    return replace(solved, course=replace(solved.course, poses=tuple(poses)))
+
+
+def travels_at(course: PosePath, loads: FloatArray) -> FloatArray:
+    """Return where a path that rises has some efforts (n,) of one sign [m or rad], as far as it has them."""
+    sense = float(np.sign(loads[-1]))
+    law = course.law(sense)
+    wanted = np.abs(loads)
+    wanted = wanted[wanted <= abs(course.poses[-1].effort) * (1 + SAME)]
+    at = np.clip(np.searchsorted(law(law.x), wanted), 1, len(law.x) - 1)
+    low, high = law.x[at - 1], law.x[at]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        below = law(middle) < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return read_only(sense * np.where(wanted == 0.0, 0.0, high))
