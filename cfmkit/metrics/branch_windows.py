@@ -120,6 +120,12 @@ def covers(extent: tuple[float, float], window: Window) -> bool:
     return extent[0] <= window.lo + slack and extent[1] >= window.hi - slack
 
 
+def between_ends(places: FloatArray, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which places lie between the ends of a window and are none of these, but for rounding."""
+    slack = TOLERANCE * (high - low)
+    return (places > low + slack) & (places < high - slack)
+
+
 def restrict(trace: BranchTrace, window: Window) -> BranchTrace:
     """Return the part of a branch inside the window, with interpolated ends; the caller checks `covers`."""
     slack = TOLERANCE * (window.hi - window.lo)

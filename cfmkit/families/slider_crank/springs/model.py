@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
@@ -28,6 +29,8 @@ from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.scalar_results import values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.metrics.branch_windows import between_ends
+from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.parts_list import BoughtPart, listed
@@ -155,7 +158,7 @@ def efforts_inside(
     """Return the unit efforts in a window, (4, k), its ends included; without a window all of them."""
     if window is None:
         return units.effort
-    between = (motion > window[0]) & (motion < window[1])
+    between = between_ends(motion, *window)
     ends = assembly.forces(np.array(window))
     return np.concatenate([ends[:, :1], units.effort[:, between], ends[:, 1:]], axis=1)
 
@@ -305,7 +308,8 @@ def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, Fl
     unit = efforts_inside(assembly, solution.motion, solution.units, window_of(spec, assembly))
     effort = assembly.rates @ unit
     sign = -1.0 if effort.mean() < 0 else 1.0
-    high, low = unit[:, int(np.argmax(sign * effort))], unit[:, int(np.argmin(sign * effort))]
+    places = _places_inside(solution, window_of(spec, assembly))
+    high, low = (_at_extreme(assembly, places, toward) for toward in (sign, -sign))
     top, bottom = float(assembly.rates @ high), float(assembly.rates @ low)
     yield f"{drive}_mean", unit.mean(axis=1)
     yield f"{drive}_max", high if sign > 0 else low
@@ -314,8 +318,7 @@ def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, Fl
         yield f"{drive}_ripple", (bottom * high / top - low) / top
     if top + bottom != 0.0:
         yield "half_band", 2.0 * (bottom * high - top * low) / (top + bottom) ** 2
-    energy = 0.5 * solution.units.turn**2
-    yield "energy_max", energy[:, int(np.argmax(assembly.rates @ energy))]
+    yield "energy_max", _at_largest_energy(solution)
     reference = reference_motion(spec, assembly)
     if solution.character.low <= reference <= solution.character.high:
         yield f"reference_{drive}", assembly.units(np.array([reference])).effort[:, 0]
@@ -323,3 +326,35 @@ def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, Fl
         at = assembly.units(np.array([assembly.stretched]))
         yield "stretched_torque", at.effort[:, 0]
         yield "stretched_stiffness", at.stiffness[:, 0]
+
+
+def _places_inside(solution: Solution, window: tuple[float, float] | None) -> FloatArray:
+    """Return the ends of a window, the points of the curve between them and the grid of the class, increasing."""
+    low, high = window or (float(solution.motion[0]), float(solution.motion[-1]))
+    places = np.concatenate([solution.motion, solution.character.grid])
+    return distinct(np.concatenate([[low, high], places[between_ends(places, low, high)]]))
+
+
+def _at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArray:
+    """Return the unit efforts (4,) where the effort times a sign is largest, next to the places too.
+
+    An extreme moves with the rates, but the effort does not change with its place there: its derivatives are these.
+    """
+    largest = int(np.argmax(sign * (assembly.rates @ assembly.forces(places))))
+    low, high = places[max(largest - 1, 0)], places[min(largest + 1, len(places) - 1)]
+
+    def falls(place: float) -> bool:
+        return sign * float(assembly.rates @ assembly.units(np.array([place])).stiffness[:, 0]) <= 0.0
+
+    at = places[largest]
+    if not falls(low) and falls(high):
+        at = bisect(falls, float(low), float(high))
+    return np.asarray(assembly.units(np.array([at])).effort[:, 0])
+
+
+def _at_largest_energy(solution: Solution) -> FloatArray:
+    """Return the energies of unit springs (4,) where the energy is largest: at an end, or where no effort is left."""
+    assembly, character = solution.assembly, solution.character
+    inner = [one.motion for one in character.equilibria if character.low < one.motion < character.high]
+    energy = 0.5 * assembly.units(np.array([character.low, *inner, character.high])).turn ** 2
+    return np.asarray(energy[:, int(np.argmax(assembly.rates @ energy))])

@@ -361,8 +361,8 @@ class ClosedFormEffort(ShortRepr):
 
     @property
     def peaks(self) -> FloatArray:
-        """None: springs bend the curve on the scale of the linkage only."""
-        return np.empty(0)
+        """The grid: springs bend the curve on the scale of the linkage, which few points of a curve may miss."""
+        return self.character.grid
 
     def effort(self, branch_name: str, places: FloatArray, /) -> FloatArray:
         """Return torque [N m] or force [N] at places of any shape."""

@@ -9,7 +9,7 @@ one mechanism, which is laid once for all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     small_angle_number,
 )
 from cfmkit.metrics.branch_views import MeasuringFrame
+from cfmkit.metrics.branch_windows import between_ends
 from cfmkit.metrics.continuous_curves import extremes, mean
 from cfmkit.metrics.ranges_many import (
     UNIFORM_POINTS,
@@ -246,10 +247,20 @@ class Slab:
             motion = base.motion
             effort = self.effort if window is None else self.rates @ base.inside(window)
             if window is not None:
-                motion = np.concatenate([window[:1], motion[(motion > window[0]) & (motion < window[1])], window[1:]])
-            self.cut[window] = ManyWindows(motion[None, :], effort, partial(extremes, self._exact))
+                motion = np.concatenate([window[:1], motion[between_ends(motion, *window)], window[1:]])
+            self.cut[window] = ManyWindows(motion[None, :], effort, self._extremes)
             self.balance(self.cut[window].mean, effort)
         return self.cut[window]
+
+    def _extremes(self, motion: FloatArray, effort: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return largest and smallest efforts between the ends of samples, next to these and to the grid, (m,) each."""
+        places, units = self.base.grid
+        samples = motion[0]
+        between = (places > samples[0]) & (places < samples[-1]) & np.isfinite(units.effort).all(axis=0)
+        both = np.concatenate([samples, places[between]])
+        order = np.argsort(both, kind="stable")
+        known = np.concatenate([effort, self.rates @ units.effort[:, between]], axis=1)
+        return extremes(self._exact, both[order][None, :], known[:, order])
 
     @cached_property
     def balanced(self) -> NDArray[np.bool_]:
