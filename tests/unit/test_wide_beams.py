@@ -62,3 +62,35 @@ def test_anything_but_a_truth_value_is_refused(path, value):
 def test_natural_frequencies_do_not_know_wide_beams():
     with pytest.raises(SpecError, match="known of narrow beams only"):
         changed(LAN, "mechanism.wide_beams=true", "analysis.modes=2", "mechanism.material.density=1410 kg/m^3")
+
+
+FLAT_ROOT = """
+cfmkit: 1
+family: beam
+name: flat-root
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  wide_beams: true
+  shear: true
+  axial: true
+  thickness: 1 mm
+  width: 6 mm
+  nodes:
+    wall: {at: [0 mm, 0 mm], support: clamped}
+    flat: {at: [1.8 mm, 0 mm]}
+    tip: {at: [24 mm, 0 mm]}
+  beams:
+    root: {start: wall, end: flat, material: {youngs_modulus: 2.2792 GPa, poisson_ratio: 0}}
+    strip: {start: flat, end: tip}
+  drive: {kind: force, node: tip, direction: 90 deg}
+analysis: {force: 3.47222 N, points: 11}
+"""
+
+
+@pytest.mark.parametrize(("force", "solid"), [(3.47222, 0.48396), (0.0347222, 0.0064828)])
+def test_a_root_that_does_not_curl_has_the_deflection_of_a_solid_in_three_dimensions(tmp_path, force, solid):
+    """0.3 widths of plane strain; 20-node bricks of `benchmarks/wide_strips_ccx.py`, b/t 6, four widths long."""
+    path = tmp_path / "flat.yaml"
+    path.write_text(FLAT_ROOT, encoding="utf-8")
+    result = cfmkit.analyze(cfmkit.load(path).replace({"analysis.force": force}))
+    assert result.curve.motion[-1] / 24e-3 == pytest.approx(solid, rel=0.01)
