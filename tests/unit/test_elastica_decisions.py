@@ -105,7 +105,7 @@ def test_the_drive_takes_over_where_it_turns_behind_limit_points():
 def test_a_stall_along_the_arc_is_the_end():
     of = problem(through_folds=True)
     path = trail(of, (0.01, 0, 0), (0.02, 1, 0))
-    path = replace(path, stretch=replace(path.stretch, natural=False))
+    path = replace(path, stretch=path.stretch._replace(natural=False))
     move = decided(of, leg(of, STALLED, path), fresh=False)
     assert isinstance(move, Stop)
     assert (move.trail.ending.status, move.trail.ending.message) == (PathStatus.LOST, "no step converged at 0.002")
@@ -178,3 +178,10 @@ def test_decisions_leave_the_path_that_they_are_made_from_as_it_is():
     assert np.array_equal(path.points.info, info)
     assert np.array_equal(path.points.drive, drives)
     assert (len(path.branches), path.events, dict(path.visited), path.stretch.natural) == (2, (), {}, True)
+
+
+def test_changed_path_counts_its_requested_points_anew():
+    path = trail(problem(), (0.01, 0, 0), (0.02, 1, 0))
+    assert path.requested == 2  # known from here on
+    assert path.changed(stretch=path.stretch._replace(first_requested=3)).requested == 3
+    assert (path.up_to(1).requested, path.requested) == (1, 2)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import distinct
 from cfmkit.elastica.continuation import points_at_bifurcation
 from cfmkit.elastica.continuation.state import PRIMARY, BranchEnd, Resume, Stop
 from cfmkit.elastica.equilibrium.meshed_network import Points
@@ -40,7 +40,7 @@ def predicted_end(
     """
     start, span = other, problem.span
     for _ in range(_LEGS):
-        ahead = sense * np.unique(sense * trail.ahead)  # the drive may turn
+        ahead = sense * distinct(sense * trail.ahead)  # the drive may turn
         ahead = ahead[(ahead - start.drive) * sense > 1e-9 * span]
         if not len(ahead):
             return None, True
@@ -123,18 +123,18 @@ def rejoined(problem: PathProblem, trail: Trail, spot: Spot, end: BranchEnd | No
     solver, span = trail.solver, problem.span
     apart = max(solver.pose_change(y, end.y) for y in trail.points.y[-8:])
     if solver.pose_change(spot.y, end.y) > 0.5 * apart:
-        return Resume(replace(trail, ends=tuple(one for one in trail.ends if one is not end)), spot)
+        return Resume(trail.changed(ends=tuple(one for one in trail.ends if one is not end)), spot)
     sense = float(np.sign(end.drive - spot.drive))
     near = points_at_bifurcation.count(problem, trail, end.drive, spot.drive)
     turn = trail.ahead[: near + 1]
     if near < len(turn) and ((turn - end.drive) * sense <= _ROUNDING * span).all():
-        return Resume(replace(points_at_bifurcation.closing(problem, trail, end, spot), branch=trail.branch), spot)
-    trail = replace(trail, closed=True, ends=())
+        return Resume(points_at_bifurcation.closing(problem, trail, end, spot).changed(branch=trail.branch), spot)
+    trail = trail.changed(closed=True, ends=())
     start = solver.solve(end.beyond.y, end.drive + sense * _room(problem, trail, end.drive, sense))
     if start is None or start.unstable > end.after:
         start = trail.settled_or_given(end.beyond)
     trail = trail.with_event(Event("bifurcation", end.drive * problem.unit, end.before, end.after))
-    trail = replace(points_at_bifurcation.closing(problem, trail, end, spot), branch=end.onto)
+    trail = points_at_bifurcation.closing(problem, trail, end, spot).changed(branch=end.onto)
     return Resume(trail.with_spot(start, -1), start)
 
 
@@ -158,7 +158,7 @@ def stepped_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int)
         place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
         kind = "unresolved" if found is None else "bifurcation"
         trail = trail.with_event(Event(kind, place * problem.unit, before, near.unstable))
-        trail = replace(trail, branch=PRIMARY)
+        trail = trail.changed(branch=PRIMARY)
         near = _clear(problem, trail, wide, forward * advance) or near
         return Resume(trail.with_spot(near, -1), near)
     return None
@@ -189,7 +189,7 @@ def closed_behind(problem: PathProblem, trail: Trail) -> Trail | None:
     begin, spot, solver = float(trail.points.drive[first]), trail.spot(-1), trail.solver
     sense = float(np.sign(begin - spot.drive))
     step = _BACK * problem.span
-    options = problem.options(trail, spot, sense * step)._replace(longest=step)
+    options = problem.options(trail, spot, sense * step, longest=step)
     code, points = solver.march(spot, np.array([begin]), options, problem.control.most_points + 2)
     if code == DONE and solver.pose_change(points.y[-1], trail.points.y[first]) <= _SAME:
         return trail
@@ -213,7 +213,7 @@ def closed_behind(problem: PathProblem, trail: Trail) -> Trail | None:
             branches[index] = PRIMARY
         elif branches[index] == PRIMARY:
             branches[index] = name
-    return replace(trail, branches=tuple(branches), events=(*events, closing))
+    return trail.changed(branches=tuple(branches), events=(*events, closing))
 
 
 def relabelled(problem: PathProblem, trail: Trail, primary: Trail) -> Trail:
@@ -243,4 +243,4 @@ def relabelled(problem: PathProblem, trail: Trail, primary: Trail) -> Trail:
     events = trail.events[:-1] if last + 1 < len(trail.branches) else trail.events  # the step over it came too late
     event = Event("unresolved", float(trail.points.drive[first]) * problem.unit, before, after)
     names = trail.branches[:first] + (PRIMARY,) * (len(trail.points) - first)
-    return replace(trail, branches=names, events=(*events, event))
+    return trail.changed(branches=names, events=(*events, event))

@@ -11,8 +11,7 @@ q: that exists where beams do not stretch, too. An eigenvalue of K is negative f
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +40,7 @@ _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node co
 _FIRST_KICK, _KICKS = 1e-3, 16  # change of the unknowns that is tried first, and how often
 
 
-@dataclass(frozen=True)
-class Singular:
+class Singular(NamedTuple):
     """A singular point: the equilibrium, its null vector, all its modes in one where several are critical, its kind."""
 
     spot: Spot
@@ -90,9 +88,7 @@ class _Search:
 
     def __init__(self, solver: ExpandedSolver, one: Spot, other: Spot, natural: bool, close: float) -> None:
         self.solver, self.one, self.other, self.close, self.natural = solver, one, other, close, natural
-        weights = np.where(np.arange(solver.n) < solver.n_free, 1.0, FORCE_WEIGHT)
-        chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
-        self.border = solver.unit if natural else chord
+        self.border = solver.unit if natural else _chord(solver, one, other)
         self.start, self.stop = self._level(one), self._level(other)
         self.several = other.unstable - one.unstable > 1
         self.close = max(close, _NEAREST) if self.several else close
@@ -205,6 +201,12 @@ class _Search:
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 
+def _chord(solver: ExpandedSolver, one: Spot, other: Spot) -> FloatArray:
+    """Return the way from one equilibrium to another, as the bordering row of the arc length."""
+    weights = np.where(np.arange(solver.n) < solver.n_free, 1.0, FORCE_WEIGHT)
+    return np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
+
+
 def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float) -> Spot | None:
     """Return an equilibrium on the branch that crosses at a bifurcation of one mode, on the stable side of it.
 
@@ -297,9 +299,11 @@ class Curvature:
         forces = modes[solver.n_free :].reshape(-1, 3, count)[solver.lasts].reshape(-1, count)
         steps, left = np.zeros(len(self.values)), np.eye(count)
         for _ in range(count):
-            moves = np.linalg.norm(poses @ left, axis=1).max(initial=0.0) > _MOVED
-            part = (poses if moves else forces) @ left
+            part = poses @ left
             sizes = np.linalg.norm(part, axis=1)
+            if not sizes.max(initial=0.0) > _MOVED:
+                part = forces @ left
+                sizes = np.linalg.norm(part, axis=1)
             row = part[np.flatnonzero(sizes >= 0.99 * sizes.max())[0]]
             row = row / np.linalg.norm(row)
             steps[chosen] -= row  # by choice: either sign would do, as long as it stays

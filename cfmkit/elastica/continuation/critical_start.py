@@ -46,11 +46,11 @@ def left(problem: PathProblem, trail: Trail, spot: Spot) -> Resume | None:
     if near is None:
         return None
     if trail.branch != PRIMARY and wide is not found[0]:
-        trail = replace(trail.with_event(Event("unresolved", 0.0, start.unstable, near.unstable)), branch=PRIMARY)
+        trail = trail.with_event(Event("unresolved", 0.0, start.unstable, near.unstable)).changed(branch=PRIMARY)
     start = replace(start, unstable=min(start.unstable, near.unstable))
     # the start is the only point of the path so far: no mesh is near another there
     trail = trail.up_to(0).with_spot(start, 0 if targets[0] == 0.0 else -1).with_spot(near, -1)
-    trail = replace(trail, pinned=(*trail.pinned, 0.0), closed=True)
+    trail = trail.changed(pinned=(*trail.pinned, 0.0), closed=True)
     return Resume(trail, near, 0.5 * abs(near.drive))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +70,7 @@ def _got_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int) ->
     fold = limit_point.is_near(problem, trail)
     if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:
         return limit_point.around(problem, trail)
-    trail = replace(trail, fold_at=spot.drive if fold else np.nan)
+    trail = trail.changed(fold_at=spot.drive if fold else np.nan)
     if not fold and (again := uncondensed(problem, trail)) is not None:
         return again
     move: Move | None = None

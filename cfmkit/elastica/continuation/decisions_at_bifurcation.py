@@ -74,7 +74,7 @@ def crossed(problem: PathProblem, trail: Trail) -> Move:
     unreported = trail
     trail = trail.with_event(Event(kind, found.spot.drive * problem.unit, found.before, found.after))
     if trail.first is None and not found.fold and found.after > found.before:
-        trail = replace(trail, first=found)
+        trail = trail.changed(first=found)
     return _parted(problem, trail, found, one, other, unreported) if natural else Resume(trail, other)
 
 
@@ -144,7 +144,7 @@ def _without_last_but_one(trail: Trail) -> Trail | None:
     last, name, back = trail.points.take([-1]), trail.branches[-1], trail.up_to(-2)
     if last.requested[0] > back.requested:
         last.requested[0] = -1.0  # the point taken back is to be done first
-    return replace(back.with_last(last, name), visited={**trail.visited, place: times})
+    return back.with_last(last, name).changed(visited={**trail.visited, place: times})
 
 
 def _parted(problem: PathProblem, trail: Trail, found: Singular, one: Spot, other: Spot, unreported: Trail) -> Move:
@@ -160,21 +160,21 @@ def _parted(problem: PathProblem, trail: Trail, found: Singular, one: Spot, othe
     found, wide = switched(problem, trail, found, one, forward)
     left = None if wide is None else trail.settled(problem.fine.reduce(wide))
     if left is None and _may_be_shorter(problem, trail) and not _sure(problem, trail, one, other, found):
-        return _again(replace(unreported, without_branch=found))
+        return _again(unreported.changed(without_branch=found))
     if left is None:
         if control.through_folds:
             return _past(problem, trail, found, one, _clear_of(problem, trail, found, one, other))
         return _no_branch(problem, trail, found)
     clear = _clear_of(problem, trail, found, one, other)
     trail = trail.up_to(-1)
-    trail = replace(trail, events=(*trail.events[:-1], replace(trail.events[-1], after=found.after)))
+    trail = trail.changed(events=(*trail.events[:-1], replace(trail.events[-1], after=found.after)))
     name = f"bifurcated at {found.spot.drive * problem.unit:.6g}, sign {control.sign:+d}"
     trail = points_at_bifurcation.opening(problem, trail, found, one, wide, name)
     left = _not_beyond(problem, trail, found, left, forward)
-    trail = replace(trail, branch=name, closed=False).with_spot(left, -1)
+    trail = trail.changed(branch=name, closed=False).with_spot(left, -1)
     ending, closed = predicted_end(problem, trail, clear, found.before, forward, onto)
-    begin = end_at(problem, replace(found, before=found.after, after=found.before), one, onto)
-    trail = replace(trail, ends=(begin, *([ending] if ending else [])), closed=closed)
+    begin = end_at(problem, found._replace(before=found.after, after=found.before), one, onto)
+    trail = trail.changed(ends=(begin, *([ending] if ending else [])), closed=closed)
     return Resume(trail, left, 0.5 * abs(left.drive - found.spot.drive))
 
 
@@ -286,7 +286,7 @@ def past_corner(problem: PathProblem, trail: Trail, spot: Spot, requested: int) 
                 move = crossed(problem, trail.with_spot(near, -1))
                 events = move.trail.events
                 if len(events) > len(trail.events) and events[-1].kind == "unresolved":
-                    trail = replace(move.trail.up_to(-1), events=events[:-1])
+                    trail = move.trail.up_to(-1).changed(events=events[:-1])
                     break
                 return trail, move
     back = None if stays or trail.stuck(problem) else _taken_back(problem, trail, spot.drive)
@@ -308,7 +308,7 @@ def _taken_back(problem: PathProblem, trail: Trail, place: float) -> Trail | Non
     events = behind.events
     while events and min(far, here) < events[-1].drive <= max(far, here):  # it is passed again
         events = events[:-1]
-    return replace(behind, events=events)
+    return behind.changed(events=events)
 
 
 def _before(problem: PathProblem, trail: Trail) -> tuple[Trail, Spot] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,4 +73,4 @@ def inaccurate(problem: PathProblem, trail: Trail, error: float, count: int) -> 
     text = f"the tolerance of {problem.control.tolerance:.3g} was not reached: error {error:.3g}, {share}"
     if trail.ending.status is PathStatus.COMPLETE:
         return trail.stopped(PathStatus.INACCURATE, text)
-    return replace(trail, ending=replace(trail.ending, message=f"{trail.ending.message}; {text}"))
+    return trail.changed(ending=trail.ending._replace(message=f"{trail.ending.message}; {text}"))

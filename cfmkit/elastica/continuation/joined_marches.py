@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from math import copysign
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ _LANDINGS = 6  # tries to land on a requested point before a bifurcation is look
 _FIRST = 0.05  # first step as a share of the drive's range, unless requested points are nearer
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
+class Followed(NamedTuple):
     """A path as far as it was followed.
 
     Attributes
@@ -62,8 +61,8 @@ def _followed(problem: PathProblem, begun: start.Start) -> Trail:
     if begun.spot is None:
         if begun.code == DONE:
             return trail
-        long = replace(trail.ending, too_long=begun.code == LONG)
-        return ending.without_start(problem, replace(trail, ending=long), begun.share)
+        long = trail.ending._replace(too_long=begun.code == LONG)
+        return ending.without_start(problem, trail.changed(ending=long), begun.share)
     if trail.branch != PRIMARY:
         trail = start.ends_of_branch(problem, trail, _way)
     move: Move = Resume(trail, begun.spot, fresh=True)
@@ -107,10 +106,8 @@ def march(problem: PathProblem, move: Resume) -> Leg:
     requested = int(stretch.targets[0] == 0.0) if move.fresh else trail.requested
     left, numbers, toward = ahead(problem, trail, spot, requested)
     patient = move.patient or not stretch.natural or control.branch == "stop"
-    options = problem.options(trail, spot, _first_step(problem, move, requested))._replace(
-        landings=np.inf if patient else _LANDINGS,
-        sense=float(np.sign(next(value for value in stretch.targets if value))) if move.fresh else 0.0,
-    )
+    landings, sense = np.inf if patient else _LANDINGS, problem.sense if move.fresh else 0.0
+    options = problem.options(trail, spot, _first_step(problem, move, requested), landings=landings, sense=sense)
     passes = PASSES if control.through_folds else 1
     room = max(len(left) + 3, control.most_points + passes * len(stretch.targets) - len(trail.points))
     code, points = trail.solver.march(spot, left, options, room)
@@ -148,15 +145,15 @@ def ahead(
 def _first_step(problem: PathProblem, move: Resume, requested: int) -> float:
     """Return the first step of a march, with the sign of the way to go if it is by the drive."""
     stretch, first = move.trail.stretch, problem.control.first_step
-    along = float(stretch.targets[requested] - move.spot.drive)
+    along = float(stretch.targets[requested]) - move.spot.drive
     if first is not None:
         step = min(first * problem.span, move.step)
-        return float(np.copysign(step, along)) if stretch.natural else step
+        return copysign(step, along) if stretch.natural else step
     if not stretch.natural:
         from cfmkit.elastica.continuation import limit_point
 
         return min(limit_point.first_step(problem), move.step)
-    return float(np.sign(along)) * min(abs(along), _FIRST * problem.span, move.step)
+    return copysign(min(abs(along), _FIRST * problem.span, move.step), along)
 
 
 def _next(problem: PathProblem, leg: Leg, fresh: bool) -> Move:

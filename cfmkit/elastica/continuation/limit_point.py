@@ -42,14 +42,13 @@ def around(problem: PathProblem, trail: Trail) -> Resume:
     """Go on by the arc length, from a little before the last point."""
     trail = trail.up_to(_well_before(problem, trail) + 1)
     start, stop = one_way(problem.values.tolist(), trail.requested)
-    stretch = replace(
-        trail.stretch,
+    stretch = trail.stretch._replace(
         natural=False,
         before_fold=trail.unstable(-1),
         targets=problem.values[:stop],
         first_requested=max(trail.stretch.first_requested, start),
     )
-    trail = replace(trail, stretch=stretch)
+    trail = trail.changed(stretch=stretch)
     return Resume(trail, _along(problem, trail, -1))
 
 
@@ -69,7 +68,7 @@ def one_way(values: list[float], requested: int) -> tuple[int, int]:
 def by_the_drive(problem: PathProblem, trail: Trail, first: int, step: float = np.inf) -> Resume:
     """Let the drive take over again, with a requested point. What was found before does not hold."""
     stretch = Stretch(problem.values, True, first, len(trail.points) - 1, trail.stretch.before_fold)
-    cleared = replace(trail, stretch=stretch, visited={}, again_at=np.nan, without_branch=None, closed=True, ends=())
+    cleared = trail.changed(stretch=stretch, visited={}, again_at=np.nan, without_branch=None, closed=True, ends=())
     return Resume(cleared, cleared.spot(-1), step)
 
 
@@ -84,7 +83,7 @@ def back_to_the_drive(problem: PathProblem, move: Move) -> Move:
     if not isinstance(move, Resume) or trail.stretch.natural or not trail.events:
         return move
     spot, targets = move.spot, trail.stretch.targets
-    move = replace(move, step=_last_step(trail))  # a longer one might lead to another path
+    move = move._replace(step=_last_step(trail))  # a longer one might lead to another path
     if spot.unstable > trail.stretch.before_fold:
         return move
     if spot.tangent[-1] * (targets[-1] - spot.drive) <= 0.0:

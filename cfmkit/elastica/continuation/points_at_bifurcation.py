@@ -86,13 +86,16 @@ def opening(problem: PathProblem, trail: Trail, found: Singular, one: Spot, wide
     `name` is the branch's.
     """
     reduce, place, at = problem.fine.reduce, found.spot.drive, _AT * problem.span
+    left = count(problem, trail, place, one.drive)
+    if not left:
+        return trail
     start, before = reduce(found.spot).y, reduce(one).y
-    for _ in range(count(problem, trail, place, one.drive)):
+    for _ in range(left):
         value = float(trail.ahead[0])
         behind = (value - place) * (place - one.drive) > 0 and abs(value - place) > at
         if behind and wide is not None:
             share = np.sqrt((value - place) / (wide.drive - place))
-            there = replace(trail, branch=name), start, share * (reduce(wide).y - start), value, wide.unstable
+            there = trail.changed(branch=name), start, share * (reduce(wide).y - start), value, wide.unstable
         else:
             share = 0.0 if abs(value - place) <= at else (value - place) / (one.drive - place)
             there = trail, start, share * (before - start), value, found.after if behind else found.before
@@ -106,7 +109,7 @@ def closing(problem: PathProblem, trail: Trail, end: BranchEnd, spot: Spot) -> T
         value = float(trail.ahead[0])
         if (value - end.drive) * (end.beyond.drive - end.drive) > 0:
             share = (value - end.drive) / (end.beyond.drive - end.drive)
-            there = replace(trail, branch=end.onto), end.y, share * (end.beyond.y - end.y), value, end.after
+            there = trail.changed(branch=end.onto), end.y, share * (end.beyond.y - end.y), value, end.after
         else:
             share = np.sqrt((value - end.drive) / (spot.drive - end.drive))
             there = trail, end.y, share * (spot.y - end.y), value, spot.unstable
@@ -125,4 +128,4 @@ def _with_requested(
     if near is None or solver.pose_change(near.y, y) > limit:
         near = Spot(y, value, solver.unit, unstable)
     added = trail.with_spot(replace(near, tangent=solver.unit.copy()), trail.requested)
-    return replace(added, pinned=(*trail.pinned, value))
+    return added.changed(pinned=(*trail.pinned, value))

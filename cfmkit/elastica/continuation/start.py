@@ -8,8 +8,8 @@ constant loads", with that share.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,7 @@ Follow = Callable[[PathProblem, str], Trail]
 """Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.joined_marches.follow`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Start:
+class Start(NamedTuple):
     """Where a path starts.
 
     Attributes
@@ -84,7 +83,7 @@ def started(problem: PathProblem, trail: Trail, follow: Follow) -> Start:
     if near is not None:
         return Start(trail, near, 1.0, DONE)
     coarse = problem.mesh.segments < _ENOUGH  # coarse segments hide the way
-    return replace(loaded, code=LONG) if coarse else loaded
+    return loaded._replace(code=LONG) if coarse else loaded
 
 
 def _by_stretching(problem: PathProblem, follow: Follow) -> Spot | None:
@@ -143,7 +142,7 @@ def _along(problem: PathProblem, trail: Trail, what: str, begin: Spot, follow: F
     if ending.too_long:
         return Start(trail, None, 0.0, LONG)
     reported = (Event(f"{one.kind} under {what}", one.drive, one.before, one.after) for one in way.events)
-    trail = replace(trail, events=(*trail.events, *reported))
+    trail = trail.changed(events=(*trail.events, *reported))
     if problem.first_only and way.first is not None:
         return Start(trail, None, 1.0, DONE, (ramp, way.first))
     through_folds, sign = problem.control.through_folds, problem.control.sign
@@ -159,7 +158,7 @@ def _along(problem: PathProblem, trail: Trail, what: str, begin: Spot, follow: F
     if name != PRIMARY and name != trail.branch:
         share = next((one.drive for one in reversed(way.events) if one.after > one.before), 1.0)
         name = f"bifurcated under {100 * share:.4g} % of the {what}, sign {sign:+d}"
-    trail = replace(trail, branch=name, closed=name == PRIMARY)
+    trail = trail.changed(branch=name, closed=name == PRIMARY)
     return Start(trail, Spot(way.points.y[-1], 0.0, problem.solver.unit.copy()), 1.0, DONE)
 
 
@@ -168,10 +167,10 @@ def ends_of_branch(problem: PathProblem, trail: Trail, follow: Follow) -> Trail:
     primary = PathProblem(problem.layout, problem.mesh, replace(problem.control, branch="primary"))
     spot = problem.solver.tightened() if problem.ramp else started(primary, Trail.begun(primary), follow).spot
     other = None if spot is None else problem.solver.solve(spot.y, 0.0)
-    sense = float(np.sign(next(value for value in trail.stretch.targets if value)))
+    sense = problem.sense
     if other is None or other.unstable == 0:
         return trail
     from cfmkit.elastica.continuation import branch_end
 
     end, closed = branch_end.predicted_end(problem, trail, other, 0, sense, PRIMARY)
-    return replace(trail, ends=(end,) if end else (), closed=closed)
+    return trail.changed(ends=(end,) if end else (), closed=closed)

@@ -9,7 +9,6 @@ drive, ends on a stable branch.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +59,7 @@ def first_of_several(problem: PathProblem, trail: Trail, found: Singular, one: S
     near = trail.settled(problem.fine.reduce(between))
     if near is None:
         return trail, found
-    return trail.up_to(-1).with_spot(near, -1), replace(found, after=between.unstable)
+    return trail.up_to(-1).with_spot(near, -1), found._replace(after=between.unstable)
 
 
 def switched(
@@ -82,7 +81,7 @@ def switched(
             continue
         wide = descend(fine, saddle, sign)
         if wide is not None and wide.unstable <= found.before and _opens(fine, found, wide):
-            return replace(found, after=saddle.unstable), wide
+            return found._replace(after=saddle.unstable), wide
     return found, None
 
 

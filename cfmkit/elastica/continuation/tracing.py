@@ -5,24 +5,28 @@ How accurate points are is told by the same equilibria on a mesh with half the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.continuation import ending
+from cfmkit.elastica.continuation.joined_marches import follow
+from cfmkit.elastica.continuation.state import PathProblem
 from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.kernels.status_codes import STALLED
 from cfmkit.elastica.model.drive import Control, Drive
 from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.outcome.path import Path, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.critical_points import Singular
-    from cfmkit.elastica.continuation.state import PathProblem, Trail
+    from cfmkit.elastica.continuation.state import Trail
     from cfmkit.elastica.equilibrium.meshed_network import Solver
     from cfmkit.elastica.model.network import Network
-    from cfmkit.elastica.outcome.path import Path
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
 _MOST_SEGMENTS = 512  # of a beam: singular points are looked at with nothing condensed out, for 2000 minutes a solution
@@ -65,8 +69,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     return replace(path, imperfection=name, branch=read_only(branch, np.str_))
 
 
-@dataclass(frozen=True, eq=False)
-class Attempt:
+class Attempt(NamedTuple):
     """A path on one mesh, with its estimated error; `first`: see `joined_marches.Followed`."""
 
     problem: PathProblem
@@ -76,15 +79,12 @@ class Attempt:
 
     def path(self) -> Path:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
-        from cfmkit.elastica.continuation.ending import inaccurate
-        from cfmkit.elastica.outcome.path import Path
-
         problem, trail, tolerance = self.problem, self.trail, self.problem.control.tolerance
         accurate: Any = np.ones(len(trail.points), dtype=bool)
         if not self.error <= tolerance:
             largest = float(largest_force(trail).max())
             accurate = np.array(errors(problem, trail, [*range(len(trail.points))], largest)) <= tolerance
-            trail = inaccurate(problem, trail, self.error, int((~accurate).sum()))
+            trail = ending.inaccurate(problem, trail, self.error, int((~accurate).sum()))
         accurate.setflags(write=False)
         return Path(
             solver=trail.solver,
@@ -103,12 +103,6 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
 
     first_only: only as far as the first bifurcation.
     """
-    from cfmkit.elastica.continuation import ending  # loads the compiler, as do the next ones
-    from cfmkit.elastica.continuation.joined_marches import follow
-    from cfmkit.elastica.continuation.state import PathProblem
-    from cfmkit.elastica.kernels.status_codes import STALLED
-    from cfmkit.elastica.outcome.path import PathStatus
-
     layout = Layout(network, drive)
     mesh, borne = first_mesh(layout, control.tolerance), -1.0
     before: Trail | None = None
@@ -190,10 +184,10 @@ def errors(problem: PathProblem, trail: Trail, indices: list[int], largest: floa
     fine, scale = trail.solver.finer(tolerance), max(1e-12, largest)
     ys, drives, far = trail.points.y[indices], trail.points.drive[indices], 0.1 * max(1.0, scale)
     found = []
-    changes = fine.solve_each(ys, drives)[1]
-    if changes[:, 1].max() > _NOISE * scale and largest < _ROUNDING * _stiffest(fine):
+    changes = fine.solve_each(ys, drives)[1].tolist()
+    if max(change[1] for change in changes) > _NOISE * scale and largest < _ROUNDING * _stiffest(fine):
         scale = 1.0  # nothing bears a load: forces are errors themselves
-    for k, (pose, force, most) in zip(indices, changes.tolist(), strict=True):
+    for k, (pose, force, most) in zip(indices, changes, strict=True):
         found.append(max(pose, force / scale) if most <= far else _across(trail, fine, k, scale, far))
     return found
 

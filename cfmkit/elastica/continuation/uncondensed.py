@@ -8,7 +8,6 @@ shortening without this.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +47,7 @@ def uncondensed(problem: PathProblem, trail: Trail, wrong: int = 0) -> Resume | 
         return None
     if plain.n_segments > _MOST_SEGMENTS:
         return None
-    trail = replace(trail, solver=UncondensedSolver(plain)).up_to(len(trail.points) - wrong)
+    trail = trail.changed(solver=UncondensedSolver(plain)).up_to(len(trail.points) - wrong)
     while _may_be_shorter(problem, trail):
         trail = trail.up_to(-1)
     step = trail.last_step if len(trail.points) > 1 else np.inf

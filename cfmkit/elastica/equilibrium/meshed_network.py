@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -88,12 +89,8 @@ class Points:
     def of(cls, spot: Spot, requested: int) -> Points:
         """Return one equilibrium; `requested` is the number of the requested point that it is, or -1."""
         info = np.zeros((1, _STORED))
-        info[0, [UNSTABLE, REQUESTED, DRIVE_RATE, SHORTNESS]] = (
-            spot.unstable,
-            requested,
-            spot.tangent[-1],
-            spot.shortness,
-        )
+        info[0, UNSTABLE], info[0, REQUESTED] = spot.unstable, requested
+        info[0, DRIVE_RATE], info[0, SHORTNESS] = spot.tangent[-1], spot.shortness
         return cls(spot.y[None], np.array([spot.drive]), info)
 
     @property
@@ -292,9 +289,13 @@ class Solver:
 
     def pose_change(self, one: FloatArray, other: FloatArray) -> float:
         """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
-        change = np.abs(one - other)
-        inner = change[self.n :].reshape(-1, 6)[:, :3]
-        return float(max(inner.max(initial=0.0), change[: self.n_free].max(initial=0.0)))
+        return float(np.abs((one - other)[self._in_poses]).max(initial=0.0))
+
+    @cached_property
+    def _in_poses(self) -> Any:
+        """Which unknowns are positions and rotations."""
+        parts = np.arange(self.n, self.size).reshape(-1, 6)
+        return np.concatenate([np.arange(self.n_free), parts[:, :3].ravel()])
 
     def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the equilibria near ys (k, unknowns) at these drives (k,), and how far they are, (k, 3).

@@ -6,7 +6,8 @@ network is (a clamped column). Where singular points are looked for, their null 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.meshed_network import MarchOptions
     from cfmkit.elastica.kernels.model import DiscreteNetwork
+
+
+_POSE = np.array([0, 1, 2, 2])  # degrees of freedom of a node, as in `DiscreteNetwork.place_dof`
+_LEVEL = np.array([1.0, 0.0])  # cos and sin of a frame that is not turned
 
 
 class ExpandedSolver(Solver):
@@ -32,22 +37,22 @@ class ExpandedSolver(Solver):
         self.inner, self.lasts = inner, plain.beam_segment[1:] - 1
         old_dofs, old_places = len(plain.slot), len(plain.place_dof)
         dof = old_dofs + 3 * np.arange(len(inner))
-        begin, end = np.empty(segments, np.int64), np.empty(segments, np.int64)
-        begin[firsts], end[self.lasts] = plain.beam_end[:, 0], plain.beam_end[:, 1]
-        begin[inner] = old_places + np.arange(len(inner))
-        end[inner - 1] = begin[inner]
+        ends = np.empty((segments, 2), np.int64)
+        ends[firsts, 0], ends[self.lasts, 1] = plain.beam_end[:, 0], plain.beam_end[:, 1]
+        ends[inner, 0] = ends[inner - 1, 1] = old_places + np.arange(len(inner))
         owner = np.cumsum(begins) - 1
         extra = 3 * len(inner)
+        nowhere, held = np.zeros((len(inner), 2)), np.zeros(extra)
         return plain._replace(
             beam_segment=np.arange(segments + 1, dtype=np.int64),
-            beam_end=np.stack([begin, end], axis=1),
+            beam_end=ends,
             line_load=np.ascontiguousarray(plain.line_load[owner]),
-            place_dof=np.concatenate([plain.place_dof, np.stack([dof, dof + 1, dof + 2, dof + 2], axis=1)]),
-            place_frame=np.concatenate([plain.place_frame, np.tile([1.0, 0.0], (len(inner), 1))]),
-            place_origin=np.concatenate([plain.place_origin, np.zeros((len(inner), 2))]),
-            place_arm=np.concatenate([plain.place_arm, np.zeros((len(inner), 2))]),
-            base=np.concatenate([plain.base, np.zeros(extra)]),
-            rate=np.concatenate([plain.rate, np.zeros(extra)]),
+            place_dof=np.concatenate([plain.place_dof, dof[:, None] + _POSE]),
+            place_frame=np.concatenate([plain.place_frame, nowhere + _LEVEL]),
+            place_origin=np.concatenate([plain.place_origin, nowhere]),
+            place_arm=np.concatenate([plain.place_arm, nowhere]),
+            base=np.concatenate([plain.base, held]),
+            rate=np.concatenate([plain.rate, held]),
             slot=np.concatenate([plain.slot, self.plain_free + np.arange(extra)]),
         )
 
@@ -56,13 +61,24 @@ class ExpandedSolver(Solver):
 
     def expand(self, y: FloatArray) -> FloatArray:
         """Return the expanded unknowns for those of a plain solver with the same segments."""
-        beams = len(self.lasts)
-        parts = y[self.plain_free + 3 * beams :].reshape(-1, 6)
-        moved = parts[self.inner, :3]
-        last = np.empty((self.n_segments, 3))
+        expanded: FloatArray = y[self._in_plain]
+        return expanded
+
+    @cached_property
+    def _in_plain(self) -> Any:
+        """Where the expanded unknowns are found among those of a plain solver."""
+        free, whole = self.plain_free, self.plain_free + 3 * len(self.lasts)
+        parts = np.arange(whole, whole + 6 * self.n_segments).reshape(-1, 6)
+        last = np.empty((self.n_segments, 3), np.int64)
         last[self.inner - 1] = parts[self.inner, 3:]
-        last[self.lasts] = y[self.plain_free : self.plain_free + 3 * beams].reshape(-1, 3)
-        return np.concatenate([y[: self.plain_free], moved.ravel(), last.ravel(), parts.ravel()])
+        last[self.lasts] = np.arange(free, whole).reshape(-1, 3)
+        return np.concatenate([np.arange(free), parts[self.inner, :3].ravel(), last.ravel(), parts.ravel()])
+
+    @cached_property
+    def _in_expanded(self) -> Any:
+        """Where the unknowns of a plain solver are found among the expanded ones."""
+        lasts = np.arange(self.n_free, self.n).reshape(-1, 3)[self.lasts]
+        return np.concatenate([np.arange(self.plain_free), lasts.ravel(), np.arange(self.n, self.size)])
 
     def spread(self, tangent: FloatArray) -> FloatArray:
         """Return a tangent or bordering row of a plain solver in the place of these unknowns, zero for all others."""
@@ -74,9 +90,7 @@ class ExpandedSolver(Solver):
 
     def reduce(self, spot: Spot) -> Spot:
         """Return an equilibrium with the unknowns of a plain solver; its tangent is not kept."""
-        forces = spot.y[self.n_free : self.n].reshape(-1, 3)[self.lasts]
-        y = np.concatenate([spot.y[: self.plain_free], forces.ravel(), spot.y[self.n :]])
-        return Spot(y, spot.drive, np.zeros(0), spot.unstable, spot.shortness)
+        return Spot(spot.y[self._in_expanded], spot.drive, np.zeros(0), spot.unstable, spot.shortness)
 
     def shifted(self, y: FloatArray, drive: float, change: FloatArray) -> FloatArray:
         """Return the unknowns with z changed, and the segments' start forces as equilibrium of each asks for."""
@@ -94,11 +108,13 @@ class ExpandedSolver(Solver):
         """Return the poses of both ends of every segment."""
         m = self.model
         values = np.where(m.slot >= 0, y[m.slot], m.base + drive * m.rate)
-        a, b, arm, turn = (values[m.place_dof[:, k]] for k in range(4))
-        (c, s), (ox, oy) = m.place_frame.T, m.place_arm.T
-        x = m.place_origin[:, 0] + c * a - s * b + np.cos(arm) * ox - np.sin(arm) * oy
-        yy = m.place_origin[:, 1] + s * a + c * b + np.sin(arm) * ox + np.cos(arm) * oy
-        poses = np.stack([x, yy, turn], axis=1)
+        a, b, arm, turn = values[m.place_dof.T]
+        (c, s), (ox, oy), (x, yy) = m.place_frame.T, m.place_arm.T, m.place_origin.T
+        co, si = np.cos(arm), np.sin(arm)
+        poses = np.empty((len(a), 3))
+        poses[:, 0] = x + c * a - s * b + co * ox - si * oy
+        poses[:, 1] = yy + s * a + c * b + si * ox + co * oy
+        poses[:, 2] = turn
         return poses[m.beam_end[:, 0]], poses[m.beam_end[:, 1]]
 
 

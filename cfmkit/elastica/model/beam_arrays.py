@@ -77,8 +77,9 @@ class Bundle:
         turned = most > 1 or c.any()
         rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy) if turned else direction(dx, dy)
         self.length, self.scale = distance / own, distance / (own * first)
-        if any(beam.closure == "raw" for beam in beams):
-            raw = np.array([beam.closure == "raw" for beam in beams])
+        closures = [beam.closure for beam in beams]
+        if "raw" in closures:
+            raw = np.array([closure == "raw" for closure in closures])
             rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
             self.length = np.where(raw, first, self.length)
         self.rotation = rotation
@@ -105,7 +106,7 @@ class Bundle:
     def _set_rigidities(self) -> None:
         """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
         sections = [self.beams[k].section for k in self.plain]
-        known = {id(section): _rigidities(section) for section in sections}
+        known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
         self.bending, self.stretch, self.slip = np.array([known[id(section)] for section in sections]).T
 
     @property

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import LoadOn
 
 
-@dataclass(frozen=True)
-class Scales:
+class Scales(NamedTuple):
     """Units of the dimensionless system: length [m], bending rigidity [N m2], drive [its own unit]."""
 
     length: float
@@ -42,8 +40,7 @@ class Scales:
         return self.rigidity / self.length
 
 
-@dataclass(frozen=True)
-class Places:
+class Places(NamedTuple):
     """Attachments: degrees of freedom (n, 4), cos and sin of their frames (n, 2), places and arms (n, 2) [m]."""
 
     dof: Any
@@ -190,7 +187,7 @@ class Layout:
 
         Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.model.HALVES`.
         """
-        length, force, turn = self.scales.length, self.scales.force, self.scales.rigidity / self.scales.length
+        length, force, turn = self.scales.length, self.scales.force, self.scales.moment
         own = [1.0, 1 / length, turn, force / length, force / length, 1 / length]
         return np.array([*own, 1.0, turn, 1.0, 1.0, turn, 1.0, 1.0] if self.bundle.wide else own)
 

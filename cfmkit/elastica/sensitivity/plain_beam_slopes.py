@@ -74,7 +74,7 @@ class PlainSlopes:
         for e, variables in enumerate(own):
             block = np.empty((len(places), TABLE_COLUMNS, len(variables)))
             block[:, 0] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
-            block[:, 1:] = shares[:, :, None] * rest[variables, e].T
+            np.multiply(shares[:, :, None], rest[variables, e].T, out=block[:, 1:])
             blocks.append(block.ravel())
         first = np.cumsum([0, *map(len, own)])
         shifts: Any = self.origin.any(axis=2) | self.arm.any(axis=2)
