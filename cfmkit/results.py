@@ -215,6 +215,8 @@ class Result:
         Motion of the pose that the band ranges are measured around [m or rad].
     allowable_stress : float, optional
         What the column ``max_stress`` is compared with [Pa].
+    stress_overrated : float
+        By what share the model is known to overrate the stress at most: so much above the allowable one is no finding.
     load_cases : tuple of Curve
         Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal one,
         in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
@@ -242,6 +244,7 @@ class Result:
     target_curve: TargetCurve | None = None
     reference: float | None = None
     allowable_stress: float | None = None
+    stress_overrated: float = 0.0
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = None
     winding: WindingPath | None = None

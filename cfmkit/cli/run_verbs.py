@@ -257,6 +257,7 @@ def _number(report: Report, name: str) -> NumberRow:
         return NumberRow(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
     window = left_of(window_of(report.result), report.result)
     rule = _allowed(report) if name == "safety_factor" else ""
+    rule += _overrated(report, name) if name.endswith("safety_factor") else ""
     return NumberRow(words(name), _branches(report, name, report.metrics) + _over(report, name, window) + rule)
 
 
@@ -266,6 +267,15 @@ def _allowed(report: Report) -> str:
     if allowed is None or "allowable_stress" in report.metrics:
         return ""
     return f", of {format_short(allowed, 'stress')}{_rule(report.result.spec)}"
+
+
+def _overrated(report: Report, name: str) -> str:
+    """Return why a safety factor below one is no finding: the model is known to overrate the stress by as much."""
+    factor, share = report.metrics[name].value, report.result.stress_overrated
+    told = {one.name for one in report.result.warnings}
+    if factor is None or "overstressed" in told or not 1 / (1 + share) <= factor < 1:
+        return ""
+    return f" (this model overrates the stress by up to {100 * share:.2g} %)"
 
 
 def _stroke(report: Report) -> str:

@@ -22,7 +22,6 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     STOCKY,
     THICK,
     VBeam,
-    overrated,
 )
 
 if TYPE_CHECKING:
@@ -298,15 +297,16 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     allowed = solution.spec.mechanism.allowable_stress
     if allowed is None:
         return
-    exact = solution.spec.analysis.fidelity in TRACED
-    slack = EXACT_FORM if exact else overrated(float(solution.parts.strip.angle))
     parts = [
-        (push, name, stress)
+        (push, name, stress, allowed * (1 + slack))
         for push in solution.pushes
-        for name, stress in (("spring", push.spring_stress), ("leaves", push.leaves.stress))
+        for name, stress, slack in (
+            ("spring", push.spring_stress, EXACT_FORM),
+            ("leaves", push.leaves.stress, max(solution.overrating, EXACT_FORM)),
+        )
     ]
-    push, name, stress = max(parts, key=lambda part: float(part[2].max()))
-    over = np.flatnonzero(stress > allowed * (1 + slack))
+    push, name, stress, bound = max(parts, key=lambda part: float(part[2].max()) / part[3])
+    over = np.flatnonzero(stress > bound)
     if len(over):
         first, top = int(over[0]), int(stress.argmax())
         place = mm(float(push.travel[first]))

@@ -16,7 +16,7 @@ from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.findings import TOO_SOFT
 from cfmkit.families.vcfm.build import RIM, share_of
-from cfmkit.families.vcfm.findings import PRESSED, ROUNDING, returns
+from cfmkit.families.vcfm.findings import EXACT_FORM, PRESSED, ROUNDING, returns
 from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
 from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
@@ -326,9 +326,11 @@ def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
     allowed = spec.mechanism.allowable_stress
     if allowed is None:
         return np.array(False)
-    leaves, spring = (np.asarray(part.stress(slab.grid[None, :])) for part in (slab.leaf, slab.spring))
-    largest = np.maximum(leaves.max(axis=1, keepdims=True), spring.max(axis=1, keepdims=True))
-    return np.asarray(largest > allowed * (1 + overrated(slab.leaf.strip.angle)))
+    leaves, spring = (
+        np.asarray(part.stress(slab.grid[None, :])).max(axis=1, keepdims=True) for part in (slab.leaf, slab.spring)
+    )
+    slack = np.maximum(overrated(slab.leaf.strip.angle), EXACT_FORM) if isinstance(slab.leaf, VBeam) else EXACT_FORM
+    return np.asarray((leaves > allowed * (1 + slack)) | (spring > allowed * (1 + EXACT_FORM)))
 
 
 def _window(spec: VcfmSpec, slab: Slab) -> tuple[FloatArray, FloatArray]:

@@ -88,6 +88,7 @@ def result_of(solution: Solution) -> Result:
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.allowable_stress,
+        stress_overrated=solution.overrating,
         load_cases=curves[1:],
         closed=DenseCurve(solution),
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}

@@ -13,6 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
+from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
 from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.specs.units import between
@@ -139,6 +140,12 @@ class Solution(ShortRepr):
             np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
         )
         return None if bears or kinds[0] == "straight" else force
+
+    @property
+    def overrating(self) -> float:
+        """By what share the model overrates the stress of the leaves at most, where that is known; else zero."""
+        closed = isinstance(self.parts.leaf, VBeam) and self.spec.analysis.fidelity == "analytic"
+        return float(overrated(self.parts.strip.angle)) if closed else 0.0
 
     @property
     def hindered_curling(self) -> Iterator[tuple[str, float, float]]:
