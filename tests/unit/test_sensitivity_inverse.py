@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.studies.sensitivity.inverse import WIDEST, LimitsAlong, answered
+from cfmkit.studies.sensitivity.output import by_interval, yield_ok
+from cfmkit.studies.sensitivity.tolerance import yield_of
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))
@@ -93,6 +96,21 @@ def test_a_study_states_tolerances_and_judges_parts_within_them():
     assert widths["tolerance_alone"] == pytest.approx(widths["tolerance_together"], rel=1e-6)
     assert 0.006 < widths["tolerance_alone"] / 0.69 < 0.02
     assert found.summary["yield"]["value"] == pytest.approx(0.95, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("method", "good", "ok", "by_chance"),
+    [
+        ("inverse", 156, True, True),  # 78 % of 200, 71.8 to 83.2 %
+        ("inverse", 146, False, False),  # 73 %, 66.5 to 78.7 %
+        ("inverse", 160, True, False),
+        ("tolerance", 156, False, False),  # tolerances that somebody stated do not aim at a yield
+    ],
+)
+def test_stated_tolerances_miss_their_yield_where_the_parts_rule_it_out_and_not_by_chance(method, good, ok, by_chance):
+    share = yield_of(np.arange(200) < good, np.zeros(200, dtype=bool), "fail")
+    found = SimpleNamespace(setup=SimpleNamespace(block=SimpleNamespace(min_yield=0.8), method=method), all_met=share)
+    assert (yield_ok(found), by_interval(found)) == (ok, by_chance)
 
 
 def test_a_cost_of_no_parameter_is_refused():

@@ -283,9 +283,13 @@ def _page(found: Findings, written: Written, everything: bool) -> Iterator[Block
 
 
 def _yields(found: Findings, share: Yield) -> CellGrid:
+    from cfmkit.studies.sensitivity.output import by_interval, yield_ok
+
     wanted = found.setup.block.min_yield
     bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
-    ok = None if wanted is None else share.value >= wanted
+    ok = None if wanted is None else yield_ok(found)
+    if by_interval(found):
+        bound += " (in the interval)"
     rows: list[tuple[str | Span, ...]] = [(Span("  yield", LABEL), _share(share), bound, verdict(ok))]
     for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
         limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
