@@ -329,6 +329,8 @@ class Design:
         Paragraphs of the page: the word that begins each, and the text.
     tables : mapping
         Name of a CSV file without its ending -> what makes it.
+    next_best : tuple of callable
+        What makes the designs with other bought springs, the best first: for who finds this one lacking.
     """
 
     spec: Spec | None
@@ -340,6 +342,7 @@ class Design:
     search: Mapping[str, Searched] = field(default_factory=dict)
     notes: tuple[tuple[str, str], ...] = ()
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
+    next_best: tuple[Callable[[], Design], ...] = ()
 
     def __post_init__(self) -> None:
         """Fall back to the status's sentence."""

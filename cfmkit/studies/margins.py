@@ -64,6 +64,9 @@ SEARCH_SEED = 7919
 CHECKED, ROUNDS, MOST_ASKED = 400, 4, 0.9975
 """Parts that are solved to see whether the estimate holds, how often more is then requested, and for how much."""
 
+OTHER_SPRINGS = 4
+"""Choices of bought springs that are tried where the best one misses the yield."""
+
 LOWER = 4
 """How often less is requested where a yield is not reached: the largest is then known to a sixteenth of what lacks."""
 
@@ -244,6 +247,8 @@ def _plain(kind: str, text: str) -> Any:
 def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     """Return a design whose made parts are good as often as `design.yield` asks, moved from one that was found.
 
+    Where none is, the next springs of a catalogue are tried.
+
     Parameters
     ----------
     given : Spec
@@ -253,34 +258,60 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     run : Run
         Seed, progress, time budget.
     """
+    others = design.next_best[:OTHER_SPRINGS]
+    good, found = _moved(given, design, run, not others)
+    if not others or design.spec is None or found.spec is not None:
+        return found
+    tried, clock = [(good, design)], Clock.of(run.time_budget)
+    for make in others:
+        other = make()
+        if other.spec is None or clock.late():
+            continue
+        good, found = _moved(given, other, run, False)
+        if found.spec is not None and good:  # without a part that was solved nothing is known of its yield
+            told = f"{len(tried)} with a smaller deviation miss the yield that is requested"
+            return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {told}")))
+        tried.append((good, other))
+    _, found = _moved(given, max(tried, key=lambda one: one[0])[1], run, True)
+    told = f"the best {len(tried)} choices of the catalogue's springs were tried"
+    return replace(found, message=f"{found.message}; {told}") if len(tried) > 1 else found
+
+
+def _moved(given: Spec, design: Design, run: Run, largest: bool) -> tuple[int, Design]:
+    """Return how many of `CHECKED` parts are good, where some were solved, and the design moved for its yield.
+
+    `largest`: whether the largest yield is looked for where the requested one is not found.
+    """
     block = getattr(given, "design", None)
     wanted = getattr(block, "yield", None)
     if design.spec is None or block is None or wanted is None:
-        return design
+        return 0, design
     free = free_of(given, design.spec)
     nominal = family(given.family).analyze(design.spec, run)
     made = tolerances_of(design.spec, block, run.seed)
     if made is None or nominal.status is not Status.COMPLETE:
-        return design
+        return 0, design
     places = places_of(nominal)
     first = sampled_of(design.spec, places, run)
     if first is None:
-        return replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
+        return 0, replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
     sight = Sight(design.spec, tuple(free), made, rows_of(nominal, first, places), run)
     problem = _problem(sight, free, wanted, run)
     start = np.array([float(design.spec.at(path)) for path in free])
     try:
-        found, good = _held(problem, sight, start)
+        found, good = _held(problem, sight, start, largest)
         if block.robust is not None and free:
             again = drawn(problem, found, DRAWN, block.robust == "worst")
             better = checked(sight, again.x)
             found, good = (again, better) if better >= good else (found, good)
     except NoPart:
-        return replace(design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins")))
-    return _designed(design, sight, found, good, problem)
+        return 0, replace(
+            design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins"))
+        )
+    return good, _designed(design, sight, found, good, problem)
 
 
-def _held(problem: RobustProblem, sight: Sight, start: FloatArray) -> tuple[RobustResult, int]:
+def _held(problem: RobustProblem, sight: Sight, start: FloatArray, largest: bool = True) -> tuple[RobustResult, int]:
     """Return the design with margins and how many of `CHECKED` parts are good; more is requested until enough are."""
     best: tuple[RobustResult, int] | None = None
     asked, x, began = problem.share, start, None
@@ -295,7 +326,7 @@ def _held(problem: RobustProblem, sight: Sight, start: FloatArray) -> tuple[Robu
             break
         asked, x = min(MOST_ASKED, max(found.share, asked) + 0.5 * short), found.x
     assert best is not None
-    return _largest(problem, sight, start, best) if _misses(best[1], problem) else best
+    return _largest(problem, sight, start, best) if largest and _misses(best[1], problem) else best
 
 
 def _misses(good: int, problem: RobustProblem) -> bool:

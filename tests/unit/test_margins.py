@@ -262,3 +262,49 @@ def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path
     assert "youngs_modulus" in found["message"]
     # the force follows E: of parts 12 % off 73 % are within 0.2 N of 1.5 N
     assert 60 <= float(found["nearest_feasible"]["design.yield"].removesuffix(" %")) <= 85
+
+
+def with_three_springs(elongation):
+    springs = [
+        {"name": name, "stiffness": f"{rate} N/mm", "max_elongation": "300 mm", "counts": [2]}
+        for name, rate in (("soft", 0.30), ("middle", 0.35), ("stiff", 0.40))
+    ]
+    longest = {"metric": "spring_elongation_max", "max": elongation}
+    return cfmkit.load("configs/cam_catalogue.yaml").replace(
+        {
+            "analysis.window": ("5 mm", "100 %"),
+            "requirements": (longest, {"metric": "deviation_from_target", "max": "3 %"}),
+            "design.catalogue": springs,
+            "design.tolerances": {"mechanism.brace_length": {"normal": "0.1 mm"}},
+            "design.yield": "90 %",
+        }
+    )
+
+
+@pytest.mark.parametrize("elongation", ["158.5 mm", pytest.param("150 mm", marks=pytest.mark.slow)])
+def test_the_next_springs_of_a_catalogue_are_tried_where_the_best_ones_miss_the_yield(elongation, monkeypatch):
+    """They need 169 mm for the stroke, the next best 183 mm, the third 158.1 mm."""
+    for name, value in (("CHECKED", 20), ("ROUNDS", 1), ("LOWER", 0)):
+        monkeypatch.setattr(margins, name, value)
+    given = with_three_springs(elongation)
+    others = cfmkit.design(given.replace({"design.yield": None})).next_best
+    assert [make().spec.mechanism.springs.name for make in others] == ["soft", "stiff"]
+    found = cfmkit.design(given)
+    if elongation == "150 mm":
+        assert found.spec is None
+        assert found.nearest_feasible == {"design.yield": "0 %"}
+        assert found.message.endswith("; the best 3 choices of the catalogue's springs were tried")
+    else:
+        assert found.spec.mechanism.springs.name == "stiff"
+        assert "2 with a smaller deviation miss the yield" in dict(found.notes)["springs"]
+
+
+@pytest.mark.parametrize("name", ["slider_crank_bought", "vcfm_bought_springs"])
+def test_designs_with_other_springs_follow_the_best_one(name):
+    best = cfmkit.design(f"configs/{name}.yaml")
+    other = best.next_best[0]()
+    assert other.spec is not None
+    assert other.spec.mechanism.springs != best.spec.mechanism.springs
+    if name == "slider_crank_bought":
+        off = [cfmkit.evaluate(one.spec, ["deviation_from_target"]) for one in (best, other)]
+        assert off[0]["deviation_from_target"].value < off[1]["deviation_from_target"].value

@@ -13,7 +13,8 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from math import isclose
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +90,14 @@ def design(spec: CamSpec, run: Run) -> Design:
         return no_design(problem.finding, problem.nearest)
 
 
+def _with_next(spec: CamSpec, target: CamDesign, factor: float, choice: Choice) -> Design:
+    """Return the design with springs that are not the best of the catalogue."""
+    try:
+        return _with_choice(spec, target, factor, choice)
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+
+
 def _design(spec: CamSpec, target: CamDesign) -> Design:
     if target.target is not None:
         check_target(target)
@@ -96,13 +105,15 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
     _check_beginning(spec, target, factor)
     smallest = None if target.choose == "preload" else _smallest_constant(spec, target, factor)
     _check_room(spec)
-    ways = {
-        "force-constant": _from_springs,
-        "stiffness": _from_constant,
-        "catalogue": _from_catalogue,
-        "preload": _with_preload,
-    }
-    choice = ways[target.choose](spec, target, pull, factor, smallest)
+    if target.choose == "catalogue":
+        best, *others = _from_catalogue(spec, target, pull, factor, smallest)
+        next_best = tuple(partial(_with_next, spec, target, factor, one) for one in others)
+        return replace(_with_choice(spec, target, factor, best), next_best=next_best)
+    ways = {"force-constant": _from_springs, "stiffness": _from_constant, "preload": _with_preload}
+    return _with_choice(spec, target, factor, ways[target.choose](spec, target, pull, factor, smallest))
+
+
+def _with_choice(spec: CamSpec, target: CamDesign, factor: float, choice: Choice) -> Design:
     law = _law(spec, target, choice.force_constant, factor, choice.preload)
     _check_stroke(law, target, choice.springs)
     _check_bend(spec, law, target)
@@ -259,8 +270,10 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
     return Choice(constant, springs, preload=spec.mechanism.preload)
 
 
-def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
-    """Pick the spring and number whose cam has the smallest two-way deviation, within all limits."""
+def _from_catalogue(
+    spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None
+) -> list[Choice]:
+    """Return the springs and numbers within all limits, the one whose cam has the smallest two-way deviation first."""
     tried = [
         _with_spring(spec, target, (pull, factor, smallest), item, count)
         for item in offers(target.catalogue, "extension")
@@ -268,7 +281,7 @@ def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float
     ]
     fitting = [one for one in tried if not isinstance(one, Miss)]
     if fitting:
-        return min(fitting, key=lambda pair: pair[0])[1]
+        return [choice for _, choice in sorted(fitting, key=lambda pair: pair[0])]
     rejected = [one for one in tried if isinstance(one, Miss)]
     if not rejected:
         none = "the catalogue has no extension spring, which is what pulls the rollers together"

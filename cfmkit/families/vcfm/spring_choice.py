@@ -8,6 +8,7 @@ model only their width is fitted, since nothing of a bought spring can be change
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -113,12 +114,11 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
             (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
         )
         missed = [one for one in tried if isinstance(one, Miss)]
-        if not target.refine and fitting:
-            return _made(spec, target, fitting[0])
-        for one in fitting[:TRIED]:
-            found = _fitted(spec, target, one)
+        for number, one in enumerate(fitting[:TRIED], 1):
+            found = _fitted(spec, target, one) if target.refine else one
             if isinstance(found, LeavesAroundSprings):
-                return _made(spec, target, found)
+                others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:TRIED])
+                return replace(_made(spec, target, found), next_best=others)
             missed.append(found)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
@@ -127,6 +127,17 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     return no_design(
         finding("no_spring_fits", f"{told} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")
     )
+
+
+def _with_next(spec: VcfmSpec, target: VcfmDesign, one: LeavesAroundSprings) -> Design:
+    """Return the design around springs that are not the best of the catalogue."""
+    try:
+        found = _fitted(spec, target, one) if target.refine else one
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    if isinstance(found, Miss):
+        return no_design(finding("no_spring_fits", nearest([found])))
+    return _made(spec, target, found)
 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:

@@ -99,6 +99,13 @@ def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {told}{allowed}"))
 
 
+def next_sets(task: Task, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
+    """Return the sets of springs that hold the target best after the one that `choose` takes, within the tolerance."""
+    most = np.inf if task.wanted.tolerance is None else task.wanted.tolerance * (1 + 1e-9)
+    found = _sets(goal, _options(task, window)[0], 1 + count)[1:]
+    return [one for one in found if one.deviation <= most]
+
+
 def least_deviation(task: Task, goal: RateGoal, window: tuple[float, float]) -> float:
     """Return the deviation of the springs of the catalogue that hold the target best; infinite where none do."""
     found = _sets(goal, _options(task, window)[0], 1)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion
-from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation
+from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
 from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,
     about_springs,
@@ -58,6 +59,9 @@ if TYPE_CHECKING:
 HOPELESS = 0.5
 """Springs that miss the target by more are no design, even where no tolerance is stated."""
 
+NEXT = 4
+"""Sets of bought springs that are tried where the best one does not have the yield."""
+
 EFFORT = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
 
@@ -83,11 +87,42 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     try:
         solved, search = _searched(spec, wanted, run)
         solved = _compensated(solved)
-        solved = _kept(audited(solved, _written(solved)))
+        found = _made(solved, search)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
     except CannotBuild as problem:
         return no_design(problem.finding)
+    others = range(NEXT if solved.bought else 0)
+    return replace(found, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
+
+
+def _with_next(solved: Solved, rank: int) -> Design:
+    """Return the design with springs that are not the best of the catalogue, with the same lengths."""
+    goal = solved.task.goal(solved.window, _places(solved.task.wanted))
+    sets = [] if goal is None else next_sets(solved.task, goal, solved.window, NEXT)
+    if goal is None or rank >= len(sets):
+        return no_design(finding("no_spring_fits", "no other springs of the catalogue hold the target"))
+    one = sets[rank]
+    try:
+        return _made(
+            replace(
+                solved,
+                rates=one.rates,
+                deviation=one.deviation,
+                rms=goal.rms(one.rates),
+                bought=one.options,
+                exact=False,
+            ),
+            None,
+        )
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+
+
+def _made(solved: Solved, search: Lowest | None) -> Design:
+    """Return what was found as a design, audited."""
+    wanted = solved.task.wanted
+    solved = _kept(audited(solved, _written(solved)))
     warnings = (*about_springs(solved), *alternatives(solved, search))
     if wanted.window is None and (search is not None or not solved.proven):
         warnings = (*warnings, not_proven(solved, search is not None))
@@ -203,6 +238,11 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> fl
     return deviation
 
 
+def _places(wanted: CrankDesign) -> int | None:
+    """Return at how many places of the window springs are chosen; None: as many as a search takes."""
+    return None if wanted.objective == "least-squares" else DENSE
+
+
 def solve(task: Task, tolerance: float | None = None) -> Solved:
     """Return the best springs for given lengths, for the design's tolerance or another one.
 
@@ -220,7 +260,7 @@ def solve(task: Task, tolerance: float | None = None) -> Solved:
     else:
         window = wanted.window
         check_reach(task, window)
-    goal = task.goal(window, None if wanted.objective == "least-squares" else DENSE)
+    goal = task.goal(window, _places(wanted))
     if goal is None:
         text = "in the window the force or torque is unbounded: it contains a dead point or the stretched position"
         text += f"; change 'design.{task.assembly.motion_name}'"
