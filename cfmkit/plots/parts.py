@@ -52,11 +52,21 @@ def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
         ax.add_artist(PathPatch(shape, facecolor=PLATE, edgecolor=GREY, linewidth=0.7, zorder=1.2, gid=gid))
 
 
+def _line(ax: Axes, x: Any, y: Any, **look: Any) -> None:
+    """Draw a line; the limits of the axes do not follow it: they are those of `to_scale`.
+
+    `Axes.plot` takes four times as long, to find limits and units and the next colour.
+    """
+    from matplotlib.lines import Line2D
+
+    ax.add_artist(Line2D(x, y, **look))
+
+
 @styled
 def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
     """Draw a chain of points (n, 2) as a line: a flank, a path."""
     look: dict[str, Any] = {"color": INK, "linewidth": 0.9, "zorder": 1.6} | options
-    ax.plot(*mm(points).T, gid=gid, **look)
+    _line(ax, *mm(points).T, gid=gid, **look)
 
 
 @styled
@@ -69,14 +79,14 @@ def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: b
     if ghost:
         circle.set(facecolor="none", edgecolor=GREY, linestyle="--")
     ax.add_artist(circle)
-    ax.plot(x, y, marker="o", markersize=2.2, color=GREY if ghost else INK, zorder=4)
+    _line(ax, [x], [y], marker="o", markersize=2.2, color=GREY if ghost else INK, zorder=4)
 
 
 @styled
 def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
     """Draw a rigid link between two pins."""
-    ax.plot(
-        *mm([start, end]).T, color=LINK, linewidth=2.0, marker="o", markersize=3.0,
+    _line(
+        ax, *mm([start, end]).T, color=LINK, linewidth=2.0, marker="o", markersize=3.0,
         markerfacecolor="white", markeredgewidth=0.8, zorder=3, gid=gid,
     )  # fmt: skip
 
@@ -92,7 +102,7 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     side = np.zeros(len(share))
     side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
     points = a + np.outer(share, along) + np.outer(side, across)
-    ax.plot(*mm(points).T, color=OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
+    _line(ax, *mm(points).T, color=OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
 @styled
@@ -108,7 +118,7 @@ def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
 @styled
 def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
     """Draw the vertical axis x = 0 as a dash-dotted line."""
-    ax.plot([0.0, 0.0], mm([low, high]), color=GREY, linewidth=0.6, dashes=(9, 2.5, 1.5, 2.5), zorder=1.1, gid="axis")
+    _line(ax, [0.0, 0.0], mm([low, high]), color=GREY, linewidth=0.6, dashes=(9, 2.5, 1.5, 2.5), zorder=1.1, gid="axis")
 
 
 @styled
@@ -135,7 +145,9 @@ def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
 def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
     x, y = mm(point)
-    ax.plot(x, y, marker="o", markersize=3.2, color=VERMILLION, markeredgewidth=0, zorder=4.5, gid=gid, linestyle="")
+    _line(
+        ax, [x], [y], marker="o", markersize=3.2, color=VERMILLION, markeredgewidth=0, zorder=4.5, gid=gid, linestyle=""
+    )
 
 
 @styled
