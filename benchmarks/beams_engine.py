@@ -9,8 +9,8 @@ Where the time goes (processor time, one core of an EPYC): of Lan's curve at 1e-
 0.24 of it 36 iterations of Newton's method in the march: four tenths are drifts, kicks and assembly, four tenths the
 system of 18 unknowns, solved and its inertia counted. The rest is Python: the network 0.02, its numbers and fits 0.09,
 tables and arrays 0.05, around the march 0.08, the error's second mesh 0.07, path and forces 0.05; no line of it takes
-more than 0.01 ms. Of the cantilever's 0.34 ms 0.05 are compiled. A V-beam takes 3.3 ms: 1.0 compiled, half of that 17
-solutions of 45 unknowns on the finer mesh on which its bifurcations are placed, and 2.3 the decisions there, in Python;
+more than 0.01 ms. Of the cantilever's 0.30 ms 0.05 are compiled. A V-beam takes 2.9 ms: 1.0 compiled, half of that 17
+solutions of 45 unknowns on the finer mesh on which its bifurcations are placed, and 1.9 the decisions there, in Python;
 on the mesh that is marched on they take no less. Thirteen gradients
 take 1.05 ms beside a curve of 0.68 ms at 1e-5: 0.40 compiled, 0.23 the thirteen networks that the caller builds, the
 rest their plain slopes in Python, no function more than 0.05. A design of a batch takes 0.75 ms: 0.29 compiled in three
