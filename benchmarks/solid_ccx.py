@@ -1,8 +1,10 @@
-"""Solids by cfmkit and by CalculiX, on the same meshes: `python benchmarks/solid_ccx.py [SPEC ...]`.
+"""Solids by cfmkit and by CalculiX, on the same meshes: `python benchmarks/solid_ccx.py [--3d] [SPEC ...]`.
 
 Needs ``ccx`` (Debian: calculix-ccx). Every deck of `cfmkit export --format inp` is run to its end; its largest reaction
 is set beside the force that cfmkit finds for the same part, mesh and travel. CalculiX stays on the form that Newton's
 method leads to, cfmkit on the stable branch: compare parts before they buckle.
+
+With ``--3d`` the coarser mesh is extruded over half the width to 15-node wedges: what plane stress leaves out.
 """
 
 from __future__ import annotations
@@ -14,11 +16,16 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import cfmkit
 from cfmkit.families import family
+from cfmkit.solid.meshed_part import COARSER
+
+if TYPE_CHECKING:
+    from cfmkit.solid.two_meshes import DrivenPart
 
 SPECS = {
     "configs/vcfm_u_shape.yaml": ["analysis.travel=0.8 mm"],
@@ -44,21 +51,89 @@ def by_ccx(data: bytes) -> tuple[float, float]:
 
 def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
     """Return the same of every part of a specification, in the order of its decks."""
-    found = []
-    for one in family(spec.family).driven_parts(spec):
-        solved = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
-        supports, pose = solved.problem.supports, solved.course.poses[-1]
-        forces = solved.problem.elements.forces(solved.moved(pose))
-        found.append(float(np.hypot(*supports.reactions(pose.unknowns, pose.travel, forces)[:, :2].T).max()))
-    return found
+    return [reaction(one, one.size) for one in family(spec.family).driven_parts(spec)]
+
+
+LAYERS, GRADED = 3, 1.5
+"""Wedges over half the width, thinner towards the free side."""
+
+
+def extruded(one: DrivenPart) -> bytes:
+    """Return a deck of the part in three dimensions, one half of its width, moved as in the plane."""
+    meshed = one.part.meshed(COARSER * one.size)
+    grid, widths = meshed.problem.elements.mesh, meshed.problem.elements.width
+    if np.ptp(widths) > 0:
+        raise ValueError("several widths")
+    width = 0.5e3 * float(widths.max())
+    heights = width * (1 - (1 - np.linspace(0.0, 1.0, 2 * LAYERS + 1)) ** GRADED)
+    corners = np.unique(grid.triangles[:, :3])
+    used = np.unique(grid.triangles)
+    number: dict[tuple[int, int], int] = {}
+    lines = ["*NODE, NSET=ALL"]
+    for layer, z in enumerate(heights.tolist()):
+        for k in (used if layer % 2 == 0 else corners).tolist():
+            number[k, layer] = len(number) + 1
+            x, y = (1e3 * grid.nodes[k]).tolist()
+            lines.append(f"{number[k, layer]}, {x:.10g}, {y:.10g}, {z:.10g}")
+    lines.append("*ELEMENT, TYPE=C3D15, ELSET=PART")
+    wedges = [(row, 2 * layer) for layer in range(LAYERS) for row in grid.triangles.tolist()]
+    for count, (row, low) in enumerate(wedges, start=1):
+        places = [(k, at) for part in (row[:3], row[3:]) for at in (low, low + 2) for k in part]
+        places += [(k, low + 1) for k in row[:3]]
+        words = [str(number[place]) for place in places]
+        lines += [f"{count}, {', '.join(words[:10])},", ", ".join(words[10:])]
+    law = one.part.law
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", f"{1e-6 * law.youngs_modulus:.10g}, {law.poisson_ratio:.10g}"]
+    lines += ["*SOLID SECTION, ELSET=PART, MATERIAL=M", "*NSET, NSET=MIDDLE"]
+    lines += [f"{place}," for (_, layer), place in number.items() if layer == 0]
+    moves = ["MIDDLE, 3, 3, 0"]
+    prints: list[str] = []
+    for group in meshed.problem.supports.groups:
+        if group.free.shape[1]:
+            raise ValueError(f"{group.name} moves freely")
+        held, word = set(group.nodes.tolist()), f"G{len(prints)}"
+        lines += [f"*NSET, NSET={word}", *(f"{place}," for (k, _), place in number.items() if k in held)]
+        moves += [f"{word}, {k + 1}, {k + 1}, {1e3 * one.stops[-1] * group.driven[k]:.10g}" for k in (0, 1)]
+        prints += [f"*NODE PRINT, NSET={word}, TOTALS=ONLY", "RF"]
+    lines += ["** widths are 0.5 times those of the part", "*STEP, NLGEOM, INC=100", "*STATIC", "0.25, 1., 1e-6, 0.25"]
+    return "\n".join([*lines, "*BOUNDARY", *moves, *prints, "*END STEP", ""]).encode("ascii")
+
+
+def in_three_dimensions(names: list[str]) -> None:
+    """Print a line per part: in three dimensions, and in plane stress."""
+    print("| part | width over thickness | ccx, 3D [N] | cfmkit, plane stress [N] | 3D over plane stress | ccx [s] |")
+    print("|---|---|---|---|---|---|")
+    for name, changes in ({one: SPECS.get(one, []) for one in names} or SPECS).items():
+        spec = cfmkit.load(name, ["analysis.fidelity=solid", *changes])
+        for one in family(spec.family).driven_parts(spec):
+            own = reaction(one, COARSER * one.size)
+            try:
+                other, took = by_ccx(extruded(one))
+            except (ValueError, subprocess.CalledProcessError) as error:
+                print(f"| {Path(name).stem} {one.name} | {str(error)[:60]} | | | | |")
+                continue
+            wide = one.part.width / one.part.thinnest
+            told = f"{other:.4f} | {own:.4f} | {100 * (other / own - 1):+.1f} % | {took:.1f}"
+            print(f"| {Path(name).stem} {one.name} | {wide:.3g} | {told} |", flush=True)
+
+
+def reaction(one: DrivenPart, size: float) -> float:
+    """Return the largest reaction of a part at the end of its travel by cfmkit [N]."""
+    solved = one.part.meshed(size).followed(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
+    supports, pose = solved.problem.supports, solved.course.poses[-1]
+    forces = solved.problem.elements.forces(solved.moved(pose))
+    return float(np.hypot(*supports.reactions(pose.unknowns, pose.travel, forces)[:, :2].T).max())
 
 
 def main(names: list[str]) -> None:
     """Print a line per part."""
     if shutil.which("ccx") is None:
         sys.exit("ccx is not installed (Debian: calculix-ccx)")
+    if "--3d" in names:
+        in_three_dimensions([name for name in names if name != "--3d"])
+        return
     print("| part | ccx [N] | cfmkit [N] | difference | ccx [s] |\n|---|---|---|---|---|")
-    for name, changes in ({one: [] for one in names} or SPECS).items():
+    for name, changes in ({one: SPECS.get(one, []) for one in names} or SPECS).items():
         try:
             spec = cfmkit.load(name, ["analysis.fidelity=solid", *changes])
             files = cfmkit.export(spec, format="inp")
