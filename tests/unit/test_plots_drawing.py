@@ -113,3 +113,18 @@ def test_a_drawing_with_stated_tolerances_names_the_process_too():
     assert "kerf 0.2 mm" in found
     assert "mechanism.springs.stiffness: normal 2 %" in found
     assert "position +-" not in found
+
+
+@pytest.mark.parametrize(
+    ("name", "across"), [("beam_lan2010", 69e-3), ("beam_two_layers", 69e-3), ("vcfm_ding2022", None)]
+)
+def test_a_drawing_says_how_far_apart_the_clamps_are(name, across):
+    spec = cfmkit.load(CONFIGS / f"{name}.yaml")
+    found = {one.name: one.value for one in part_of(spec).dimensions}
+    if across is None:  # a leaf on each side of the shuttle
+        across = 2 * found["span of a leaf"] + found["shuttle"]
+    assert found["across clamps"] == pytest.approx(across, rel=1e-12)
+
+
+def test_one_clamp_is_at_no_distance_from_another():
+    assert [one.name for one in part_of(cfmkit.load(CONFIGS / "beam_cantilever.yaml")).dimensions] == ["tip from root"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -252,17 +252,28 @@ def _all_strips(assembly: Assembly) -> Iterator[BeamStrip]:
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
-    """Yield where the driven node is from the first one that is held."""
+    """Yield how far what is held reaches, its mirror image included, and where the driven node is from the first."""
     nodes = assembly.network.nodes
     driven = assembly.spec.mechanism.drive.node
-    held = next((name for name, node in nodes.items() if node.support.along and node.support.across), None)
-    if held is None or driven not in nodes:
+    held = {name: node for name, node in nodes.items() if node.support.along and node.support.across}
+    if not held:
         return
-    start, end = ((nodes[name].x, nodes[name].y) for name in (held, driven))
-    words = f"{driven} from {held}"
-    for along, distance in (("x", end[0] - start[0]), ("y", end[1] - start[1])):
-        if abs(distance) > ROUGH:
-            yield DrawnDimension(words, start, end, "x" if along == "x" else "y")
+    at, axis = np.array([(node.x, node.y) for node in held.values()]), mirror_axis(assembly)
+    at = at if axis is None else np.vstack([at, mirrored(at, *axis)])
+    words = "across clamps" if all(node.support.rotation for node in held.values()) else "across supports"
+    first, last = at[at.argmin(axis=0)], at[at.argmax(axis=0)]
+    yield from _distances(words, first[0], last[0], ("x",))
+    yield from _distances(words, first[1], last[1], ("y",))
+    if driven in nodes and driven not in held:
+        yield from _distances(
+            f"{driven} from {next(iter(held))}", at[0], (nodes[driven].x, nodes[driven].y), ("x", "y")
+        )
+
+
+def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
+    for axis in along:
+        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > ROUGH:
+            yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)
 
 
 def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:

@@ -110,13 +110,14 @@ def _box(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
 
 
 def _dimensions(spec: VcfmSpec) -> Iterator[DrawnDimension]:
-    """Yield the span and the rise of a leaf, and the shuttle's width."""
+    """Yield the span and the rise of a leaf, the shuttle's width, and how far apart the clamped ends are."""
     about, half = spec.mechanism.bistable, 0.5 * spec.mechanism.frame.shuttle_width
     strip = strip_of(about, spec.mechanism.material)
     reach, rise = float(strip.reach), float(strip.rise)
     yield DrawnDimension("rise h", (half, 0.0), (half + reach, -rise), "y")
     yield DrawnDimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
     yield DrawnDimension("shuttle", (-half, 0.0), (half, 0.0), "x")
+    yield DrawnDimension("across clamps", (-half - reach, -rise), (half + reach, -rise), "x")
     sizes = _sizes(spec)
     if sizes.stopped:
         yield DrawnDimension("stop", (sizes.out, sizes.wall_top), (sizes.out, sizes.under), "y")
