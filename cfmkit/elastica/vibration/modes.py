@@ -28,6 +28,8 @@ _TIED = 1e-10  # share of the largest row from which a constraint counts: a stra
 _NEUTRAL = 1e-9  # share of the largest stiffness, all of similar size, within which a direction has none
 _REAL = 1e-5  # share of a square of a frequency that its imaginary part is at least where two have met: roots that meet
 # are a square root of rounding apart
+_SMALL = 200  # unknowns up to which all frequencies are as quick as a few
+_SPARE, _MOST_ROUNDS, _SETTLED = 16, 40, 1e-12  # modes beside those wanted; rounds; share of a value that it changes by
 _RESOLVED = 3  # so many times the modes wanted are examined for flutter: higher ones of the basis are no modes of beams
 
 
@@ -149,8 +151,8 @@ def _symmetric(stiffness: FloatArray, mass: FloatArray, count: int) -> FloatArra
 
     found = np.full(count, np.nan)
     stiffness, mass = _evened(stiffness, mass)
-    neutral = 0
-    if not _firm(stiffness):
+    neutral, factor = 0, _firm_factor(stiffness)
+    if factor is None:
         values, vectors = np.linalg.eigh(stiffness)
         neutral = int((values < _NEUTRAL * values[-1]).sum())
         moving = mass @ vectors[:, :neutral]
@@ -164,19 +166,43 @@ def _symmetric(stiffness: FloatArray, mass: FloatArray, count: int) -> FloatArra
     lowest = min(max(count - neutral, 0), n)
     found[:neutral] = 0.0
     if lowest:
-        inverse = eigh(mass, stiffness, eigvals_only=True, subset_by_index=[n - lowest, n - 1])[::-1]
+        known = None if factor is None or n <= _SMALL else _largest(mass, factor, lowest)
+        if known is None:
+            known = eigh(mass, stiffness, eigvals_only=True, subset_by_index=[n - lowest, n - 1])[::-1]
+        inverse = known
         inverse = inverse[inverse > np.finfo(float).eps * inverse[0]]  # what has no mass does not swing
         found[neutral : neutral + len(inverse)] = 1.0 / inverse
     return found
 
 
-def _firm(stiffness: FloatArray) -> bool:
-    """Tell whether a matrix of ones on its diagonal is positive definite by more than rounding."""
+def _firm_factor(stiffness: FloatArray) -> FloatArray | None:
+    """Return Cholesky's factor of a matrix of ones on its diagonal, None unless positive by more than rounding."""
     try:
         factor = np.linalg.cholesky(stiffness)
     except np.linalg.LinAlgError:
-        return False
-    return bool((np.diag(factor) ** 2 > _NEUTRAL).all())
+        return None
+    return np.asarray(factor) if (np.diag(factor) ** 2 > _NEUTRAL).all() else None
+
+
+def _largest(mass: FloatArray, factor: FloatArray, count: int) -> FloatArray | None:
+    """Return the largest values of M v = mu K v, falling, by iteration of a subspace; None where that does not settle.
+
+    `factor` is Cholesky's of K. A subspace, and not one vector, so that equal frequencies are found as often as they
+    occur: it is wider than the modes wanted, so few rounds do.
+    """
+    from scipy.linalg import solve_triangular
+
+    known: Any = np.zeros(count)
+    motions: Any = np.random.default_rng(0).standard_normal((len(mass), 3 * count + _SPARE))
+    for _ in range(_MOST_ROUNDS):
+        motions, _ = np.linalg.qr(motions)
+        bent = solve_triangular(factor, motions, lower=True, trans=1)
+        image = solve_triangular(factor, mass @ bent, lower=True)
+        found = np.linalg.eigvalsh(motions.T @ image)[::-1][:count]
+        if (np.abs(found - known) <= _SETTLED * found).all():
+            return np.asarray(found)
+        motions, known = image, found
+    return None
 
 
 def _evened(stiffness: FloatArray, *others: FloatArray) -> tuple[FloatArray, ...]:
