@@ -23,8 +23,8 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.families.cam.dynamics.build import build
 from cfmkit.families.cam.dynamics.inverse import respond
+from cfmkit.families.cam.dynamics.machine_from_spec import build
 from cfmkit.families.cam.dynamics.multibody import NineCoordinates, Scheme
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "cam_dynamics.yaml"

@@ -20,11 +20,11 @@ import numpy as np
 import cfmkit
 from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.design import form_of, task_of
 from cfmkit.families.slider_crank.printed.model import chain_of
-from cfmkit.families.slider_crank.printed.search import search
 from cfmkit.families.slider_crank.printed.sqp_program import StripProgram
+from cfmkit.families.slider_crank.printed.strip_thickness_search import search
 
 if TYPE_CHECKING:
     from collections.abc import Callable

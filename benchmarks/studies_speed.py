@@ -23,9 +23,9 @@ from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
+from cfmkit.studies.point_evaluation import Metric, Row, Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.study import Metric, Row, Study
-from cfmkit.studies.sweep import outputs, summary_of
+from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, wish
 
 ROOT = Path(__file__).parents[1]
@@ -112,9 +112,8 @@ def million(name: str) -> None:
         seconds, worked = time.perf_counter() - start, processor() - before
         size = os.path.getsize(f"{folder}/out/results.csv")
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    bare = (
-        "import cfmkit.studies.sweep, cfmkit.families.cam, resource as r; print(r.getrusage(r.RUSAGE_SELF).ru_maxrss)"
-    )
+    bare = "import cfmkit.studies.sweep_request_and_files, cfmkit.families.cam, resource as r;"
+    bare += "print(r.getrusage(r.RUSAGE_SELF).ru_maxrss)"
     base = int(subprocess.run([sys.executable, "-c", bare], capture_output=True, check=True).stdout) / 1024
     print(f"a million points         {name}: {seconds:.1f} s, {size / 1e6:.0f} MB of CSV   (allowed 40 s)")
     print(f"  of a processor         {worked:.1f} s")

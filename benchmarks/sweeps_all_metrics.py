@@ -41,17 +41,18 @@ ROUNDS = 3
 def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
-    from cfmkit.studies import engine, sweep
+    from cfmkit.studies import engine, sweep_request_and_files
     from cfmkit.studies.varied_axes import wish
 
     file, *vary = SWEEPS[name]
-    request = getattr(sweep, "SweepRequest", None) or sweep.Request  # as older checkouts call it
-    work = sweep.prepare(cfmkit.load(configs / file), request(vary=tuple(wish(one) for one in vary)))
+    module = sweep_request_and_files
+    request = getattr(module, "SweepRequest", None) or module.Request  # as older checkouts call it
+    work = module.prepare(cfmkit.load(configs / file), request(vary=tuple(wish(one) for one in vary)))
     if singly:
         engine.vectorised = lambda *_: False
     start = time.process_time()
     records = engine.run(work)
-    b"".join(dict(sweep.outputs(records, sweep.summary_of(records)))["results.csv"])
+    b"".join(dict(sweep_request_and_files.outputs(records, sweep_request_and_files.summary_of(records)))["results.csv"])
     return time.process_time() - start, len(work.plan), work.vectorised
 
 

@@ -18,8 +18,8 @@ import cfmkit
 from cfmkit import api
 from cfmkit.elastica import Displacement, trace
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.methods import carry_out

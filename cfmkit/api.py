@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
-    from cfmkit.runs.analysis_view import AnalysisView
+    from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.study_result import StudyResult
     from cfmkit.studies.suggest.search import Suggestions
@@ -141,7 +141,7 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
     50.0002
     """
     from cfmkit.metrics import windows_judged
-    from cfmkit.runs.analysis_view import AnalysisView
+    from cfmkit.runs.notebook_result import AnalysisView
 
     spec = spec_of(spec)
     return AnalysisView.of(windows_judged(family(spec.family).analyze(spec, run or Run())))
@@ -163,7 +163,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     found = record.design(spec, run)
     asked = getattr(spec, "design", None)
     if getattr(asked, "yield", None) is not None:
-        from cfmkit.studies.margins import with_design_margins
+        from cfmkit.studies.redesign_for_yield import with_design_margins
 
         found = with_design_margins(spec, found, run)
     if getattr(asked, "verify", None) is not None:
@@ -314,8 +314,8 @@ def suggest(
     (0, 4)
     """
     from cfmkit.runs.read_wish import wish_of
-    from cfmkit.studies.executors import serial
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import serial
     from cfmkit.studies.suggest.search import suggest as searched
 
     def written(value: Any) -> str:
@@ -469,7 +469,7 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
     """
-    from cfmkit.export.engraving import engraved
+    from cfmkit.export.engraved_part_labels import engraved
 
     spec = spec_of(spec)
     record = family(spec.family)

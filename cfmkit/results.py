@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
     from cfmkit.specs.spec import Spec
-    from cfmkit.specs.target_function import TargetCurve
     from cfmkit.tables import Table
 
 

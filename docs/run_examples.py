@@ -126,7 +126,8 @@ def main() -> int:
     """Run the examples of the files named on the command line, as many files at once as there are processors."""
     failures = 0
     longest_first = sorted(map(Path, sys.argv[1:]), key=_work, reverse=True)
-    os.environ.update(import_module("cfmkit.studies.executors").ONE_THREAD)  # before any process imports numpy
+    # before any process imports numpy
+    os.environ.update(import_module("cfmkit.studies.serial_and_cluster_executors").ONE_THREAD)
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _import_ahead) as pool:
         for failed, told in pool.map(run_file, longest_first):
             failures += failed

@@ -10,7 +10,7 @@ from cfmkit.errors import CfmError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.studies.batch_entries import Entry
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
     from cfmkit.studies.metric_changes import MetricChange
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)

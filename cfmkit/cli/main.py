@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit._version import __version__
-from cfmkit.cli import completion, streams
+from cfmkit.cli import completion_candidates, streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
@@ -59,7 +59,7 @@ def _one_thread() -> None:
 
     Matrices here are small: threads cost more than they bring, five times as much where other programs run.
     """
-    from cfmkit.studies.executors import ONE_THREAD
+    from cfmkit.studies.serial_and_cluster_executors import ONE_THREAD
 
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
@@ -178,9 +178,9 @@ def _of_shell(verb: str, text: str) -> Any:
     return typer.Option(
         f"--{verb}-completion",
         metavar="[SHELL]",
-        help=f"{text}: {', '.join(completion.SHELLS)}; default: the shell this runs in.",
-        callback=getattr(completion, verb),
-        autocompletion=completion.shells,
+        help=f"{text}: {', '.join(completion_candidates.SHELLS)}; default: the shell this runs in.",
+        callback=getattr(completion_candidates, verb),
+        autocompletion=completion_candidates.shells,
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,7 +118,7 @@ class Changing(Common):
             text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Repeatable. "
             """Put a key that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. """
             "With a family in front, for the specs of that family only: cam:mechanism.roller_radius='10 mm'.",
-            autocompletion=completion.changes,
+            autocompletion=completion_candidates.changes,
         ),
     ] = None
 
@@ -173,7 +173,9 @@ class FigureChoice(Common):
 class OneSpec(Changing):
     """What a verb takes that reads one specification and writes a folder."""
 
-    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", completion.specs)]
+    spec: Annotated[
+        str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", completion_candidates.specs)
+    ]
     out: Out = None
 
 

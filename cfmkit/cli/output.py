@@ -1,7 +1,7 @@
 """How results reach the user: text for people on a terminal, or one JSON document.
 
 Results go to standard output, everything else to standard error. What a page consists of
-is said in `cfmkit.cli.page_blocks`; here it becomes characters, and nowhere else.
+is said in `cfmkit.cli.page_block_types`; here it becomes characters, and nowhere else.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
-from cfmkit.cli.page_blocks import FAINT, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
+from cfmkit.cli.page_block_types import FAINT, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
 
     Report = Callable[[float, str], None]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.cli.output import MARGIN
-from cfmkit.cli.page_blocks import (
+from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
     CellGrid,
@@ -28,15 +28,15 @@ from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
 from cfmkit.runs.run import Request, carry_out
 from cfmkit.runs.specfile import STDIN
-from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import border_unit, format_short, to_border
+from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Searched
     from cfmkit.runs.run import FinishedRun, Verb

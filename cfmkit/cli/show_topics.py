@@ -10,14 +10,14 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
-from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, line, listed
+from cfmkit.cli.page_block_types import LABEL, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.specs.keys_and_schema import Key
 
     Record = Mapping[str, Any]
@@ -127,8 +127,8 @@ def units_page() -> Answer:
 def metrics_page() -> Answer:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
-    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
+    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
     records = [
         {
@@ -263,7 +263,7 @@ def found(name: str) -> Answer | None:
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families; they are imported for it."""
-    from cfmkit.runs.family_drawing import scheme
+    from cfmkit.runs.parameter_sketch_file import scheme
 
     return [
         {"name": one.symbol, "family": record.name, "key": one.key, "meaning": one.meaning}
@@ -328,8 +328,8 @@ def _materials() -> Records:
 
 def _metrics() -> Records:
     from cfmkit.metrics import definitions
-    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
+    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
     known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]
     known += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.store import Manifest, RunFolder
     from cfmkit.studies.engine import Records, Work
-    from cfmkit.studies.executors import Executor
     from cfmkit.studies.journal import Journal
+    from cfmkit.studies.serial_and_cluster_executors import Executor
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def wants_parquet(text: str) -> bool:
     if unknown or not wanted:
         raise UsageError(f"--table: there is no format {''.join(unknown[:1])!r}; there are csv, parquet")
     if "parquet" in wanted:
-        from cfmkit.tables.parquet import require_pyarrow
+        from cfmkit.tables.parquet_writing import require_pyarrow
 
         require_pyarrow()
     return "parquet" in wanted
@@ -131,7 +131,7 @@ def wants_parquet(text: str) -> bool:
 def as_parquet(results: bytes) -> bytes:
     """Return results.csv as Parquet."""
     from cfmkit.tables import read_csv
-    from cfmkit.tables.parquet import parquet
+    from cfmkit.tables.parquet_writing import parquet
 
     return parquet(read_csv(results))
 
@@ -161,15 +161,15 @@ def executor_for(work: Work, options: Studying) -> Executor:
     cfmkit.errors.UsageError
         If options contradict each other.
     """
-    from cfmkit.studies.executors import cores, serial
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import cores, serial
 
     timeout = options.timeout_per_point
     if timeout is not None and timeout <= 0:
         raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
     jobs = options.jobs or cores()
     if options.cluster is not None:
-        from cfmkit.studies.executors import Cluster
+        from cfmkit.studies.serial_and_cluster_executors import Cluster
 
         if timeout is not None:
             raise UsageError(

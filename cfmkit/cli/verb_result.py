@@ -10,7 +10,7 @@ from cfmkit.errors import ExitCode
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
 
 
 @dataclass(frozen=True)

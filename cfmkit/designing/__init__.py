@@ -1,14 +1,14 @@
 """The kit that optimised designs are made with, whatever the mechanism: it knows no family.
 
-`sqp_program`
+`objective_and_constraints`
     What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`.
 `limits`
     Which limits a point misses, and which of them hold it.
-`variables`
+`bounds_and_rounding`
     Numbers within bounds: rounded to what is written, and those that are at a bound.
-`starts`
+`run_many_starts`
     Many starts, in this process or several, each noted when it is finished, within a time budget.
-`audit`
+`reported_values`
     What is reported of a design is what the analysis of its written specification measures.
 `robust_design`
     Values for which made parts are good: margins from tolerances to first order, and drawn parts.

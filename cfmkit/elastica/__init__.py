@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.batch import NetworkOutcome, trace_many
-    from cfmkit.elastica.continuation.tracing import trace
+    from cfmkit.elastica.continuation.trace_to_tolerance import trace
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
     from cfmkit.elastica.model.network import (
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     )
     from cfmkit.elastica.model.section import Section, Taper
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
-    from cfmkit.elastica.outcome.curling import HinderedCurling, hindered_curling
+    from cfmkit.elastica.outcome.curling_stiffening import HinderedCurling, hindered_curling
     from cfmkit.elastica.outcome.path import Event, Path, PathStatus
     from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
 
 _HOMES = {
     "continuation.batch": ("NetworkOutcome", "trace_many"),
-    "continuation.tracing": ("trace",),
+    "continuation.trace_to_tolerance": ("trace",),
     "model.beam": ("Beam",),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
     "model.network": (
@@ -63,7 +63,7 @@ _HOMES = {
     ),
     "model.section": ("Section", "Taper"),
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
-    "outcome.curling": ("HinderedCurling", "hindered_curling"),
+    "outcome.curling_stiffening": ("HinderedCurling", "hindered_curling"),
     "outcome.path": ("Event", "Path", "PathStatus"),
     "sensitivity.gradient": ("Gradient", "gradient"),
 }

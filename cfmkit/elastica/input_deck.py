@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.drive import Displacement, Rotation
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.continuation.tracing import trace
+from cfmkit.elastica.continuation.trace_to_tolerance import trace
 from cfmkit.elastica.model.beam import Beam
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.elastica.model.network import CLAMPED, Network, Node

@@ -21,11 +21,11 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
-from cfmkit.experiment.corrections import corrected
 from cfmkit.experiment.hysteresis import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import settled
+from cfmkit.experiment.zeros_and_signs import corrected
 from cfmkit.metrics import MeasuringFrame, Window, measure
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.robust_statistics import spikes
@@ -157,7 +157,7 @@ def read_measured(
     units : str, optional
         Likewise.
     tare, zero, flip
-        As for `cfmkit.experiment.corrections.corrected`.
+        As for `cfmkit.experiment.zeros_and_signs.corrected`.
     """
     recording = corrected(read_recording(path, units), tare, zero, flip)
     return measured(recording, None, LEFT_OUT)

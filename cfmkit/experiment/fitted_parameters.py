@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.specs.yamlio.allowed_keys import Slot
+from cfmkit.specs.yamlio.allowed_at_path import Slot
 from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:

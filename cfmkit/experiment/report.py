@@ -126,7 +126,7 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
     form : FigureForm, optional
         How figures are written; default: as PNG, as they are drawn.
     """
-    from cfmkit.tables.jsontext import json_bytes
+    from cfmkit.tables.json_writing import json_bytes
 
     yield "curve.csv", to_csv(curves_table(report.source))
     yield "cycles.csv", to_csv(cycles_table(report))

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import UsageError
-from cfmkit.families import installed
-from cfmkit.families.installed import Unusable
+from cfmkit.families import entry_point_plugins
+from cfmkit.families.entry_point_plugins import Unusable
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Family
@@ -24,13 +24,13 @@ FAMILIES = {
 
 def names() -> tuple[str, ...]:
     """Return the names of all families, those of other packages last; nothing is imported for it."""
-    return (*FAMILIES, *installed.usable_names(FAMILIES))
+    return (*FAMILIES, *entry_point_plugins.usable_names(FAMILIES))
 
 
 def clashing() -> tuple[str, ...]:
     """Return the names that more than one other package offers: none of those families can be used."""
     known = names()
-    return tuple(dict.fromkeys(one.name for one in installed.offers() if one.name not in known))
+    return tuple(dict.fromkeys(one.name for one in entry_point_plugins.offers() if one.name not in known))
 
 
 def family(name: str) -> Family:
@@ -46,15 +46,15 @@ def family(name: str) -> Family:
     if name in FAMILIES:
         record: Family = import_module(FAMILIES[name]).FAMILY
         return record
-    for offer in installed.offers():
+    for offer in entry_point_plugins.offers():
         if offer.name == name:
-            return installed.record_of(offer, FAMILIES)
+            return entry_point_plugins.record_of(offer, FAMILIES)
     near = get_close_matches(name, names(), n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
 
 
-def examined() -> tuple[tuple[installed.InstalledFamily | None, Family | str], ...]:
+def examined() -> tuple[tuple[entry_point_plugins.InstalledFamily | None, Family | str], ...]:
     """Return every family with the offer of the package it is from, or the reason why it cannot be used.
 
     Returns
@@ -63,7 +63,7 @@ def examined() -> tuple[tuple[installed.InstalledFamily | None, Family | str], .
         Those of this package come first, without an offer. All others are imported.
     """
     own = tuple((None, family(name)) for name in FAMILIES)
-    return own + tuple((offer, _tried(offer)) for offer in installed.offers())
+    return own + tuple((offer, _tried(offer)) for offer in entry_point_plugins.offers())
 
 
 def records() -> tuple[Family, ...]:
@@ -76,9 +76,9 @@ def skipped() -> tuple[str, ...]:
     return tuple(found for _, found in examined() if isinstance(found, str))
 
 
-def _tried(offer: installed.InstalledFamily) -> Family | str:
+def _tried(offer: entry_point_plugins.InstalledFamily) -> Family | str:
     try:
-        return installed.record_of(offer, FAMILIES)
+        return entry_point_plugins.record_of(offer, FAMILIES)
     except Unusable as problem:
         return str(problem)
 
@@ -93,12 +93,14 @@ def origin(name: str) -> dict[str, str]:
     """
     if name in FAMILIES:
         return {}
-    return next((installed.code_of(offer) for offer in installed.offers() if offer.name == name), {})
+    offers = entry_point_plugins.offers()
+    return next((entry_point_plugins.code_of(offer) for offer in offers if offer.name == name), {})
 
 
 def origins() -> dict[str, dict[str, str]]:
     """Return what computes each family of another package."""
-    return {one.name: installed.code_of(one) for one in installed.offers() if one.name not in FAMILIES}
+    offers = entry_point_plugins.offers()
+    return {one.name: entry_point_plugins.code_of(one) for one in offers if one.name not in FAMILIES}
 
 
 __all__ = ["FAMILIES", "Unusable", "clashing", "examined", "family", "names", "origin", "origins", "records", "skipped"]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.designing.starts import Notes
+    from cfmkit.designing.run_many_starts import Notes
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
@@ -28,7 +28,7 @@ def _silent(_fraction: float, _text: str) -> None:
 
 
 class Executor(Protocol):
-    """How independent jobs get done: `cfmkit.studies.executors` and `cfmkit.studies.pool` have several ways."""
+    """How independent jobs get done: see `cfmkit.studies.serial_and_cluster_executors` and `cfmkit.studies.pool`."""
 
     def __call__(
         self, work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.metrics import continuous_curves, winding_branches
+from cfmkit.metrics import continuous_means_and_extremes, winding_branches
 from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
     from cfmkit.results import ClosedForm, WindingPath
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 ZERO = 1e-9
@@ -243,8 +243,8 @@ class Branch:
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
-        uneven = bool(between.any()) and len(peaks) < continuous_curves.FEW
-        top, bottom = continuous_curves.extremes(
+        uneven = bool(between.any()) and len(peaks) < continuous_means_and_extremes.FEW
+        top, bottom = continuous_means_and_extremes.extremes(
             partial(model.effort, self.name), motion[None, :], effort[None, :], uneven
         )
         return float(top[0]), float(bottom[0])
@@ -264,7 +264,7 @@ class Branch:
             return winding_branches.mean(path, *self.ends_on_way)
         if model is None:
             return float(level(self.spread))
-        return continuous_curves.mean(partial(model.effort, self.name), model.places, *self.ends)
+        return continuous_means_and_extremes.mean(partial(model.effort, self.name), model.places, *self.ends)
 
     @cached_property
     def function(self) -> Function:

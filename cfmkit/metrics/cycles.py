@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.metrics.ranges_many import ManyBranches
     from cfmkit.results import ClosedForm, WindingPath
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 Interval = tuple[float, float]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics.branch_windows import ROUNDING
-from cfmkit.numerics.last_places import last_places
+from cfmkit.numerics.where_condition_ends import last_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

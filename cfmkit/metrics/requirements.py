@@ -14,8 +14,8 @@ from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric
 from cfmkit.metrics.metrics_json import finite_border
-from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
+from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

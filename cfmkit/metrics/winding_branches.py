@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from cfmkit.arrays import distinct
-from cfmkit.numerics.last_places import last_places
+from cfmkit.numerics.where_condition_ends import last_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.metrics import ranges_many, spread, winding_branches
 from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 
 if TYPE_CHECKING:

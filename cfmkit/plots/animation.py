@@ -1,7 +1,7 @@
 """The mechanism in motion beside its curve, as a GIF or a film for slides.
 
-The poses are those of the page (`cfmkit.plots.moving_svg`), there and back. GIF needs nothing more; a film needs the
-program ``ffmpeg``.
+The poses are those of the page (`cfmkit.plots.poses_in_one_svg`), there and back. GIF needs nothing more; a film
+needs the program ``ffmpeg``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.plots.moving_svg import Moving
+    from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Result
 
 KINDS = ("gif", "mp4")

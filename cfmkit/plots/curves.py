@@ -15,9 +15,9 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import frame_of, window_of
-from cfmkit.plots.bands import Band, bands_of
+from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_chart import Limit, MarkedRange, level, padded, shade
+from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, padded, shade
 from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, styled
 from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result

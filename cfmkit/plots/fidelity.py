@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_chart import padded
+from cfmkit.plots.stacked_line_diagrams import padded
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import axis_label, remark, shown_range, write_heading
 from cfmkit.specs.units import to_border

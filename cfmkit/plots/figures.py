@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.families.base import Family
-    from cfmkit.plots.moving_svg import Moving
+    from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Result
 
 
@@ -29,7 +29,7 @@ def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]
     if not result.curves:
         return {}
     if family.draw is None:
-        from cfmkit.plots.loop_figure import loop_figure
+        from cfmkit.plots.curve_with_enlarged_band import loop_figure
 
         return {"curve": partial(loop_figure, result)}
     makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)

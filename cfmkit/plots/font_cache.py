@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cfmkit.store.private_folder import private_folder
+from cfmkit.store.private_cache_folder import private_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.requirements import Bounds
-    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
-    from cfmkit.studies.study import Metric
+    from cfmkit.studies.point_evaluation import Metric
+    from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
 
 
 MOST_BINS = 40

@@ -14,11 +14,11 @@ from cfmkit.arrays import Several, named
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
-from cfmkit.runs import batch_files
+from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_outcome import worst
-from cfmkit.studies.batch_entries import LEFT, Entry
+from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
 from cfmkit.studies.metric_changes import TOLERANCE, BatchComparison, earlier, gone
 from cfmkit.studies.metric_changes import changes as changes_of
 from cfmkit.tables.html import first_rows
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.batch_entries import KeptRuns
-    from cfmkit.studies.executors import Executor, Lost
+    from cfmkit.studies.batch_sources_and_outcomes import KeptRuns
     from cfmkit.studies.metric_changes import Known
+    from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
 
 
@@ -115,7 +115,7 @@ def _natural(spec: Spec) -> str:
 
 def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
     """Return the data files that a specification names, and the hashes of their content."""
-    from cfmkit.specs.data_files import named_in
+    from cfmkit.specs.data_file_paths import named_in
     from cfmkit.store import file_hash
 
     return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
@@ -256,8 +256,8 @@ def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executo
     cfmkit.errors.UsageError
         If the time allowed is none.
     """
-    from cfmkit.studies.executors import cores, serial
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import cores, serial
 
     if timeout is not None and timeout <= 0:
         raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
@@ -320,20 +320,20 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """What metrics.json says."""
-        found: Mapping[str, Any] = named(batch_files.data(self.entries, self.exit_code, self.compared))
+        found: Mapping[str, Any] = named(batch_output_files.data(self.entries, self.exit_code, self.compared))
         return found
 
     @property
     def table(self) -> Table:
         """What results.csv says: one row per specification."""
-        from cfmkit.studies.batch_entries import results_table
+        from cfmkit.studies.batch_sources_and_outcomes import results_table
 
         return results_table(self.entries)
 
     @property
     def requirements(self) -> Table:
         """What requirements.csv says: one row per requirement."""
-        from cfmkit.studies.batch_entries import requirements_table
+        from cfmkit.studies.batch_sources_and_outcomes import requirements_table
 
         return requirements_table(self.entries)
 
@@ -425,7 +425,7 @@ def batch(
     """
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch_entries import KeptRuns, folders, sources
+    from cfmkit.studies.batch_sources_and_outcomes import KeptRuns, folders, sources
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
 
@@ -458,13 +458,13 @@ def batch(
         code = exit_code(entries, watched.stopped)
         if compared is not None and compared.beyond and not watched.stopped:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
-        written = batch_files.write(
-            folder, entries, batch_files.about(work.arguments, work.common.seed, named, code), page, compared
+        written = batch_output_files.write(
+            folder, entries, batch_output_files.about(work.arguments, work.common.seed, named, code), page, compared
         )
     if report is not None:
         report(junit_of(entries))
     if told is not None:
-        from cfmkit.runs.batch_files import summary as in_markdown
+        from cfmkit.runs.batch_output_files import summary as in_markdown
 
         told(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared)

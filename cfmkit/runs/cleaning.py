@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store import Manifest, RunFolder, disk
+from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, hash_in, mode_of
 from cfmkit.store.disk import reporting
 from cfmkit.store.lock import LOCK, has_signed_lock
-from cfmkit.store.names import JOURNAL, MANIFEST, hash_in, mode_of
 from cfmkit.studies.journal import has_foreign_lines, is_journal
 
 if TYPE_CHECKING:

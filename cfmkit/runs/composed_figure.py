@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.plots.composed_figure import DrawnPanel
     from cfmkit.specs.composed_figure import ComposedFigure, Panel
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.executors import Executor
+    from cfmkit.studies.serial_and_cluster_executors import Executor
 
     Makers = Mapping[str, Callable[[], Figure]]
 
@@ -124,7 +124,7 @@ def _solved(spec: Spec, verb: str) -> Makers:
 def _swept(spec: Spec, executor: Executor) -> Makers:
     from cfmkit.studies.engine import run
     from cfmkit.studies.pictures import makers
-    from cfmkit.studies.sweep import SweepRequest, outputs, prepare, summary_of
+    from cfmkit.studies.sweep_request_and_files import SweepRequest, outputs, prepare, summary_of
 
     records = run(prepare(spec, SweepRequest(pictures=True)), executor)
     summary = summary_of(records)

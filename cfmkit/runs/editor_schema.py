@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.metrics import known_metrics, values_of_family
 from cfmkit.specs.keys_and_schema import schema as plain_schema
 from cfmkit.store import atomic_write
-from cfmkit.tables.jsontext import json_bytes
+from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -29,7 +29,7 @@ from cfmkit import api
 from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
 from cfmkit.runs.run_page import ENDS, escaped_json, part, template
 from cfmkit.runs.specfile import bind, changed, read_spec
-from cfmkit.specs.units.number_text import NUMBER
+from cfmkit.specs.units.number_reading import NUMBER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -164,7 +164,7 @@ class Explorer:
         """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
         from cfmkit.families import family
         from cfmkit.plots.figures import moving_of
-        from cfmkit.plots.moving_svg import still
+        from cfmkit.plots.poses_in_one_svg import still
 
         try:
             result = api.analyze(self.spec(changes))

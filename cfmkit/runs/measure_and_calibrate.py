@@ -71,11 +71,11 @@ def measure(
     >>> round(found.numbers.filtered["force_mean[load]"].value, 2)
     50.46
     """
-    from cfmkit.experiment.corrections import corrected
     from cfmkit.experiment.evaluation import LEFT_OUT, measured, require_loop
     from cfmkit.experiment.low_pass import read_filter
     from cfmkit.experiment.reading import Recording, read_recording
     from cfmkit.experiment.report import report_on
+    from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.metrics import MeasuringFrame
 
     low_pass = filter if filter == "default" else read_filter(filter)
@@ -151,10 +151,10 @@ def calibrate(
     0.00224
     """
     from cfmkit.experiment.calibration import calibrate as fitted
-    from cfmkit.experiment.corrections import corrected
     from cfmkit.experiment.evaluation import LEFT_OUT, MeasuredCurves, measured, read_measured
     from cfmkit.experiment.fitted_parameters import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.metrics import Window
     from cfmkit.numerics.least_squares import LOSSES
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Curve
-    from cfmkit.runs.analysis_view import AnalysisView
+    from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
 
 VERDICTS: Mapping[str, str] = {
@@ -247,7 +247,7 @@ def number(text: str) -> Number:
     ('>', 0.53, 0.01)
     """
     from cfmkit.errors import QuantityError
-    from cfmkit.specs.units.number_text import read_number
+    from cfmkit.specs.units.number_reading import read_number
     from cfmkit.specs.units.unit_size import unit_size
 
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)

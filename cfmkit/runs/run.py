@@ -179,7 +179,7 @@ def _make_ready(spec: Spec) -> None:
     """Import what an analysis of a specification needs, so that nobody interrupts an import once there is a folder."""
     from cfmkit.families import family
 
-    import_module("cfmkit.runs.analysis_view")
+    import_module("cfmkit.runs.notebook_result")
     family(spec.family).model_of(spec)
 
 
@@ -290,7 +290,7 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
 
     yields = yields_of(nominal, given, run)
     if yields is None:
-        from cfmkit.studies.expected_yield import expected
+        from cfmkit.studies.yield_by_assumed_tolerances import expected
 
         told = expected(nominal, run)
         return found.beside({}, run_outcome.Supplement(lines=(("made", told),))) if told else found
@@ -307,8 +307,8 @@ def _csv(table: Callable[[], Table]) -> bytes:
 @contextmanager
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run, noting: Noting = journal_of) -> Iterator[Run]:
     """Yield a run that works in several processes and notes what it has finished in the folder's journal."""
-    from cfmkit.studies.executors import serial
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import serial
 
     with noting(folder, fresh) as journal:
         yield replace(plain, executor=serial if jobs == 1 else Pool(jobs), notes=journal)

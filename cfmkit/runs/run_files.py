@@ -14,7 +14,7 @@ from cfmkit.errors import SolutionError
 from cfmkit.families import family
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.plots.figures import moving_of
-from cfmkit.tables.jsontext import json_bytes
+from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,7 +86,7 @@ def files(
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
     """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
-    from cfmkit.specs.data_files import named_in
+    from cfmkit.specs.data_file_paths import named_in
 
     for source in named_in(spec.model_dump()):
         yield str(source), source.path.read_bytes()
@@ -129,7 +129,7 @@ def stated_tolerances(spec: Spec) -> tuple[str, ...]:
 
 def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
-    from cfmkit.studies.design_tolerances import assumed
+    from cfmkit.studies.stated_or_assumed_tolerances import assumed
 
     found = assumed(spec)
     if found is None:

@@ -9,8 +9,8 @@ from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.metrics.requirements import of_many
 from cfmkit.results import Result, Status
-from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
-from cfmkit.tables.jsontext import json_bytes
+from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

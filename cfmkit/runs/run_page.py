@@ -163,7 +163,7 @@ def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) 
     moving = moving_of(family(result.spec.family), result)
     if moving is None or not drawn:
         return None
-    from cfmkit.plots.moving_svg import film
+    from cfmkit.plots.poses_in_one_svg import film
 
     name = next(iter(drawn))
     spots = list(_cursors(drawn[name], to_border(moving.motion, result.curve.motion_dimension)))

@@ -218,13 +218,13 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
 
 def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
-    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.spec import DesignKeys
+    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     said = False
     if isinstance(design, DesignKeys):
-        from cfmkit.studies.design_tolerances import faults, is_made
+        from cfmkit.studies.stated_or_assumed_tolerances import faults, is_made
 
         said = is_made(spec, design)
         for path, message in faults(spec, design):

@@ -11,16 +11,16 @@ from cfmkit.errors import ExitCode
 from cfmkit.runs.run_page import NAME, identifier, part, template
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.studies.pool import until
-from cfmkit.tables.jsontext import json_bytes
+from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.figure import Figure
 
-    from cfmkit.designing.starts import Clock
+    from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.base import Run
-    from cfmkit.studies.suggest.proposal import Proposal
+    from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import WishBlock
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength
-from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
@@ -27,6 +26,7 @@ from cfmkit.specs.units import (
     dimension_of_end,
     ends_increase,
 )
+from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 
 
 class OldWords:
@@ -229,7 +229,7 @@ class DesignKeys(Model):
 
 
 if TYPE_CHECKING:
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
     DesignBlock = DesignKeys
 else:

@@ -16,14 +16,14 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.errors import QuantityError
 from cfmkit.specs.block import Model
-from cfmkit.specs.data_files import DataSource
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.units import Displacement, Place, UnitField, format_quantity, format_short, read_quantity
 from cfmkit.specs.units.fields import plain_schema
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 EFFORTS, SLOPES = ("force", "torque"), ("stiffness", "rotational_stiffness")
@@ -139,7 +139,7 @@ class Target(Model):
         from cfmkit.numerics.monotone_interpolation import (
             ThroughPoints,  # numpy, which reading a specification does not need
         )
-        from cfmkit.specs.target_function import TargetCurve
+        from cfmkit.specs.evaluable_target_curve import TargetCurve
 
         points = self.all_points
         if points is None:

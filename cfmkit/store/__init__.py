@@ -22,14 +22,14 @@ What a user can rely on
 While a run lives, ``.cfmkit.lock`` and ``.cfmkit-run/`` stand in the folder; both
 are gone after it, and after a kill both are cleared by the next run.
 
-`disk` makes changes and turns their errors into sentences, `names` says what may
+`disk` makes changes and turns their errors into sentences, `allowed_file_names` says what may
 be written, `lock` keeps other runs out, `transaction` changes many files as one,
 `manifest` is the list of what a run wrote, `run_folder` is what a run works with, and
-`identity` gives content its name.
+`content_hashes_and_versions` gives content its name.
 """
 
+from cfmkit.store.content_hashes_and_versions import code_stamp, file_hash, origin, stable_hash
 from cfmkit.store.disk import FileRecord, atomic_write
-from cfmkit.store.identity import code_stamp, file_hash, origin, stable_hash
 from cfmkit.store.manifest import Manifest
 from cfmkit.store.run_folder import RunFolder
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import disk, transaction
+from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
+from cfmkit.store.content_hashes_and_versions import file_hash
 from cfmkit.store.disk import TEMPORARY, FileRecord, reporting, shown
-from cfmkit.store.identity import file_hash
 from cfmkit.store.lock import FolderLock
 from cfmkit.store.manifest import Manifest
-from cfmkit.store.names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
 from cfmkit.store.transaction import NEW, RUN
 
 if TYPE_CHECKING:

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store import disk
+from cfmkit.store.allowed_file_names import CURE, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
 from cfmkit.store.disk import reason, remove_empty, reporting, shown, sync_folder
-from cfmkit.store.names import CURE, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -17,15 +17,15 @@ from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
-from cfmkit.studies.design_tolerances import assumed, tolerances, tolerances_of
 from cfmkit.studies.requirement_constraints import sampled_of
+from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances, tolerances_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.design_tolerances import DesignTolerances
+    from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances
 
 PARTS, SHARE = 4000, 0.95
 """Parts that are drawn, and the share of them whose forces are named."""

@@ -13,10 +13,10 @@ import numpy as np
 
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
-from cfmkit.studies.executors import Lost, serial
 from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
-from cfmkit.studies.rows import ResultRows, cut, gathered, joined, recalled, recalled_row, record
-from cfmkit.studies.study import Row
+from cfmkit.studies.point_evaluation import Row
+from cfmkit.studies.row_blocks_for_journal import ResultRows, cut, gathered, joined, recalled, recalled_row, record
+from cfmkit.studies.serial_and_cluster_executors import Lost, serial
 from cfmkit.studies.vectorised_blocks import BLOCK, evaluate_block, vectorised
 
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.studies.executors import Executor
     from cfmkit.studies.journal import Journal
     from cfmkit.studies.plan import Plan
-    from cfmkit.studies.study import Study
+    from cfmkit.studies.point_evaluation import Study
+    from cfmkit.studies.serial_and_cluster_executors import Executor
 
 SMALLEST, JOBS = 64, 64
 """Points in a block at least, and blocks that a study is cut into unless they become too large."""

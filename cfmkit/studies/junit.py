@@ -17,7 +17,7 @@ from cfmkit.errors import ExitCode, OutputError, UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from cfmkit.studies.batch_entries import Entry
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 Element = ElementTree.Element
 FAILURES = (ExitCode.NO_SOLUTION, ExitCode.PARTIAL)

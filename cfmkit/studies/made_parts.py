@@ -21,16 +21,16 @@ from cfmkit.families import family
 from cfmkit.metrics import split_name, windows_judged
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
-from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.spec import DesignKeys
-from cfmkit.studies.design_tolerances import DesignTolerances, tolerances_of
+from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.evaluation import plan_of
-from cfmkit.studies.sensitivity.intervals import LEVEL, clopper_pearson, wilson
-from cfmkit.studies.study import Study
+from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL, clopper_pearson, wilson
+from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, tolerances_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve
     from cfmkit.families.base import Run
     from cfmkit.specs.spec import DesignBlock, Spec
+    from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.parameters import Parameter
-    from cfmkit.studies.study import Metric
 
 ALIKE = 0.1
 """An error is common where it changes the force by the same share everywhere but for this share of that share."""

@@ -14,7 +14,7 @@ from cfmkit.tables import Table, TableColumn
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.studies.batch_entries import Entry
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
     Known = Mapping[str, "Earlier"]
 

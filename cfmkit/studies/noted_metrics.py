@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.metrics import definition_of, definitions, metrics_by_name, values_of_family
-from cfmkit.studies.study import Metric, Study
+from cfmkit.studies.point_evaluation import Metric, Study
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import CfmError, UsageError
 from cfmkit.results import Status
 from cfmkit.studies import worker_process
-from cfmkit.studies.executors import ONE_THREAD, Lost, never
+from cfmkit.studies.serial_and_cluster_executors import ONE_THREAD, Lost, never
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import BinaryIO
 
-    from cfmkit.studies.executors import Executor, Stopping, Work
+    from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
 DEATHS = 2
 """A job is given up after so many of its workers have died."""

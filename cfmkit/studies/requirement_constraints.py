@@ -19,7 +19,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
 from cfmkit.specs.units import Share
 from cfmkit.studies.noted_metrics import metrics_of
-from cfmkit.studies.study import Study
+from cfmkit.studies.point_evaluation import Study
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
-    from cfmkit.studies.study import Metric
+    from cfmkit.studies.point_evaluation import Metric
 
 POSES = 15
 """Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""

@@ -11,8 +11,8 @@ import numpy as np
 from cfmkit.arrays import named
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.units import format_quantity
-from cfmkit.studies.executors import serial
 from cfmkit.studies.plan import MOST_POINTS
+from cfmkit.studies.serial_and_cluster_executors import serial
 from cfmkit.studies.variable_paths import CannotVary, leaf
 from cfmkit.tables import read_csv
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.engine import Records, Work
-    from cfmkit.studies.executors import Executor
+    from cfmkit.studies.serial_and_cluster_executors import Executor
     from cfmkit.tables import Table
 
 
@@ -147,7 +147,7 @@ def _bounds(one: Mapping[str, Any]) -> str:
 def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sweep; see `cfmkit.sweep`."""
     from cfmkit.studies.engine import run
-    from cfmkit.studies.sweep import SweepRequest, outputs, prepare, summary_of
+    from cfmkit.studies.sweep_request_and_files import SweepRequest, outputs, prepare, summary_of
 
     asked = dict(block)
     seed = _seed(asked.pop("seed", 0))

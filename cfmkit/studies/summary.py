@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.rows import ResultRows
-    from cfmkit.studies.study import Study
+    from cfmkit.studies.point_evaluation import Study
+    from cfmkit.studies.row_blocks_for_journal import ResultRows
 
 DEFAULT_OBJECTIVES = ("force_ripple", "torque_ripple")
 MOST_SHOWN = 4

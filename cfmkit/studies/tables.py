@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.specs.units import border_unit
-from cfmkit.studies.rows import WARNINGS_JOINT
+from cfmkit.studies.row_blocks_for_journal import WARNINGS_JOINT
 from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
-    from cfmkit.studies.rows import ResultRows
-    from cfmkit.studies.study import Metric
+    from cfmkit.studies.point_evaluation import Metric
+    from cfmkit.studies.row_blocks_for_journal import ResultRows
 
     Watch = Callable[[NDArray[np.int64], ResultRows], None]
 

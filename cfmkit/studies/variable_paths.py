@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units import BareFloat, UnitField, place_of
 from cfmkit.specs.units.fields import described
-from cfmkit.specs.yamlio.allowed_keys import Slot, expected, required
+from cfmkit.specs.yamlio.allowed_at_path import Slot, expected, required
 from cfmkit.specs.yamlio.explain_validation_errors import not_among
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.requirements import ROUNDING, Bounds
 from cfmkit.specs.units import Share
-from cfmkit.studies.rows import ResultRows, gathered
+from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics import Definition
     from cfmkit.specs.spec import Requirement
     from cfmkit.studies.plan import Plan
-    from cfmkit.studies.study import Study
+    from cfmkit.studies.point_evaluation import Study
 
 BLOCK = 4096
 """Points that are evaluated and noted together."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.audit import searched
+from cfmkit.designing.reported_values import searched
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import function_named

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank, arc_lengths
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.numerics.registration import turned
 
 HERE = Path(__file__).resolve().parent

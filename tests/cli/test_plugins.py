@@ -13,9 +13,9 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.main import main
-from cfmkit.families import installed
+from cfmkit.families import entry_point_plugins
 
 SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml")
 
@@ -28,11 +28,11 @@ def site(tmp_path, monkeypatch):
     here.mkdir()
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.chdir(here)
-    installed._imported.cache_clear()
-    installed._offers_on.cache_clear()
+    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._offers_on.cache_clear()
     yield folder
     packages.forget(folder)
-    installed._imported.cache_clear()
+    entry_point_plugins._imported.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -75,8 +75,8 @@ def test_a_run_says_which_package_computed_it(site):
 
 
 def test_names_are_completed():
-    assert completion.families("ob") == ["oblique"]
-    assert "oblique" in completion.topics("obl")
+    assert completion_candidates.families("ob") == ["oblique"]
+    assert "oblique" in completion_candidates.topics("obl")
 
 
 def test_a_family_has_its_article(monkeypatch):

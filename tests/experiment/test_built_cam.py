@@ -12,9 +12,9 @@ from flanks import Errors, flanks, measured, parameters
 
 import cfmkit
 from cfmkit.errors import DataError, SpecError
-from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.measured_cam import built_flank, built_track, flanks_of
-from cfmkit.studies.study import Study
+from cfmkit.families.cam.mechanism_from_spec import assemble
+from cfmkit.studies.point_evaluation import Study
 
 CONFIG = (Path(__file__).parents[2] / "configs/cam.yaml").read_text()
 

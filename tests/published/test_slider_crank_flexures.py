@@ -20,9 +20,9 @@ from flexure_support import (
     strip_chain,
 )
 
-from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure
-from cfmkit.families.slider_crank.printed.pressing import Chain, PressingEnd
-from cfmkit.families.slider_crank.printed.sizing import rotations
+from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, PressingEnd
+from cfmkit.families.slider_crank.printed.flexure_sizing import rotations
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, Flexure
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.numerics.roots import bracketed_root
 

@@ -16,9 +16,11 @@ import pytest
 from flexure_support import ABS, LINKAGE, MM, SHARES, THICKNESS, UNLOADED, WIDTH, corners, strip_chain
 
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.printed.chain import Elasticity, joints
-from cfmkit.families.slider_crank.printed.chain import kink as offset
-from cfmkit.families.slider_crank.printed.search import (
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, joints
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink as offset
+from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     FoundStrip,
     Ranges,
     descend,
@@ -26,8 +28,6 @@ from cfmkit.families.slider_crank.printed.search import (
     uniform_for_stroke,
     uniform_thickness,
 )
-from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
 from cfmkit.numerics.sqp import SearchEnding
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)

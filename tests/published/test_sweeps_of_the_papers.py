@@ -5,7 +5,7 @@ import pytest
 
 import cfmkit
 from cfmkit.studies.engine import run
-from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
+from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
 from cfmkit.studies.tables import results_csv
 from cfmkit.tables import read_csv
 

@@ -13,9 +13,9 @@ from vcfm_support import leaf, side
 from cfmkit.families.vcfm.leaves import springs, truss
 from cfmkit.families.vcfm.leaves import v_beam as vbeam
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.springs import force_change, measured_stiffness_for, rest_shift
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
 
 
 def printed_diamond_stiffness(strip):

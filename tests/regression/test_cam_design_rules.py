@@ -7,7 +7,7 @@ import pytest
 from cam_support import MM, analyze, at, cam, fixed
 from scipy.integrate import quad
 
-from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.mechanism_from_spec import assemble
 
 A = 9.058 * MM
 

@@ -10,9 +10,9 @@ import pytest
 from cam_motion import change_at_rest, moving, peak_over_one_second, response, with_springs
 from cam_support import analyze
 
-from cfmkit.families.cam.dynamics.build import build
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.dynamics.moving_parts import Moment
+from cfmkit.families.cam.dynamics.machine_from_spec import build
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
 
 WIDE_ROLLER = {"masses__roller_inertia": 4.61e-5}
 FROM_CAM = {"analysis__dynamics__origin": "cam-start"}

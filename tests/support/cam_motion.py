@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from cam_support import cam
 
-from cfmkit.families.cam.dynamics.build import build
 from cfmkit.families.cam.dynamics.inverse import MotionResponse, respond, statics
+from cfmkit.families.cam.dynamics.machine_from_spec import build
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec

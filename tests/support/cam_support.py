@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.spec import frozen

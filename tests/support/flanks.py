@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from cam_support import cam
 
-from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.numerics.registration import turned
 
 if TYPE_CHECKING:

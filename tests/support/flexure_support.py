@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.printed.chain import (
+from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     FLEXURES,
     STRIP,
     Elasticity,
@@ -18,7 +19,6 @@ from cfmkit.families.slider_crank.printed.chain import (
     lumped,
     spread,
 )
-from cfmkit.families.slider_crank.printed.pressing import Chain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

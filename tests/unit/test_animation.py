@@ -13,7 +13,7 @@ from cfmkit.cli.main import main
 from cfmkit.families import family
 from cfmkit.plots.animation import MILLISECONDS, animation, frames
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.moving_svg import POSES
+from cfmkit.plots.poses_in_one_svg import POSES
 
 SPEC = "configs/slider_crank_li2019.yaml"
 

@@ -152,7 +152,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
             "options",
             "verb_result",
             "failures",
-            "page_blocks",
+            "page_block_types",
             "output",
         )
     ]

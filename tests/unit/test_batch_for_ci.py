@@ -15,8 +15,8 @@ import cfmkit
 from cfmkit.cli.github_annotations import workflow_commands
 from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
-from cfmkit.runs.batch_files import summary
-from cfmkit.studies.batch_entries import Entry
+from cfmkit.runs.batch_output_files import summary
+from cfmkit.studies.batch_sources_and_outcomes import Entry
 from cfmkit.studies.metric_changes import Earlier, changes
 
 ROOT = Path(__file__).parents[2]

@@ -15,8 +15,8 @@ from beam_support import MM, at, cantilever, config, solved, value
 import cfmkit
 from cfmkit.elastica import Section, Taper
 from cfmkit.errors import DataError, InputError, SpecError
-from cfmkit.families.beam.build import thickest_of, thinnest_of
-from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
+from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
+from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as SURFACE
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")

@@ -14,8 +14,8 @@ import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.export import files
 from cfmkit.export.union import merged
-from cfmkit.families.beam import strips as strip_module
-from cfmkit.families.beam.strips import mirrored, smallest_gap
+from cfmkit.families.beam import strips_and_gaps as strip_module
+from cfmkit.families.beam.strips_and_gaps import mirrored, smallest_gap
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
 

@@ -10,16 +10,23 @@ import numpy as np
 import pytest
 
 from cfmkit import analyze, dumps, evaluate, load, loads
-from cfmkit.designing.starts import Clock
+from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
-from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, half_band, lines_cross, strict_share, tolerated
 from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
 from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, looked_at, searched
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
+    NetworkScatter,
+    audited,
+    half_band,
+    lines_cross,
+    strict_share,
+    tolerated,
+)
 from cfmkit.families.beam.shaping.sqp_program import Compared, Flattest, Shaping, Widest
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
@@ -253,7 +260,7 @@ def test_the_written_design_is_the_one_that_was_found() -> None:
     spec = load("configs/beam_design_lan.yaml", ["analysis.fidelity=inextensible"])
     new = written(spec, task, found_of(task, table_3(task), 7e-3))
     assert new.analysis.window == (pytest.approx(7e-3, abs=1e-6), 13.6e-3)
-    from cfmkit.families.beam.build import assemble
+    from cfmkit.families.beam.network_from_spec import assemble
 
     drive = replace(assemble(new).drive(), points=np.array([13.6e-3]))
     path = trace(assemble(new).network, drive)

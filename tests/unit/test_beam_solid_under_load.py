@@ -9,8 +9,8 @@ import pytest
 from vee_leaf import VEE
 
 import cfmkit
-from cfmkit.families.beam.build import assemble
-from cfmkit.families.beam.solid import driven_part
+from cfmkit.families.beam.network_from_spec import assemble
+from cfmkit.families.beam.plane_fem_model import driven_part
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.results import Status
 

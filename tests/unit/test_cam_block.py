@@ -10,12 +10,12 @@ from cfmkit.families.cam.many_designs.model import VARIED, analyze_block
 from cfmkit.results import Status
 from cfmkit.studies import vectorised_blocks
 from cfmkit.studies.engine import Work, run
-from cfmkit.studies.executors import Lost
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
-from cfmkit.studies.rows import joined
-from cfmkit.studies.study import Study
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.row_blocks_for_journal import joined
+from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.varied_axes import axes, wishes
 from cfmkit.studies.vectorised_blocks import evaluate_block, vectorised
 

@@ -10,9 +10,9 @@ from cam_support import MM, analyze, cam, design, message, names
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.design import two_way_gap
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.results import Status
 
 NOMINAL = {"springs": {"stiffness": "0.69 N/mm", "count": 2}}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from cam_support import MM, analyze, at, cam, fixed, message, names
 
-from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.findings import FINDINGS, finding
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.results import Status
 
 FITS = {"roller_radius": "10 mm"}

@@ -10,7 +10,7 @@ import pytest
 from cam_motion import moving
 from cam_support import analyze
 
-from cfmkit.families.cam.dynamics.build import build
+from cfmkit.families.cam.dynamics.machine_from_spec import build
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 
 

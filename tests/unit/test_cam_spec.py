@@ -9,7 +9,7 @@ import pytest
 from cam_support import MM, analyze, at, cam, fixed
 
 from cfmkit.errors import SpecError
-from cfmkit.families.cam.build import resolve
+from cfmkit.families.cam.mechanism_from_spec import resolve
 from cfmkit.families.cam.scalar_results import contact_pressure
 from cfmkit.stock import material
 

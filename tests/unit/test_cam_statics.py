@@ -9,7 +9,7 @@ from cam_support import MM, analyze, at, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.families.cam.build import assemble, hanging_weights
+from cfmkit.families.cam.mechanism_from_spec import assemble, hanging_weights
 from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.families.no_mechanism import CannotBuild
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from cfmkit.cli.output import Terminal
-from cfmkit.cli.page_blocks import (
+from cfmkit.cli.page_block_types import (
     BLANK,
     CellGrid,
     GridColumn,

@@ -14,8 +14,8 @@ from cfmkit.plots.figure_options import FigureForm
 from cfmkit.plots.style import MM, size_mm
 from cfmkit.plots.vector_formats import svg
 from cfmkit.runs.composed_figure import panels, read
-from cfmkit.studies.batch_entries import files_below
-from cfmkit.studies.executors import serial
+from cfmkit.studies.batch_sources_and_outcomes import files_below
+from cfmkit.studies.serial_and_cluster_executors import serial
 
 STUDIES = Path("configs/studies")
 

@@ -12,10 +12,10 @@ from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping import multistart
-from cfmkit.families.slider_crank.printed import search
+from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.results import Status
 from cfmkit.runs.run import designed as compute
-from cfmkit.studies.executors import Lost, serial
+from cfmkit.studies.serial_and_cluster_executors import Lost, serial
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,7 +45,7 @@ def test_a_design_all_of_whose_starts_crash_ends_as_a_bug(name: str, changes: li
 
 @pytest.mark.parametrize(
     ("name", "module", "function"),
-    [("beam_design_arch", multistart, "searched"), ("slider_crank_taper_design", search, "descend")],
+    [("beam_design_arch", multistart, "searched"), ("slider_crank_taper_design", strip_thickness_search, "descend")],
 )
 def test_a_fault_in_the_process_itself_is_not_swallowed(
     name: str, module: Any, function: str, monkeypatch: pytest.MonkeyPatch

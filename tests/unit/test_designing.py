@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.designing import limits, sqp_program
+from cfmkit.designing import limits, objective_and_constraints
+from cfmkit.designing.bounds_and_rounding import at_bounds, rounded
 from cfmkit.designing.limits import LimitRows
-from cfmkit.designing.sqp_program import SeenPoint
-from cfmkit.designing.starts import NEVER, Clock, Stage, done
-from cfmkit.designing.variables import at_bounds, rounded
+from cfmkit.designing.objective_and_constraints import SeenPoint
+from cfmkit.designing.run_many_starts import NEVER, Clock, Stage, done
 from cfmkit.families.base import Run
 from cfmkit.numerics.sqp import Effort, SearchEnding, minimize
 from cfmkit.results import Status
-from cfmkit.studies.executors import Lost
+from cfmkit.studies.serial_and_cluster_executors import Lost
 
 
 @dataclass
@@ -41,10 +41,10 @@ class Disc:
         )
 
     def values(self, z: np.ndarray) -> Any:
-        return sqp_program.values(self, z, self.elastic)
+        return objective_and_constraints.values(self, z, self.elastic)
 
     def slopes(self, z: np.ndarray) -> Any:
-        return sqp_program.slopes(self, z, self.elastic)
+        return objective_and_constraints.slopes(self, z, self.elastic)
 
 
 @pytest.mark.parametrize("elastic", [(), ("disc",), ("disc", "line")])

@@ -11,7 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.main import main
 from cfmkit.runs.editor_schema import LINE, metric_names, schema
 
@@ -59,7 +59,7 @@ def test_a_file_of_its_own_on_request(tmp_path, monkeypatch, capsys):
 
 
 def completed(text, **named):
-    return completion.changes(SimpleNamespace(params=named), text)
+    return completion_candidates.changes(SimpleNamespace(params=named), text)
 
 
 def test_keys_of_set_are_those_of_the_family_on_the_command_line():

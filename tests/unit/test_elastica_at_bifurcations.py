@@ -22,9 +22,9 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver
-from cfmkit.elastica.equilibrium.uncondensed_system import UncondensedSolver
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.equilibrium.network_solver import MarchOptions, Solver
+from cfmkit.elastica.equilibrium.uncondensed_solver import UncondensedSolver
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.errors import InputError
 
 LENGTH, ANGLE = 35e-3, np.radians(8)

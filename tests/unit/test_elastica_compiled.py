@@ -22,13 +22,13 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
-from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, march, packing
+from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, march, passing_arrays_by_address
 from cfmkit.elastica.kernels.compiled import reported
 from cfmkit.elastica.kernels.compiler import OPTIONS
-from cfmkit.elastica.kernels.packing import HEAD, objects
+from cfmkit.elastica.kernels.passing_arrays_by_address import HEAD, objects
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
-from cfmkit.store.private_folder import trusted
+from cfmkit.store.private_cache_folder import trusted
 
 _count, _solve, _swap, _predict = dense.positive_count, dense.lu_solve, dense._swap, march._predict
 
@@ -485,12 +485,13 @@ def test_every_field_of_an_array_is_where_the_compiled_code_reads_it() -> None:
     def word(offset: int, kind: Any = ctypes.c_int64) -> int:
         return int(kind.from_address(id(array) + offset).value)
 
-    assert word(packing.TYPE) == id(np.ndarray)
-    assert word(packing.DATA) == array.__array_interface__["data"][0]
-    assert word(packing.AXES, ctypes.c_int) == 2
-    assert tuple((ctypes.c_int64 * 2).from_address(word(packing.SHAPE))) == (2, 3)
-    assert word(packing.DTYPE) == id(array.dtype)
-    assert word(packing.FLAGS, ctypes.c_int) & packing.READY == packing.READY
+    assert word(passing_arrays_by_address.TYPE) == id(np.ndarray)
+    assert word(passing_arrays_by_address.DATA) == array.__array_interface__["data"][0]
+    assert word(passing_arrays_by_address.AXES, ctypes.c_int) == 2
+    assert tuple((ctypes.c_int64 * 2).from_address(word(passing_arrays_by_address.SHAPE))) == (2, 3)
+    assert word(passing_arrays_by_address.DTYPE) == id(array.dtype)
+    ready = passing_arrays_by_address.READY
+    assert word(passing_arrays_by_address.FLAGS, ctypes.c_int) & ready == ready
 
 
 def test_arrays_from_another_process_are_taken() -> None:

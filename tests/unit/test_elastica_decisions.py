@@ -10,19 +10,19 @@ import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Event, Network, Node, PathStatus, Section, guided
 from cfmkit.elastica.continuation import (
-    branch_end,
+    branch_rejoins_path,
+    decision_loop,
     decisions_at_bifurcation,
-    ending,
-    joined_marches,
-    limit_point,
+    ending_messages,
+    passing_limit_points,
     points_at_bifurcation,
 )
 from cfmkit.elastica.continuation.decisions_after_march import decided
-from cfmkit.elastica.continuation.state import BranchEnd, Leg, PathProblem, Resume, Stop, Stretch, Trail
+from cfmkit.elastica.continuation.path_and_moves import BranchEnd, Leg, PathProblem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.meshed_network import Spot
+from cfmkit.elastica.equilibrium.network_solver import Spot
 from cfmkit.elastica.kernels.status_codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 
 ASKED = (1e-3, 2e-3, 3e-3)  # [m]; the mean beam length is 0.1 m
 
@@ -99,7 +99,7 @@ def test_the_drive_takes_over_where_it_turns_behind_limit_points():
     assert (after.natural, after.first_requested, after.begun) == (True, 2, 1)
     assert after.targets.tolist() == of.values.tolist()
     assert not move.trail.visited
-    assert limit_point.one_way(of.values.tolist(), 1) == (0, 2)
+    assert passing_limit_points.one_way(of.values.tolist(), 1) == (0, 2)
 
 
 def test_a_stall_along_the_arc_is_the_end():
@@ -115,11 +115,11 @@ def test_a_branch_is_followed_to_just_before_its_end_and_counts_its_points_as_th
     of = problem()
     end = BranchEnd(0.025, spot(of, 0.025).y, spot(of, 0.026), 1, 0, "primary")
     path = replace(trail(of, (0.01, 0, 0)), branch="bifurcated", ends=(end,), closed=False)
-    values, numbers, toward = joined_marches.ahead(of, path, spot(of, 0.01), 1)
+    values, numbers, toward = decision_loop.ahead(of, path, spot(of, 0.01), 1)
     assert numbers is not None
     assert numbers.tolist() == [1, -1, -1]
     assert values[0] == of.values[1]
-    assert end.drive - branch_end.BEFORE_END * of.span <= values[1] < end.drive
+    assert end.drive - branch_rejoins_path.BEFORE_END * of.span <= values[1] < end.drive
     assert toward is end
 
 
@@ -172,8 +172,8 @@ def test_decisions_leave_the_path_that_they_are_made_from_as_it_is():
     of = problem(through_folds=True)
     path = trail(of, (0.01, 0, 0), (0.02, 1, 0))
     info, drives = path.points.info.copy(), path.points.drive.copy()
-    limit_point.around(of, path)
-    ending.stop(of, path, OUTSIDE)
+    passing_limit_points.around(of, path)
+    ending_messages.stop(of, path, OUTSIDE)
     path.up_to(-1).with_spot(spot(of, 0.5), 1).with_event(Event("bifurcation", 0.1, 0, 1)).come_by(0.1)
     assert np.array_equal(path.points.info, info)
     assert np.array_equal(path.points.drive, drives)

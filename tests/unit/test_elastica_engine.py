@@ -38,8 +38,8 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.meshed_network import Solver
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.equilibrium.network_solver import Solver
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.errors import InputError
 
 TIGHT = Control(tolerance=1e-10)

@@ -20,7 +20,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation import branch_end, decisions_at_bifurcation, tracing
+from cfmkit.elastica.continuation import branch_rejoins_path, decisions_at_bifurcation, trace_to_tolerance
 from cfmkit.elastica.equilibrium.mesh import Mesh
 
 DOWN = -np.pi / 2
@@ -40,8 +40,8 @@ def strip() -> Network:
 
 def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a path on one mesh that is too coarse for the tolerance."""
-    monkeypatch.setattr(tracing, "_ROUNDS", 1)
-    monkeypatch.setattr(tracing, "first_mesh", lambda layout, tolerance: Mesh(2, 1))
+    monkeypatch.setattr(trace_to_tolerance, "_ROUNDS", 1)
+    monkeypatch.setattr(trace_to_tolerance, "first_mesh", lambda layout, tolerance: Mesh(2, 1))
     return trace(strip(), BENDING, Control(tolerance=1e-10))
 
 
@@ -109,7 +109,7 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
 def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """From 4.71 mm one step passes it; from 4.7 mm the steps become short there, and rounding decides what is found."""
     monkeypatch.setattr(decisions_at_bifurcation, "predicted_end", lambda *given: (None, False))
-    monkeypatch.setattr(branch_end, "closed_behind", lambda *given: None)
+    monkeypatch.setattr(branch_rejoins_path, "closed_behind", lambda *given: None)
     path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.71, 5.0, 6.0]) * 1e-3))
     assert path.branch[path.at_requested][2:].tolist() == ["primary", "primary"]
     assert path.events[-1].kind == "unresolved"

@@ -14,9 +14,9 @@ import pytest
 from beam_networks import drives, network
 
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, Mesh
-from cfmkit.elastica.equilibrium.meshed_network import Solver
+from cfmkit.elastica.equilibrium.network_solver import Solver
 from cfmkit.elastica.kernels import compiled
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 
 WEIGHTS = np.array([1, -8, 8, -1]) / 12.0
 STEPS = np.array([-2, -1, 1, 2])

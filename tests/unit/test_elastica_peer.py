@@ -17,7 +17,7 @@ import numpy as np
 from lan_2010 import half
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.verification.corotational import recheck
 
 

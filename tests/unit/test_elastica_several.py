@@ -26,8 +26,8 @@ from cfmkit.elastica import (
 from cfmkit.elastica.continuation.critical_points import Curvature, eigenvalues
 from cfmkit.elastica.continuation.switching import descend
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
+from cfmkit.elastica.model.network_under_drive import Layout
 
 LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)
 

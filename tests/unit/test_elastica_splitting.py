@@ -29,7 +29,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.model.beam import GAUSS
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
 FINE = Control(tolerance=1e-10)

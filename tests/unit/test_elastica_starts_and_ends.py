@@ -29,7 +29,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.meshed_network import Solver, Spot
+from cfmkit.elastica.equilibrium.network_solver import Solver, Spot
 
 UP = np.pi / 2
 SECTION = Section(2e9, 8e-3, 1e-3)

@@ -34,11 +34,11 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.meshed_network import Solver
-from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
+from cfmkit.elastica.equilibrium.network_solver import Solver
+from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
 from cfmkit.elastica.kernels import compiled
-from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.kernels.symplectic_splitting_coefficients import DRIFTS, KICKS, NODES
+from cfmkit.elastica.model.network_under_drive import Layout
 
 RNG = np.random.default_rng(0)
 

@@ -22,7 +22,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation.limit_point import one_way
+from cfmkit.elastica.continuation.passing_limit_points import one_way
 
 DOWN = -np.pi / 2
 RISE = 35e-3 * np.sin(np.radians(8.0))

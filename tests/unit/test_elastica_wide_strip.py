@@ -120,8 +120,8 @@ def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
 def test_the_splitting_converges_fast_with_the_law():
     """Its order falls from six to four where the energy is not a square of the moment, but the departure is slight."""
     from cfmkit.elastica.equilibrium.mesh import Mesh
-    from cfmkit.elastica.equilibrium.meshed_network import Solver
-    from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.equilibrium.network_solver import Solver
+    from cfmkit.elastica.model.network_under_drive import Layout
 
     section = Section(E, B, TAPER, axial=False, poisson_ratio=NU, wide=True)
     layout = Layout(cantilever(section, 1.0), Loading((PointLoad("b", 0, 1.0, 0),), np.array([1.5])))

@@ -12,7 +12,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.families import installed
+from cfmkit.families import entry_point_plugins
 from cfmkit.families.base import INTERFACE
 
 GROUP = "cfmkit.families"
@@ -25,11 +25,11 @@ def site(tmp_path, monkeypatch):
     folder = tmp_path / "site"
     folder.mkdir()
     monkeypatch.syspath_prepend(str(folder))
-    installed._imported.cache_clear()
-    installed._offers_on.cache_clear()
+    entry_point_plugins._imported.cache_clear()
+    entry_point_plugins._offers_on.cache_clear()
     yield folder
     packages.forget(folder)
-    installed._imported.cache_clear()
+    entry_point_plugins._imported.cache_clear()
 
 
 def reason(name):
@@ -58,7 +58,7 @@ def test_listing_imports_nothing(site):
 def test_what_is_found_is_what_the_standard_library_finds(site):
     packages.install(site, "more-springs", "", "soft", "softer = more_springs:OTHER", "# hard = a:b")
     packages.install(site, "Other.Package", "", "hard", kind="egg")
-    found = {(one.name, one.target) for one in installed.offers()}
+    found = {(one.name, one.target) for one in entry_point_plugins.offers()}
     assert found == {(one.name, one.value) for one in importlib.metadata.entry_points(group=GROUP)}
     assert {"soft", "softer", "hard"} <= {name for name, _ in found}
 
@@ -126,7 +126,7 @@ def test_a_specification_of_a_family_that_is_here_asks_no_other_package(monkeypa
     def offers():
         raise AssertionError("packages were listed")
 
-    monkeypatch.setattr(installed, "offers", offers)
+    monkeypatch.setattr(entry_point_plugins, "offers", offers)
     spec = cfmkit.load(Path(__file__).parents[2] / "configs" / "cam.yaml")
     assert cfmkit.analyze(spec).status.usable
     assert families.origin("cam") == {}
@@ -161,7 +161,7 @@ sys.path.insert(0, sys.argv[1])
 import cfmkit.families
 best = 1.0
 for _ in range(5):
-    cfmkit.families.installed._offers_on.cache_clear()
+    cfmkit.families.entry_point_plugins._offers_on.cache_clear()
     began = time.process_time()
     names = cfmkit.families.names()
     best = min(best, time.process_time() - began)

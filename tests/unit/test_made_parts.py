@@ -14,10 +14,10 @@ from cfmkit.errors import SpecError
 from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
-from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.made_parts import common, judge, yields_of
 from cfmkit.studies.noted_metrics import metrics_of
-from cfmkit.studies.study import Study
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 

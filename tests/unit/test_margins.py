@@ -15,10 +15,10 @@ from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families.base import Run
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.specs.units import Share
-from cfmkit.studies import margins
-from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.margins import with_design_margins
+from cfmkit.studies import redesign_for_yield
+from cfmkit.studies.redesign_for_yield import with_design_margins
 from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of, stated_places
+from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 
@@ -40,7 +40,7 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     nominal = cfmkit.analyze(design)
     places = places_of(nominal)
     rows = rows_of(nominal, sampled_of(design, places, Run()), places)
-    sight = margins.Sight(design, (), tolerances_of(design, design.design, 0), rows, Run())
+    sight = redesign_for_yield.Sight(design, (), tolerances_of(design, design.design, 0), rows, Run())
     larger, smaller = np.array([5e-5]), np.array([-5e-5])
     assert [sight.is_good(np.empty(0), one) for one in (larger, smaller)] in ([False, True], [True, False])
     assert all(sight(np.empty(0), one) is not None for one in (larger, smaller))
@@ -104,9 +104,9 @@ def test_margins_of_beams_look_at_few_parts():
     # with differences it would be 61 of them at each step
     spec = cfmkit.load(LAN)
     nominal, made = cfmkit.analyze(spec), tolerances_of(spec, spec.design, 0)
-    free, places = margins.free_of(spec, spec), places_of(nominal)
+    free, places = redesign_for_yield.free_of(spec, spec), places_of(nominal)
     rows = rows_of(nominal, sampled_of(spec, places, Run()), places)
-    sight = margins.Sight(spec, tuple(free), made, rows, Run())
+    sight = redesign_for_yield.Sight(spec, tuple(free), made, rows, Run())
     start = np.array([spec.at(path) for path in free])
     found = sight.slopes(start, np.zeros(len(made.paths)))
     assert np.isfinite(found.by_x).all()
@@ -156,7 +156,7 @@ def test_rows_of_a_requirement_hold_just_as_long_as_the_metric_keeps_it(requirem
 @pytest.fixture
 def few(monkeypatch):
     """Judge by few parts: what is tested is where the search goes."""
-    monkeypatch.setattr(margins, "CHECKED", 60)
+    monkeypatch.setattr(redesign_for_yield, "CHECKED", 60)
 
 
 def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
@@ -200,7 +200,7 @@ def test_where_nothing_may_move_the_yield_is_reached_or_not_and_that_is_said(few
 )
 def test_what_a_design_chooses_may_move_for_its_yield_too(config, moving):
     spec = cfmkit.load(f"configs/{config}.yaml")
-    found = margins.free_of(spec, spec)
+    found = redesign_for_yield.free_of(spec, spec)
     assert set(moving) <= set(found)
     assert all(low <= spec.at(path) <= high and low < high for path, (low, high) in found.items())
 
@@ -246,9 +246,9 @@ def test_the_largest_yield_is_found_where_the_worst_parts_cannot_be_helped():
     problem = RobustProblem(
         sight, np.array([[0.0, 0.9]]), drawn, np.ones(2), sight.rows.matrix, sight.rows.constant, about, 0.99
     )
-    alone = margins.checked(sight, with_margins(problem, np.array([0.1])).x)
-    largest = max(margins.checked(sight, np.array([x])) for x in np.linspace(0.0, 0.9, 46))
-    _, good = margins._held(problem, sight, np.array([0.1]))
+    alone = redesign_for_yield.checked(sight, with_margins(problem, np.array([0.1])).x)
+    largest = max(redesign_for_yield.checked(sight, np.array([x])) for x in np.linspace(0.0, 0.9, 46))
+    _, good = redesign_for_yield._held(problem, sight, np.array([0.1]))
     assert alone < 0.85 * largest
     assert good >= 0.95 * largest
 
@@ -285,7 +285,7 @@ def with_three_springs(elongation):
 def test_the_next_springs_of_a_catalogue_are_tried_where_the_best_ones_miss_the_yield(elongation, monkeypatch):
     """They need 169 mm for the stroke, the next best 183 mm, the third 158.1 mm."""
     for name, value in (("CHECKED", 20), ("ROUNDS", 1), ("LOWER", 0)):
-        monkeypatch.setattr(margins, name, value)
+        monkeypatch.setattr(redesign_for_yield, name, value)
     given = with_three_springs(elongation)
     others = cfmkit.design(given.replace({"design.yield": None})).next_best
     assert [make().spec.mechanism.springs.name for make in others] == ["soft", "stiff"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from cfmkit.numerics.last_places import NARROW, last_places
+from cfmkit.numerics.where_condition_ends import NARROW, last_places
 
 ROOT = 0.3 + 0.4 * np.arange(12) / 11
 CURVES = {

@@ -14,7 +14,7 @@ from cfmkit.studies.engine import run
 from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
 from cfmkit.studies.summary import Summary, main_columns
-from cfmkit.studies.sweep import SweepRequest, prepare
+from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
 from cfmkit.studies.varied_axes import wish
 
 TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")

@@ -63,7 +63,7 @@ def test_a_result_is_shown_with_metrics_requirements_and_one_figure(result):
 
 def test_a_result_without_a_curve_is_shown_with_its_reason():
     spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
-    from cfmkit.runs.analysis_view import AnalysisView
+    from cfmkit.runs.notebook_result import AnalysisView
 
     shown = AnalysisView.of(Result(spec, Status.NO_EQUILIBRIUM, "nothing holds it"))._repr_html_()
     assert "nothing holds it" in shown

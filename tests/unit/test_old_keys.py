@@ -7,7 +7,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.results import OLD_KEY
-from cfmkit.studies.design_tolerances import assumed, tolerances_of
+from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances_of
 
 
 def warned(spec):

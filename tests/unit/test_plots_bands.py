@@ -7,9 +7,9 @@ import pytest
 from plot_support import axes, band_boxes, flipped, loop_curve, result_of
 
 from cfmkit.curves import Curve
-from cfmkit.plots.bands import bands_of, limits_on
+from cfmkit.plots.bands_from_requirements import bands_of, limits_on
+from cfmkit.plots.curve_with_enlarged_band import enlarged, loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.loop_figure import enlarged, loop_figure
 from cfmkit.plots.style import BAND, TROUBLE
 from cfmkit.results import Quantity
 

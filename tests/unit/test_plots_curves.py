@@ -8,7 +8,7 @@ from plot_support import axes, data_lines, loop_curve
 
 from cfmkit.curves import Curve
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.line_chart import Limit, MarkedRange
+from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange
 from cfmkit.plots.style import png
 
 

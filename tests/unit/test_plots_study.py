@@ -7,11 +7,11 @@ import pytest
 
 import cfmkit
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_figure_inputs import DrawnScale, StudyCurve, StudyMarks
+from cfmkit.plots.study_figure_types import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings
-from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
+from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare, summary_of
 from cfmkit.studies.varied_axes import wishes
 from cfmkit.tables import Table, TableColumn
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cfmkit.cli.output import Terminal
-from cfmkit.cli.page_blocks import CellGrid, GridColumn
+from cfmkit.cli.page_block_types import CellGrid, GridColumn
 
 
 @pytest.mark.parametrize("width", [40, 60, 108])

@@ -18,12 +18,12 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.moving_svg import poses
+from cfmkit.plots.poses_in_one_svg import poses
 from cfmkit.plots.style import axes_mm, new_figure
 from cfmkit.plots.vector_formats import inline, svg
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_files, run_outcome, run_page, study_page, suggestion_files
-from cfmkit.studies.batch_entries import Entry
+from cfmkit.runs import batch_output_files, run_outcome, run_page, study_page, suggestion_files
+from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOSTILE = "</script><img src=x onerror=alert(1)> \"quoted\" & 'more'"
@@ -228,7 +228,7 @@ def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
         ),
         Entry("bad.yaml", "bad", status="invalid", code=ExitCode.INVALID, message=HOSTILE),
     )
-    text = batch_files.page(entries, "two", "cfmkit batch .").decode()
+    text = batch_output_files.page(entries, "two", "cfmkit batch .").decode()
     outline = Outline(text)
     assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == [
         "b%20c/report.html",

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from cfmkit.studies.sensitivity import distributions, intervals, local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity import (
+    distributions,
+    local,
+    morris,
+    oat,
+    probability_confidence_intervals,
+    sobol,
+    tolerance,
+)
 from cfmkit.studies.sensitivity.distributions import ParameterSpread
 
 RANGE = {"kind": "uniform", "nominal": 0.0}
@@ -240,7 +248,10 @@ def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
 @pytest.mark.parametrize("count", [10, 40, 300])
 def test_the_exact_interval_covers_the_truth_as_often_as_it_says_and_wilson_on_average(count):
     outcomes = np.arange(count + 1)
-    for name, interval in (("exact", intervals.clopper_pearson), ("score", intervals.wilson)):
+    for name, interval in (
+        ("exact", probability_confidence_intervals.clopper_pearson),
+        ("score", probability_confidence_intervals.wilson),
+    ):
         ends = np.array([interval(int(k), count) for k in outcomes])
         covered = []
         for truth in np.linspace(0.02, 0.98, 49):
@@ -255,12 +266,14 @@ def test_the_interval_of_a_paired_difference_covers_the_truth():
     generator, truth, hits = np.random.default_rng(0), 0.1, 0
     for _ in range(400):
         kinds = generator.choice(3, size=120, p=[0.15, 0.05, 0.8])
-        low, high = intervals.paired_difference(int((kinds == 0).sum()), int((kinds == 1).sum()), 120)
+        low, high = probability_confidence_intervals.paired_difference(
+            int((kinds == 0).sum()), int((kinds == 1).sum()), 120
+        )
         hits += low <= truth <= high
     assert hits / 400 == pytest.approx(0.95, abs=0.025)
 
 
 def test_an_interval_without_samples_says_nothing():
-    assert intervals.wilson(0, 0) == (0.0, 1.0)
-    assert intervals.clopper_pearson(0, 0) == (0.0, 1.0)
-    assert intervals.paired_difference(0, 0, 0) == (-1.0, 1.0)
+    assert probability_confidence_intervals.wilson(0, 0) == (0.0, 1.0)
+    assert probability_confidence_intervals.clopper_pearson(0, 0) == (0.0, 1.0)
+    assert probability_confidence_intervals.paired_difference(0, 0, 0) == (-1.0, 1.0)

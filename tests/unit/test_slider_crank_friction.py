@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.springs.assembly import assemble, turned
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turned
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PINS = {"diameter": "3 mm", "friction": 0.1}

@@ -27,13 +27,20 @@ import cfmkit
 from cfmkit import api
 from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.printed import search
-from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure, joints, kink, mirrored, spread
-from cfmkit.families.slider_crank.printed.pressing import PressingEnd
-from cfmkit.families.slider_crank.printed.search import Ranges
-from cfmkit.families.slider_crank.printed.sizing import rotations, sized
+from cfmkit.families.slider_crank.printed import strip_thickness_search
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
+from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, sized
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
+    Elasticity,
+    Flexure,
+    joints,
+    kink,
+    mirrored,
+    spread,
+)
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.strip_thickness_search import Ranges
 from cfmkit.numerics import sqp
 from cfmkit.numerics.barycentric import differentiation, interpolation
 from cfmkit.results import Status
@@ -501,12 +508,12 @@ def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pyt
 
     task = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
     wanted = task, Form(2, width=WIDTH), Ranges(np.tile([0.5, 2.0], (2, 1)), 15 * MM), 2, Run(notes=Recorder()), "x"
-    first = search.search(*wanted)
+    first = strip_thickness_search.search(*wanted)
     assert len(notes) == 2
-    monkeypatch.setattr(search, "_climb", None)
-    again = search.search(*wanted)
-    assert isinstance(first, search.FoundStrip)
-    assert isinstance(again, search.FoundStrip)
+    monkeypatch.setattr(strip_thickness_search, "_climb", None)
+    again = strip_thickness_search.search(*wanted)
+    assert isinstance(first, strip_thickness_search.FoundStrip)
+    assert isinstance(again, strip_thickness_search.FoundStrip)
     np.testing.assert_array_equal(again.descent.z, first.descent.z)
     assert again.descent.evaluations == first.descent.evaluations
 

@@ -11,11 +11,11 @@ from slider_crank import DEG, LI, START, config
 
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.assembly import assemble, reactions
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
 from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
 from cfmkit.numerics.box_search import BoxAxis, lowest
-from cfmkit.numerics.turning_points import monotone, sharpened
+from cfmkit.numerics.hermite_cubic_turning_points import monotone, sharpened
 
 rng = np.random.default_rng(20)
 

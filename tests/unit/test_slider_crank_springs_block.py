@@ -11,11 +11,11 @@ from cfmkit import api
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
 from cfmkit.plots.study import draw_map, draw_metric
-from cfmkit.plots.study_figure_inputs import DrawnScale, StudyMarks
+from cfmkit.plots.study_figure_types import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid, zipped
-from cfmkit.studies.study import Study
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.varied_axes import axes, wishes
 from cfmkit.studies.vectorised_blocks import evaluate_block, measures
 

@@ -169,8 +169,8 @@ def test_a_window_may_end_exactly_where_a_joint_reaches_its_limit(force):
 @pytest.mark.slow  # some thousand linear programmes
 @pytest.mark.parametrize("seed", range(6))
 def test_no_window_anywhere_is_wider_than_the_widest(seed):
+    from cfmkit.families.slider_crank.springs.rates_for_widest_window import judged, widest_of_all
     from cfmkit.families.slider_crank.springs.targets import task_of
-    from cfmkit.families.slider_crank.springs.widest_window import judged, widest_of_all
 
     random = np.random.default_rng(seed)
     about = {

@@ -12,8 +12,8 @@ from slider_crank import DEG, config, force_of_energy
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.slider_crank.springs.assembly import assemble, reactions
 from cfmkit.families.slider_crank.springs.figures import figures
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
 from cfmkit.families.slider_crank.springs.targets import task_of
 from cfmkit.families.slider_crank.unit_springs import JOINTS, along_slider
 

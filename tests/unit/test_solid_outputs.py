@@ -12,8 +12,8 @@ from cfmkit.errors import SpecError
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.mesh import mesh
-from cfmkit.solid.motions_and_reactions import MaterialPoint
 from cfmkit.solid.plane_stress_law import SaintVenantKirchhoff
+from cfmkit.solid.point_motions_and_reactions import MaterialPoint
 
 if TYPE_CHECKING:
     from cfmkit.results import Result

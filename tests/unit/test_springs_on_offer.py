@@ -15,12 +15,12 @@ import cfmkit
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.springs.assembly import assemble
 from cfmkit.families.slider_crank.springs.best_sets import best_sets
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
-from cfmkit.specs.data_files import DataSource
-from cfmkit.stock.springs.catalogue import Miss, generic, nearest
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.stock.springs.helical import Wound
+from cfmkit.stock.springs.offers_and_generic_series import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -17,7 +17,7 @@ from store_support import listing, one_line
 import cfmkit
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import atomic_write, disk, file_hash, origin, stable_hash
-from cfmkit.store.identity import tree_hash
+from cfmkit.store.content_hashes_and_versions import tree_hash
 
 # ---- atomic_write
 

@@ -12,8 +12,8 @@ from shoulder_fillets import handbook
 import cfmkit
 from cfmkit.arrays import read_only
 from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, guided
-from cfmkit.families.fillet_table import FilletRow, fillet_table, largest_concentration
-from cfmkit.families.nominal_stress import SolvedBeams, both_images, nominal_stresses, with_steps
+from cfmkit.families.fillet_stress_results import FilletRow, fillet_table, largest_concentration
+from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
 from cfmkit.solid.fillet_stress import FilletArc
 
 if TYPE_CHECKING:

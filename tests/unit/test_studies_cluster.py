@@ -13,12 +13,12 @@ import pytest
 import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.studies.engine import Work, run
-from cfmkit.studies.executors import Cluster
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.study import Study
-from cfmkit.studies.sweep import outputs, summary_of
+from cfmkit.studies.serial_and_cluster_executors import Cluster
+from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, wish
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cfmkit[cluster]'")
@@ -120,7 +120,7 @@ class Killer:
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
-    monkeypatch.setattr("cfmkit.studies.executors.CONNECT_WITHIN", 1)
+    monkeypatch.setattr("cfmkit.studies.serial_and_cluster_executors.CONNECT_WITHIN", 1)
     with pytest.raises(UsageError, match="no Dask scheduler answers"):
         run(work(2), Cluster("tcp://127.0.0.1:9"))
 

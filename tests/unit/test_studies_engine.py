@@ -16,9 +16,9 @@ from cfmkit.studies.engine import Work, compact, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.plan import grid
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.rows import squeezed, unsqueezed
-from cfmkit.studies.study import Study
+from cfmkit.studies.row_blocks_for_journal import squeezed, unsqueezed
 from cfmkit.studies.tables import results_csv
 from cfmkit.studies.varied_axes import axes, wish
 from cfmkit.tables import read_csv
@@ -58,7 +58,8 @@ def test_a_bug_is_a_crashed_row_with_its_traceback_and_is_not_kept(monkeypatch, 
         return record.analyze(spec, run)
 
     monkeypatch.setattr(
-        "cfmkit.studies.study.family", lambda _name: dataclasses.replace(record, models={"quasi-static": broken})
+        "cfmkit.studies.point_evaluation.family",
+        lambda _name: dataclasses.replace(record, models={"quasi-static": broken}),
     )
     with Journal(tmp_path / "journal") as journal:
         records = run(work(FRICTION), journal=journal)
@@ -145,7 +146,7 @@ def test_whatever_decides_a_row_makes_it_new(tmp_path, change):
 def test_rows_of_other_code_are_computed_again(tmp_path, monkeypatch, changed):
     with Journal(tmp_path / "journal") as journal:
         run(work(FRICTION), journal=journal)
-    monkeypatch.setattr("cfmkit.studies.study.origin", lambda: origin() | {changed: "another"})
+    monkeypatch.setattr("cfmkit.studies.point_evaluation.origin", lambda: origin() | {changed: "another"})
     with Journal(tmp_path / "journal") as journal:
         assert run(work(FRICTION), journal=journal).reused == 0
 
@@ -196,7 +197,7 @@ def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(m
 
     fake = dataclasses.replace(record, models={"quasi-static": single}, analyze_block=block)
     monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
-    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.point_evaluation.family", lambda _name: fake)
     some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
     expected = [None, "undercut", "high_pressure_angle; undercut", "odd"]
     for reused in (0, 4):
@@ -263,7 +264,7 @@ def test_warnings_that_a_block_model_does_not_know_are_not_told_as_none(monkeypa
 
     fake = dataclasses.replace(family("cam"), models={"quasi-static": single}, analyze_block=block)
     monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
-    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.point_evaluation.family", lambda _name: fake)
     assert warnings(run(work(FRICTION, names=("theoretical_force",)))) == ["not_judged", None]
 
 

@@ -14,8 +14,8 @@ import pytest
 from cfmkit.errors import CfmError
 from cfmkit.results import Status
 from cfmkit.studies import pool as pools
-from cfmkit.studies.executors import Lost, never, serial
 from cfmkit.studies.pool import Pool
+from cfmkit.studies.serial_and_cluster_executors import Lost, never, serial
 
 SUPPORT = Path(__file__).parents[1] / "support"
 

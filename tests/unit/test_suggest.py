@@ -11,7 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
-from cfmkit.designing.starts import NEVER
+from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
@@ -19,13 +19,13 @@ from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
-from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
-from cfmkit.studies.executors import Lost
+from cfmkit.stock.springs.offers_and_generic_series import SHEAR_SHARE
+from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import figures, good_parts, search
 from cfmkit.studies.suggest.eased_wish import nearest
-from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
@@ -296,7 +296,7 @@ def test_a_candidate_whose_time_is_up_is_not_made():
 
 
 def test_a_design_that_its_own_time_ended_says_so_and_is_tried_again_by_the_next_run(monkeypatch):
-    monkeypatch.setattr("cfmkit.studies.suggest.proposal.LONGEST", 0.0)
+    monkeypatch.setattr("cfmkit.studies.suggest.proposal_making_and_judging.LONGEST", 0.0)
     asked = wish()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     designed = next(one for one in offer.candidates if one.design)

@@ -7,7 +7,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.metrics import check, evaluate
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.specs.target_curve import Target

@@ -13,11 +13,11 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.vcfm.build import parts
 from cfmkit.families.vcfm.findings import extreme_sums
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.longest_window import longest_window
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
@@ -30,7 +30,7 @@ from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
-from cfmkit.studies.study import Study
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.varied_axes import axes, wishes
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
@@ -318,7 +318,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     """Before thin leaves buckle, too: 1/500 of the rise at Q = 40. To 1e-6 of the peak, up to three times the rise."""
     from cfmkit.elastica import Control, Displacement, trace
     from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
-    from cfmkit.families.vcfm.traced_network import traced
+    from cfmkit.families.vcfm.interpolated_equilibrium_path import traced
 
     rise = 4.265427 * MM
     spec = table_i(

@@ -38,7 +38,7 @@ def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
         found = analyze(given.replace({"analysis.fidelity": "analytic"}), run)
         return replace(found, curves=tuple(replace(one, effort=1.04 * one.effort) for one in found.curves))
 
-    monkeypatch.setattr("cfmkit.families.vcfm.solid.analyze", stiffer)
+    monkeypatch.setattr("cfmkit.families.vcfm.plane_fem_model.analyze", stiffer)
     found = verified(spec, Design(spec, Status.COMPLETE), Run())
     mean = found.search["verified_solid_before"].quantity.value
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(11.15 / mean)

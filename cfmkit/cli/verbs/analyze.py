@@ -68,14 +68,14 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
-    from cfmkit.experiment.additions_to_run import (
+    from cfmkit.experiment.comparison import compare
+    from cfmkit.experiment.comparison_and_calibration_outputs import (
         causes_lines,
         comparison_data,
         comparison_figures,
         comparison_files,
         comparison_lines,
     )
-    from cfmkit.experiment.comparison import compare
     from cfmkit.runs.run import analysed
     from cfmkit.runs.run_outcome import Supplement
 

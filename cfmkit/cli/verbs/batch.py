@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import (
     Changing,
     Fidelity,
@@ -20,7 +20,19 @@ from cfmkit.cli.options import (
     flag,
     option,
 )
-from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, CellGrid, Paragraph, Span, TextLine, Written, columns
+from cfmkit.cli.page_block_types import (
+    BAD,
+    BLANK,
+    FAINT,
+    GOOD,
+    LABEL,
+    CellGrid,
+    Paragraph,
+    Span,
+    TextLine,
+    Written,
+    columns,
+)
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, visible
 
@@ -28,9 +40,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.runs.batch import BatchResult
-    from cfmkit.studies.batch_entries import Entry
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
     from cfmkit.studies.metric_changes import BatchComparison
 
 
@@ -44,7 +56,9 @@ class BatchOptions(Changing, FigureChoice):
 
     specs: Annotated[
         list[str],
-        argument("SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", completion.specs),
+        argument(
+            "SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", completion_candidates.specs
+        ),
     ]
     out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/batch/.")] = (
         None
@@ -96,7 +110,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli import study_verbs
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch, unreached
-    from cfmkit.studies.batch_entries import message
+    from cfmkit.studies.batch_sources_and_outcomes import message
 
     start = study_verbs.now()
     with watching(terminal, "specs") as progress:
@@ -177,7 +191,7 @@ MOST_CHANGES = 8
 
 def _page(found: BatchResult, written: Written, more: Sequence[str], everything: bool) -> Iterator[Block]:
     """Yield one line per specification, and what is wrong below it."""
-    from cfmkit.studies.batch_entries import message
+    from cfmkit.studies.batch_sources_and_outcomes import message
 
     entries = found.entries
     count = _reused(entries)
@@ -212,7 +226,7 @@ def _changes(compared: BatchComparison, everything: bool) -> Iterator[Block]:
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:
-    from cfmkit.studies.batch_entries import outcome
+    from cfmkit.studies.batch_sources_and_outcomes import outcome
 
     word = outcome(one)
     good = word == "ok"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_record, option, read_measured
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
 class CalibrateOptions(Computing, Measuring):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", completion.tables)]
+    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", completion_candidates.tables)]
     fit: Annotated[
         str,
         option(
@@ -78,7 +78,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     from dataclasses import replace
 
     from cfmkit import api
-    from cfmkit.experiment import additions_to_run as add
+    from cfmkit.experiment import comparison_and_calibration_outputs as add
     from cfmkit.runs.run_outcome import Supplement, report_on
     from cfmkit.tables import to_csv
 

@@ -6,10 +6,10 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
-from cfmkit.cli.page_blocks import BAD, GOOD, Span, whole_line, within
+from cfmkit.cli.page_block_types import BAD, GOOD, Span, whole_line, within
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import CfmError, ExitCode, visible
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import TextLine
+    from cfmkit.cli.page_block_types import TextLine
     from cfmkit.specs.spec import Spec
 
 PLACE = 40
@@ -30,7 +30,7 @@ class CheckOptions(Changing):
 
     specs: Annotated[
         list[str],
-        argument("SPEC", "YAML files, or folders with them; - reads standard input.", completion.specs),
+        argument("SPEC", "YAML files, or folders with them; - reads standard input.", completion_candidates.specs),
     ]
     quiet: Quiet = False
 
@@ -60,7 +60,7 @@ def run(options: CheckOptions, terminal: Terminal) -> Answer:
 
 def _files(named: list[str]) -> list[str]:
     """Return the files to check: a folder stands for all YAML files in it and below, as in a batch."""
-    from cfmkit.studies.batch_entries import files_below
+    from cfmkit.studies.batch_sources_and_outcomes import files_below
 
     found: list[str] = []
     for name in named:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, Quiet, argument, flag
-from cfmkit.cli.page_blocks import Verbatim, whole_line
+from cfmkit.cli.page_block_types import Verbatim, whole_line
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import TextLine
+    from cfmkit.cli.page_block_types import TextLine
     from cfmkit.runs.cleaning import Remains
 
 PLACE = 80

@@ -34,7 +34,7 @@ def run(options: DesignOptions, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
     from cfmkit.cli.run_verbs import execute
     from cfmkit.runs.run import Verb, designed
-    from cfmkit.studies.executors import cores
+    from cfmkit.studies.serial_and_cluster_executors import cores
 
     running = partial(long_run, options.jobs or cores(), options.fresh)
     return execute(

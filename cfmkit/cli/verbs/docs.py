@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, argument
-from cfmkit.cli.page_blocks import Paragraph, Verbatim, field, listed
+from cfmkit.cli.page_block_types import Paragraph, Verbatim, field, listed
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError, visible
 from cfmkit.runs.shipped import shipped_folder

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.cli.options import Common
-from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, listed
+from cfmkit.cli.page_block_types import LABEL, Field, Span, TextLine, Verbatim, field, listed
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
 
     Record = dict[str, Any]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
-from cfmkit.cli.page_blocks import BAD, GOOD, Paragraph, command_line, field, listed
+from cfmkit.cli.page_block_types import BAD, GOOD, Paragraph, command_line, field, listed
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
-    from cfmkit.studies.batch_entries import Entry
+    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 PLACE = 52
 EXAMPLE = "cfmkit examples cam"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import OneSpec, Quiet, option
-from cfmkit.cli.page_blocks import Paragraph, Written
+from cfmkit.cli.page_block_types import Paragraph, Written
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, option
-from cfmkit.cli.page_blocks import Written
+from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
@@ -23,7 +23,8 @@ class FigureOptions(Changing, FigureChoice):
     """Arguments and options."""
 
     file: Annotated[
-        str, argument("FILE", "YAML file: panels (each with run and plot), columns, width.", completion.specs)
+        str,
+        argument("FILE", "YAML file: panels (each with run and plot), columns, width.", completion_candidates.specs),
     ]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/FILE-figure/.")
@@ -37,8 +38,8 @@ def run(options: FigureOptions, terminal: Terminal) -> Answer:
     from cfmkit.errors import UsageError
     from cfmkit.runs.composed_figure import panels, read
     from cfmkit.store import RunFolder
-    from cfmkit.studies.executors import cores, serial
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import cores, serial
 
     if options.no_plots:
         raise UsageError("--no-plots: a figure is all that this command makes")

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
-from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
+from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.experiment.report import MeasureReport
 
 PLACE = 32
@@ -27,7 +27,7 @@ class MeasureOptions(Measuring, FigureChoice):
     """Arguments and options."""
 
     data: Annotated[
-        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", completion.tables)
+        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", completion_candidates.tables)
     ]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument, flag, option
-from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
+from cfmkit.cli.page_block_types import GOOD, Paragraph, Verbatim, command_line
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import OutputError, UsageError, visible
 
@@ -23,7 +23,9 @@ EXAMPLE = "cfmkit new cam -o mine.yaml"
 class NewOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", completion.families)]
+    family: Annotated[
+        str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", completion_candidates.families)
+    ]
     out: Annotated[
         str | None,
         option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),

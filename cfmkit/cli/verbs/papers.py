@@ -6,7 +6,20 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, argument, flag
-from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, Field, Paragraph, Span, TextLine, field, line, listed
+from cfmkit.cli.page_block_types import (
+    BAD,
+    BLANK,
+    FAINT,
+    GOOD,
+    LABEL,
+    Field,
+    Paragraph,
+    Span,
+    TextLine,
+    field,
+    line,
+    listed,
+)
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode
 from cfmkit.runs.papers import VERDICTS
@@ -15,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
 
     Record = Mapping[str, Any]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument
-from cfmkit.cli.page_blocks import JsonText
+from cfmkit.cli.page_block_types import JsonText
 from cfmkit.cli.verb_result import Answer, told_of
 
 if TYPE_CHECKING:
@@ -21,7 +21,9 @@ EXAMPLE = "cfmkit schema cam > cam.schema.json"
 class SchemaOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[str | None, argument("FAMILY", "One family only; default: all.", completion.families)] = None
+    family: Annotated[
+        str | None, argument("FAMILY", "One family only; default: all.", completion_candidates.families)
+    ] = None
 
 
 def run(options: SchemaOptions, terminal: Terminal) -> Answer:

@@ -7,9 +7,9 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
-from cfmkit.cli.page_blocks import (
+from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
     FAINT,
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
+    from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.tolerance import Yield
 
 PLACE = 24
@@ -94,7 +94,7 @@ class SensitivityOptions(Studying):
             metavar="A.B=SPREAD",
             text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
             "mechanism.roller_radius='normal:0.05 mm', 'uniform:2 %'. Repeatable; replaces the spec's parameters.",
-            autocompletion=completion.changes,
+            autocompletion=completion_candidates.changes,
         ),
     ] = None
     on_failure: Annotated[

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.cli.page_blocks import BLANK, GOOD, Paragraph, field, listed
+from cfmkit.cli.page_block_types import BLANK, GOOD, Paragraph, field, listed
 from cfmkit.cli.verb_result import Answer, told_of
 from cfmkit.errors import UsageError, visible
 
@@ -27,7 +27,7 @@ class ShowOptions(Common):
         argument(
             "FAMILY|units|metrics|materials|references|NAME",
             "What to explain: a topic, or anything by its name: brace_length, pla, MPa; default: list all.",
-            completion.topics,
+            completion_candidates.topics,
         ),
     ] = None
     figure: Annotated[
@@ -72,7 +72,7 @@ def _drawn(name: str | None, given: str) -> Answer:
     """Write the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
-    from cfmkit.runs.family_drawing import drawn, scheme
+    from cfmkit.runs.parameter_sketch_file import drawn, scheme
     from cfmkit.store.disk import reporting, write_new
 
     found = scheme(name)

@@ -9,9 +9,20 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, WithReport, argument, flag, option
-from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written, line
+from cfmkit.cli.page_block_types import (
+    BAD,
+    BLANK,
+    LABEL,
+    CellGrid,
+    GridColumn,
+    Paragraph,
+    Span,
+    TextLine,
+    Written,
+    line,
+)
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
@@ -19,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
 
 PLACE = 5
 EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
@@ -43,7 +54,8 @@ class SuggestOptions(Common):
     """Arguments and options."""
 
     wish: Annotated[
-        str | None, argument("WISH", "YAML file with a block 'wish'; - reads standard input.", completion.specs)
+        str | None,
+        argument("WISH", "YAML file with a block 'wish'; - reads standard input.", completion_candidates.specs),
     ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '[19 N, 21 N]'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
@@ -107,14 +119,14 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     that meet the whole wish are listed.
     """
     from cfmkit.cli.study_verbs import noting
-    from cfmkit.designing.starts import Clock
+    from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestion_files
     from cfmkit.runs.read_wish import wish_of
     from cfmkit.runs.run import long_run
     from cfmkit.store import RunFolder
-    from cfmkit.studies.executors import cores
     from cfmkit.studies.pool import Pool
+    from cfmkit.studies.serial_and_cluster_executors import cores
     from cfmkit.studies.suggest.search import RESERVE, suggest, with_better_models
 
     start, begun = time.perf_counter(), time.time()

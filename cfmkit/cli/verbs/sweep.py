@@ -6,9 +6,9 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion
+from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
-from cfmkit.cli.page_blocks import (
+from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
     FAINT,
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.cli.output import Terminal
-    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.page_block_types import Block
     from cfmkit.specs.yamlio import Document
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
-    from cfmkit.studies.sweep import SweepRequest
+    from cfmkit.studies.sweep_request_and_files import SweepRequest
 
 PLACE = 22
 EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
@@ -58,7 +58,7 @@ class SweepOptions(Studying):
             metavar="A.B=VALUES",
             text="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
             "Repeatable; replaces what the spec's block sweep varies.",
-            autocompletion=completion.changes,
+            autocompletion=completion_candidates.changes,
         ),
     ] = None
     zip: Annotated[bool, flag("--zip", text="Vary values in step instead of in all combinations.")] = False
@@ -85,7 +85,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli import study_verbs
     from cfmkit.cli.run_verbs import folder_of
     from cfmkit.runs.run import placing, read
-    from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
+    from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
     start = study_verbs.now()
     out, form, in_parquet = folder_of(options, "sweep"), options.form, study_verbs.wants_parquet(options.table)
@@ -140,7 +140,7 @@ def request(options: SweepOptions) -> SweepRequest:
         If one is malformed, or two contradict each other.
     """
     from cfmkit.cli.study_verbs import names
-    from cfmkit.studies.sweep import SweepRequest
+    from cfmkit.studies.sweep_request_and_files import SweepRequest
     from cfmkit.studies.varied_axes import wish
 
     if options.zip and options.sample:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import Common, Quiet
-from cfmkit.cli.page_blocks import Verbatim
+from cfmkit.cli.page_block_types import Verbatim
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:

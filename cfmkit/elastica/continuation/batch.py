@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.continuation.tracing import trace
+from cfmkit.elastica.continuation.trace_to_tolerance import trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:

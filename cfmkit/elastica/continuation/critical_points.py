@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT, Spot
+from cfmkit.elastica.equilibrium.network_solver import FORCE_WEIGHT, Spot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
+    from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
 
 _SEARCHES = 40  # solutions in which a bracket is closed at most: halving alone would take forty to 1e-12 of it
 _CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.critical_points import Curvature, Singular, entered
-from cfmkit.elastica.continuation.state import PRIMARY, Resume
+from cfmkit.elastica.continuation.path_and_moves import PRIMARY, Resume
 from cfmkit.elastica.equilibrium.mesh import LOADS
-from cfmkit.elastica.equilibrium.meshed_network import Spot
+from cfmkit.elastica.equilibrium.network_solver import Spot
 from cfmkit.elastica.outcome.path import Event
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import PathProblem, Trail
+    from cfmkit.elastica.continuation.path_and_moves import PathProblem, Trail
 
 _JUST = 1e-10  # share of the prestress or the constant loads that the start is just critical at
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start

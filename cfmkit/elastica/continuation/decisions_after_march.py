@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation import (
-    branch_end,
+    branch_rejoins_path,
     critical_start,
     decisions_at_bifurcation,
-    ending,
-    limit_point,
+    ending_messages,
+    passing_limit_points,
     points_at_bifurcation,
 )
-from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop
+from cfmkit.elastica.continuation.path_and_moves import PRIMARY, Leg, Resume, Stop
 from cfmkit.elastica.continuation.uncondensed import uncondensed
 from cfmkit.elastica.kernels.status_codes import DENIED, DONE, INERTIA, NO_START, STALLED
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
-    from cfmkit.elastica.equilibrium.meshed_network import Spot
+    from cfmkit.elastica.continuation.path_and_moves import Move, PathProblem, Trail
+    from cfmkit.elastica.equilibrium.network_solver import Spot
 
 _NEARBY = 0.01  # share of the drive's range within which a march stalls at the same place again
 
@@ -35,7 +35,7 @@ def decided(problem: PathProblem, leg: Leg, fresh: bool) -> Move:
     if leg.code == DONE and requested == len(trail.stretch.targets):
         if requested == len(problem.values):
             return Resume(trail, leg.spot)
-        return limit_point.by_the_drive(problem, trail, requested)
+        return passing_limit_points.by_the_drive(problem, trail, requested)
     move = _after(problem, leg, requested)
     return Stop(move.trail) if problem.first_only and move.trail.first is not None else move
 
@@ -52,9 +52,9 @@ def _after(problem: PathProblem, leg: Leg, requested: int) -> Move:
         message = f"stability is lost at {trail.drive * problem.unit:.6g}: the path ends there"
         return Stop(trail.stopped(PathStatus.JUMPS, message))
     if code == INERTIA:
-        return limit_point.back_to_the_drive(problem, decisions_at_bifurcation.crossed(problem, trail))
+        return passing_limit_points.back_to_the_drive(problem, decisions_at_bifurcation.crossed(problem, trail))
     if code == DONE:
-        return branch_end.rejoined(problem, trail, spot, leg.toward)
+        return branch_rejoins_path.rejoined(problem, trail, spot, leg.toward)
     if code == DENIED:
         behind = points_at_bifurcation.passed(problem, trail, float(trail.stretch.targets[requested]))
         return (
@@ -62,24 +62,24 @@ def _after(problem: PathProblem, leg: Leg, requested: int) -> Move:
         )
     if code == STALLED and trail.stretch.natural and len(trail.points):
         return _got_over(problem, trail, spot, requested)
-    return ending.stop(problem, trail, code)
+    return ending_messages.stop(problem, trail, code)
 
 
 def _got_over(problem: PathProblem, trail: Trail, spot: Spot, requested: int) -> Move:
     """Return where to go on after a march by the drive that stalled."""
-    fold = limit_point.is_near(problem, trail)
+    fold = passing_limit_points.is_near(problem, trail)
     if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:
-        return limit_point.around(problem, trail)
+        return passing_limit_points.around(problem, trail)
     trail = trail.changed(fold_at=spot.drive if fold else np.nan)
     if not fold and (again := uncondensed(problem, trail)) is not None:
         return again
     move: Move | None = None
     if any(name != PRIMARY for name in trail.branches):
-        move = branch_end.stepped_over(problem, trail, spot, requested)
+        move = branch_rejoins_path.stepped_over(problem, trail, spot, requested)
     if move is None:
         trail, move = decisions_at_bifurcation.past_corner(problem, trail, spot, requested)
     if move is not None:
         return move
     if problem.control.through_folds:
-        return limit_point.around(problem, trail)
-    return ending.stop(problem, trail, STALLED)
+        return passing_limit_points.around(problem, trail)
+    return ending_messages.stop(problem, trail, STALLED)

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation import limit_point, points_at_bifurcation
-from cfmkit.elastica.continuation.branch_end import end_at, predicted_end
+from cfmkit.elastica.continuation import passing_limit_points, points_at_bifurcation
+from cfmkit.elastica.continuation.branch_rejoins_path import end_at, predicted_end
+from cfmkit.elastica.continuation.path_and_moves import Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.points_at_bifurcation import NEAR_BIFURCATION
-from cfmkit.elastica.continuation.state import Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
 from cfmkit.elastica.continuation.uncondensed import uncondensed
-from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT
+from cfmkit.elastica.equilibrium.network_solver import FORCE_WEIGHT
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.critical_points import Singular
-    from cfmkit.elastica.continuation.state import Move, PathProblem, Trail
-    from cfmkit.elastica.equilibrium.meshed_network import Spot
+    from cfmkit.elastica.continuation.path_and_moves import Move, PathProblem, Trail
+    from cfmkit.elastica.equilibrium.network_solver import Spot
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
@@ -46,7 +46,7 @@ def crossed(problem: PathProblem, trail: Trail) -> Move:
     if natural:
         one, beyond = fine_spot(problem, trail, -2), fine_spot(problem, trail, -1)
     else:
-        one, beyond = limit_point.fine_spots(problem, trail, begun)
+        one, beyond = passing_limit_points.fine_spots(problem, trail, begun)
     if natural and len(trail.points) > 2 and _at_it(problem, trail, -2, one, beyond):
         back = _without_last_but_one(trail)
         if back is not None:

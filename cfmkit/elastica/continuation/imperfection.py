@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
+from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
 from cfmkit.elastica.model.network import Network
 from cfmkit.elastica.model.shapes import Bent
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.critical_points import Singular
-    from cfmkit.elastica.continuation.state import PathProblem
+    from cfmkit.elastica.continuation.path_and_moves import PathProblem
     from cfmkit.elastica.model.beam import Fit
 
 _KICK = 1e-5  # of the mode, to difference its states

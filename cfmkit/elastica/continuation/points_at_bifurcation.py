@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.critical_points import locate
-from cfmkit.elastica.continuation.state import fine_spot
-from cfmkit.elastica.equilibrium.meshed_network import Spot
+from cfmkit.elastica.continuation.path_and_moves import fine_spot
+from cfmkit.elastica.equilibrium.network_solver import Spot
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.critical_points import Singular
-    from cfmkit.elastica.continuation.state import BranchEnd, PathProblem, Trail
+    from cfmkit.elastica.continuation.path_and_moves import BranchEnd, PathProblem, Trail
 
 NEAR_BIFURCATION = 1e-5  # share of the drive's range
 _AT = 3e-11  # and within which a point is at the bifurcation, whose place is known to about 1e-11

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.continuation.state import PRIMARY, PathProblem, Trail
+from cfmkit.elastica.continuation.path_and_moves import PRIMARY, PathProblem, Trail
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
-from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver, Spot
+from cfmkit.elastica.equilibrium.network_solver import MarchOptions, Solver, Spot
 from cfmkit.elastica.kernels.status_codes import DONE, LONG, SHORT, STALLED
-from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.network import Network
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
@@ -31,7 +31,7 @@ _ENOUGH = 16  # segments of a beam with which such a way is found
 _STEP, _TURN = 0.25, 0.35  # first step, as a share of them; largest change of a pose in a step
 
 Follow = Callable[[PathProblem, str], Trail]
-"""Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.joined_marches.follow`."""
+"""Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.decision_loop.follow`."""
 
 
 class Start(NamedTuple):
@@ -170,7 +170,7 @@ def ends_of_branch(problem: PathProblem, trail: Trail, follow: Follow) -> Trail:
     sense = problem.sense
     if other is None or other.unstable == 0:
         return trail
-    from cfmkit.elastica.continuation import branch_end
+    from cfmkit.elastica.continuation import branch_rejoins_path
 
-    end, closed = branch_end.predicted_end(problem, trail, other, 0, sense, PRIMARY)
+    end, closed = branch_rejoins_path.predicted_end(problem, trail, other, 0, sense, PRIMARY)
     return trail.changed(ends=(end,) if end else (), closed=closed)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.critical_points import Curvature, leave
-from cfmkit.elastica.continuation.state import fine_spot
+from cfmkit.elastica.continuation.path_and_moves import fine_spot
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.critical_points import Singular
-    from cfmkit.elastica.continuation.state import PathProblem, Trail
-    from cfmkit.elastica.equilibrium.meshed_network import Spot
-    from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
+    from cfmkit.elastica.continuation.path_and_moves import PathProblem, Trail
+    from cfmkit.elastica.equilibrium.network_solver import Spot
+    from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
 
 _STEPS = 100  # on the way down at most: ten of the longest go as far as is near, the first ones are short
 _KICK, _LONGEST = 1e-3, 0.05  # first and longest step along one mode [rad]

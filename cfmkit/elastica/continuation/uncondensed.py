@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.state import Resume
-from cfmkit.elastica.equilibrium.uncondensed_system import UncondensedSolver
+from cfmkit.elastica.continuation.path_and_moves import Resume
+from cfmkit.elastica.equilibrium.uncondensed_solver import UncondensedSolver
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.state import PathProblem, Trail
+    from cfmkit.elastica.continuation.path_and_moves import PathProblem, Trail
 
 _STRAIGHT = 1e3  # largest dimensionless force of beams that are not pulled straight
 _MOST_SEGMENTS = 600  # of a network: the tangent is full, 6 unknowns a segment; 2000 segments take minutes a solution

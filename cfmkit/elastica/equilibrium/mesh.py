@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.model import HALVES, TABLE_COLUMNS, DiscreteNetwork
-from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES, ROWS
+from cfmkit.elastica.kernels.network_arrays import HALVES, TABLE_COLUMNS, DiscreteNetwork
+from cfmkit.elastica.kernels.symplectic_splitting_coefficients import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
 from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
 from cfmkit.elastica.model.section import Taper
@@ -18,7 +18,7 @@ from cfmkit.elastica.model.section import Taper
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Fit
-    from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.model.network_under_drive import Layout
     from cfmkit.elastica.model.section import Section
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
@@ -63,7 +63,7 @@ class Grid:
     beam_of_step, piece : (steps,) int arrays
         The beam that a step is on, and the smooth piece of it; pieces count through all beams.
     segment_step, beam_segment : int arrays
-        As in `cfmkit.elastica.kernels.model.DiscreteNetwork`.
+        As in `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
     """
 
     edges: FloatArray
@@ -272,7 +272,7 @@ _RISE = np.array([[0.0, 1.0, 2 * x, 3 * x * x] for x in _PAIR]) @ np.linalg.inv(
 def _strip_columns(
     fitted: Fit, section: Section, ends: tuple[Any, Any], where: tuple[float, float], whole: tuple[Any, Any]
 ) -> list[Any]:
-    """Return the columns that wide strips have beside others, in SI: see `cfmkit.elastica.kernels.model.HALVES`.
+    """Return the columns of wide strips beside others, in SI: see `cfmkit.elastica.kernels.network_arrays.HALVES`.
 
     ends: parameters at both ends of the drifts; whole: their lengths, and integrals of ds/EI.
     """

@@ -8,8 +8,8 @@ Reissner (1972)]:
     M' = y' h - x' v,   (h, v)' = -w
 
 by the arc length; w is a dead load per reference length. The equations are integrated by the symmetric splitting of
-`cfmkit.elastica.kernels.splitting`, from a table that does not depend on the state: see
-`cfmkit.elastica.kernels.model.DiscreteNetwork`.
+`cfmkit.elastica.kernels.symplectic_splitting_coefficients`, from a table that does not depend on the state: see
+`cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
 
 Derivatives are those of the discrete solution. That by the rotation at the start follows from the others, since the
 whole segment may be turned together with its force.
@@ -20,8 +20,8 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS
-from cfmkit.elastica.kernels.splitting import ROWS
+from cfmkit.elastica.kernels.network_arrays import TABLE_COLUMNS
+from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 from cfmkit.elastica.kernels.wide_strip import strip_drift
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M

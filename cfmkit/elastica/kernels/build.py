@@ -24,7 +24,19 @@ from numba.core.typing.context import Context
 from cfmkit.elastica.kernels import entry_points
 from cfmkit.elastica.kernels.compiler import KERNELS, OPTIONS
 from cfmkit.elastica.kernels.machine_code import SYMBOL, Code
-from cfmkit.elastica.kernels.packing import AXES, DATA, DTYPE, DTYPES, ENTRIES, FLAGS, READY, REFUSED, SHAPE, TYPE, Kind
+from cfmkit.elastica.kernels.passing_arrays_by_address import (
+    AXES,
+    DATA,
+    DTYPE,
+    DTYPES,
+    ENTRIES,
+    FLAGS,
+    READY,
+    REFUSED,
+    SHAPE,
+    TYPE,
+    Kind,
+)
 from cfmkit.elastica.kernels.signatures import DOORS, REAL, WHOLE
 
 if TYPE_CHECKING:
@@ -175,7 +187,7 @@ def _type(what: Any) -> Any:
 
 
 class _Reader:
-    """Writes code that reads values from a block of words, and looks into NumPy's arrays; see `packing`."""
+    """Writes code that reads words of a block and looks into NumPy's arrays; see `passing_arrays_by_address`."""
 
     def __init__(self, context: Any, builder: Any, block: Any) -> None:
         self.context, self.builder, self.block, self.at, self.arrays = context, builder, block, 0, 0

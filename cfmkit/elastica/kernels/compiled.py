@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.kernels import disk_cache, machine_code
-from cfmkit.elastica.kernels.packing import HEAD, REFUSED, Kind, flat, objects
+from cfmkit.elastica.kernels.passing_arrays_by_address import HEAD, REFUSED, Kind, flat, objects
 from cfmkit.elastica.kernels.signatures import DOORS, EACH, FORCES, MARCH, SOLVE, TANGENT
 from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
+    from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
 
 _Pair = ctypes.c_int64 * 2

@@ -2,7 +2,7 @@
 
 They are exact: the derivative of everything that the solver integrates and sums.
 
-`cfmkit.elastica.kernels.model.DesignSlopes` holds how a model changes with each variable. At equilibria the
+`cfmkit.elastica.kernels.network_arrays.DesignSlopes` holds how a model changes with each variable. At equilibria the
 residual stays zero, so the unknowns change by the solution of a linear system with the tangent that Newton's method
 uses; its right sides are the changes of the residual at unchanged unknowns. Along a beam those come from the
 drifts and kicks of the state, differentiated: one sweep for all the variables that a beam depends on.
@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica.kernels.beam_ode_derivatives import flow_slopes
+from cfmkit.elastica.kernels.beam_ode_design_derivatives import flow_slopes
 from cfmkit.elastica.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, lu_solve
 from cfmkit.elastica.kernels.newton import all_values, assemble
-from cfmkit.elastica.kernels.splitting import ROWS
-from cfmkit.elastica.kernels.springs import LINE, TURN, spring_law
+from cfmkit.elastica.kernels.springs_and_loads import LINE, TURN, spring_law
+from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 
 
 @kernel

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.elastica.kernels.machine_code import Code, linked, processor
-from cfmkit.store.identity import installed
-from cfmkit.store.private_folder import place, private_folder, trusted
+from cfmkit.store.content_hashes_and_versions import installed
+from cfmkit.store.private_cache_folder import place, private_folder, trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

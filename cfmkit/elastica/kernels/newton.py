@@ -8,7 +8,15 @@ from cfmkit.elastica.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, copy_matrix, lu_solve, positive_count
 from cfmkit.elastica.kernels.follower_stability import diverging
-from cfmkit.elastica.kernels.springs import acts, add_block, add_force, add_loads, add_springs, jacobian, wires_of
+from cfmkit.elastica.kernels.springs_and_loads import (
+    acts,
+    add_block,
+    add_force,
+    add_loads,
+    add_springs,
+    jacobian,
+    wires_of,
+)
 from cfmkit.elastica.kernels.status_codes import DIVERGED, SINGULAR, SLOW, SOLVED
 
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused

@@ -6,7 +6,7 @@ from cfmkit.elastica.kernels.beam_ode import plain_flow
 from cfmkit.elastica.kernels.chain import places_of, pose_of
 from cfmkit.elastica.kernels.compiler import kernel
 from cfmkit.elastica.kernels.newton import all_values, assemble
-from cfmkit.elastica.kernels.springs import add_force, add_loads, add_springs, jacobian, wires_of
+from cfmkit.elastica.kernels.springs_and_loads import add_force, add_loads, add_springs, jacobian, wires_of
 
 STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's start
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
-from cfmkit.elastica.kernels.packing import complexes, floats
+from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
+from cfmkit.elastica.kernels.passing_arrays_by_address import complexes, floats
 from cfmkit.elastica.kernels.workspace import HELD_SLOPES, MARCHING, SLOPES, SOLVING
 
 WHOLE, REAL = "integer", "number"

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.packing import Packed, floats, objects
+from cfmkit.elastica.kernels.passing_arrays_by_address import Packed, floats, objects
 from cfmkit.elastica.kernels.status_codes import KEPT
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.kernels.model import DesignSlopes, DiscreteNetwork
+    from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
 
 SOLVING = (
     floats(2),  # system, with the drive's column and the bordering row

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.arrays import distinct, read_only
-from cfmkit.elastica.equilibrium.meshed_network import Points
+from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.outcome.between_points import FEWEST, LEAST, ROUNDS, STRAY
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
@@ -112,7 +112,7 @@ class AlongTheWay:
 
     @cached_property
     def _known(self) -> dict[bytes, list[FloatArray]]:
-        """What was asked for: every metric asks for the same places."""
+        """What was requested: every metric asks for the same places."""
         return {}
 
     def stress(self, ways: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, distinct, read_only
-from cfmkit.elastica.equilibrium.meshed_network import Points
+from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.outcome.corners import Corner, SmoothStretch
@@ -29,7 +29,7 @@ from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, value
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.meshed_network import Spot
+    from cfmkit.elastica.equilibrium.network_solver import Spot
     from cfmkit.elastica.outcome.path import Path
 
 FEWEST = 4

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.equilibrium.meshed_network import Solver
+from cfmkit.elastica.equilibrium.network_solver import Solver
 from cfmkit.elastica.model.drive import Displacement
-from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.network import Network, Support
+from cfmkit.elastica.model.network_under_drive import Layout
 
 if TYPE_CHECKING:
     from typing import Any

@@ -17,9 +17,9 @@ from cfmkit.elastica.outcome.stress import StressExtremes, extremes, signed_extr
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
+    from cfmkit.elastica.equilibrium.network_solver import Points, Solver
     from cfmkit.elastica.model.beam import Fit
-    from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.model.network_under_drive import Layout
 
 _TIE = 1e-9  # share by which stresses of two beams differ that are one but for rounding
 

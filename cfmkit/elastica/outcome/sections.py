@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import Mesh, assemble_model, grid, si_rows, table
-from cfmkit.elastica.kernels.splitting import ROWS
+from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
-    from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.equilibrium.network_solver import Points, Solver
+    from cfmkit.elastica.model.network_under_drive import Layout
 
 _ROWS = 8  # samples of a segment,
 _TIGHT = 2e-12  # twice as many from this tolerance of Newton's method on: slopes of stresses are interpolated

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import assemble_model, table
-from cfmkit.elastica.kernels.model import DesignSlopes, in_order
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.kernels.network_arrays import DesignSlopes, in_order
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.sensitivity.plain_beam_slopes import plain_slopes
 from cfmkit.errors import InputError
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.mesh import Grid
-    from cfmkit.elastica.kernels.model import DiscreteNetwork
+    from cfmkit.elastica.kernels.network_arrays import DiscreteNetwork
 
 STEP = 1e-30
 _WHOLE = ("place_dof", "slot", "load_place", "load_follows", "spring_place", "spring_kind", "beam_end")

@@ -17,14 +17,14 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.sensitivity import outputs
-from cfmkit.elastica.sensitivity.outputs import Slopes
+from cfmkit.elastica.sensitivity import output_derivatives
+from cfmkit.elastica.sensitivity.output_derivatives import Slopes
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.outcome.path import Path
-    from cfmkit.elastica.sensitivity.outputs import SectionSlopes
+    from cfmkit.elastica.sensitivity.output_derivatives import SectionSlopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Gradient(Slopes):
         """Derivatives of `Path.effort`, (p, k)."""
         layout = self.path.layout
         if isinstance(layout.drive, Loading):
-            return read_only(outputs.load_displacement(self, layout.drive))
+            return read_only(output_derivatives.load_displacement(self, layout.drive))
         dof, sense = layout.driven  # type: ignore[misc]
         unit = layout.scales.moment if dof == layout.first[layout.drive.node] + 2 else layout.scales.force
         if self.path.solver.model.load_follows.any():
@@ -46,12 +46,12 @@ class Gradient(Slopes):
     @property
     def motion(self) -> Mapping[str, FloatArray]:
         """Node -> (p, 3, k) derivatives of `Path.motion`, of linked nodes too."""
-        return _Lookup(self, outputs.motion)
+        return _Lookup(self, output_derivatives.motion)
 
     @property
     def reaction(self) -> Mapping[str, FloatArray]:
         """Node -> (p, 3, k) derivatives of `Path.reaction`."""
-        return _Lookup(self, outputs.reaction)
+        return _Lookup(self, output_derivatives.reaction)
 
     def end_force(self, beam: str, end: int) -> FloatArray:
         """Return the derivatives of `Path.end_force`, (p, 3, k)."""
@@ -64,15 +64,15 @@ class Gradient(Slopes):
     @cached_property
     def energy(self) -> FloatArray:
         """Derivatives of `Path.energy`, (p, k)."""
-        return read_only(outputs.energy(self))
+        return read_only(output_derivatives.energy(self))
 
     def shape(self, beam: str) -> FloatArray:
         """Return the derivatives of `Path.shape`, (p, n, 2, k): of material points of the beam."""
-        return read_only(outputs.shape(self, beam))
+        return read_only(output_derivatives.shape(self, beam))
 
     def sections(self, beam: str) -> SectionSlopes:
         """Return the derivatives of `Path.sections`; arrays (p, n, k)."""
-        return outputs.sections(self, beam)
+        return output_derivatives.sections(self, beam)
 
     def stress_extremes(self, beam: str, axial: bool = True) -> FloatArray:
         """Return the derivatives of the values of `Path.stress_extremes`, (p, 2, 2, k).
@@ -80,7 +80,7 @@ class Gradient(Slopes):
         An extreme inside a beam stays one while its place moves, so that its place needs no derivative (envelope
         theorem).
         """
-        return read_only(outputs.stress_extremes(self, beam, axial))
+        return read_only(output_derivatives.stress_extremes(self, beam, axial))
 
 
 class _Lookup(Mapping[str, Any]):

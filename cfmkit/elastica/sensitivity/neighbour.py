@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.equilibrium.network_solver import Points, Solver
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.outcome.path import Path, PathStatus
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Drive
-    from cfmkit.elastica.model.layout import Scales
     from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.model.network_under_drive import Scales
 
 
 def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float = 0.5) -> Path:

@@ -1,8 +1,8 @@
 """How the arrays of a network of plain beams change with design variables: all variables at once.
 
-A plain beam has a polynomial angle and one thickness (`cfmkit.elastica.model.beam_arrays`). Where variables move nodes
-and offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out and computed
-as arrays.
+A plain beam has a polynomial angle and one thickness (`cfmkit.elastica.model.plain_beams_at_once`). Where variables
+move nodes and offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out
+and computed as arrays.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS, DesignSlopes
+from cfmkit.elastica.kernels.network_arrays import TABLE_COLUMNS, DesignSlopes
 from cfmkit.elastica.model.beam import GAUSS
-from cfmkit.elastica.model.beam_arrays import powers
 from cfmkit.elastica.model.numbering import NOWHERE
+from cfmkit.elastica.model.plain_beams_at_once import powers
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.equilibrium.mesh import Grid
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive
-    from cfmkit.elastica.model.layout import Layout
     from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.model.network_under_drive import Layout
 
 NO_OFFSET = (0.0, 0.0)  # an end without offset
 _SAME = attrgetter("start", "end", "start_joint", "end_joint", "closure", "section.axial", "section.shear")

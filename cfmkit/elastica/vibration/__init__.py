@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.elastica.vibration.network_masses import NetworkMasses
+from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.vibration.modes import Frequencies, frequencies
+    from cfmkit.elastica.vibration.natural_frequencies import Frequencies, frequencies
 
 __all__ = ["Frequencies", "NetworkMasses", "frequencies"]
 
@@ -26,6 +26,6 @@ def __getattr__(name: str) -> Any:
     """Import the eigenproblem when it is first needed: every network has masses, few are asked how they swing."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from cfmkit.elastica.vibration import modes
+    from cfmkit.elastica.vibration import natural_frequencies
 
-    return getattr(modes, name)
+    return getattr(natural_frequencies, name)

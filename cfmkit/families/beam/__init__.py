@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
-from cfmkit.families.beam.build import resolve
 from cfmkit.families.beam.findings import FINDINGS
+from cfmkit.families.beam.network_from_spec import resolve
 from cfmkit.families.beam.scalar_results import DEFINITIONS
 from cfmkit.families.beam.spec import BeamSpec
-from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
+from cfmkit.families.beam.tip_on_uneven_surface import DEFINITIONS as SURFACE
 
 FAMILY = Family(
     name="beam",
@@ -15,21 +15,21 @@ FAMILY = Family(
     spec_type=BeamSpec,
     models={
         **dict.fromkeys(("inextensible", "extensible", "reissner"), "cfmkit.families.beam.model:analyze"),
-        "solid": "cfmkit.families.beam.solid:analyze",
+        "solid": "cfmkit.families.beam.plane_fem_model:analyze",
     },
     design=when_called("cfmkit.families.beam.design:design"),
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
     errors="cfmkit.families.beam.force_at_few_poses:errors",
-    free="cfmkit.families.beam.yield_parameters:free",
+    free="cfmkit.families.beam.yield_variables:free",
     sampled="cfmkit.families.beam.force_at_few_poses:sampled",
     sampled_slopes="cfmkit.families.beam.force_at_few_poses:sampled_slopes",
     draw="cfmkit.families.beam.figures",
     scheme="cfmkit.families.beam.parameter_sketch",
     outline="cfmkit.families.beam.outline",
-    elastic_parts="cfmkit.families.beam.solid:elastic_parts",
-    elastic_networks="cfmkit.families.beam.solid:elastic_networks",
+    elastic_parts="cfmkit.families.beam.plane_fem_model:elastic_parts",
+    elastic_networks="cfmkit.families.beam.plane_fem_model:elastic_networks",
     levels=("design.rescale.force", "design.optimise.force.target"),
     propose="cfmkit.families.beam.proposals_for_wish:propose",
     room="cfmkit.families.beam.bounding_box:room",

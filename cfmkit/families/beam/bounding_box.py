@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import Room
-from cfmkit.families.beam.build import mirror_axis, thickest
+from cfmkit.families.beam.network_from_spec import mirror_axis, thickest
 from cfmkit.families.beam.outline import drawing, regions
-from cfmkit.families.beam.strips import mirrored
+from cfmkit.families.beam.strips_and_gaps import mirrored
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.build import thickest
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.model import solve
+from cfmkit.families.beam.network_from_spec import thickest
 from cfmkit.families.beam.scalar_results import ranges, window_of
 from cfmkit.numerics.cubic_interpolation import value_at
 from cfmkit.results import Design, Status
@@ -30,7 +30,7 @@ from cfmkit.stock.spec import sheet_of
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.mechanism.spec import Mechanism
-    from cfmkit.families.beam.parts.spec import Thickness
+    from cfmkit.families.beam.network_elements.spec import Thickness
     from cfmkit.families.beam.spec import BeamSpec, Rescale
     from cfmkit.results import Finding
 

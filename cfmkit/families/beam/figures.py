@@ -10,19 +10,19 @@ import numpy as np
 
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.outcome.sections import TURN
-from cfmkit.families.beam.build import mirror_axis
+from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.scalar_results import natural, window_of
-from cfmkit.families.beam.strips import mirrored, strips
-from cfmkit.families.beam.surface_following import ride
-from cfmkit.families.fillet_table import numbered
+from cfmkit.families.beam.strips_and_gaps import mirrored, strips
+from cfmkit.families.beam.tip_on_uneven_surface import ride
+from cfmkit.families.fillet_stress_results import numbered
 from cfmkit.plots import parts
-from cfmkit.plots.bands import limits_on
+from cfmkit.plots.bands_from_requirements import limits_on
+from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.loop_figure import loop_figure
-from cfmkit.plots.moving_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.rounding_noise import vanishing
+from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, color_key, value_text, write_heading
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.families.beam.solid import SolidSolution
+    from cfmkit.families.beam.plane_fem_model import SolidSolution
     from cfmkit.families.beam.solution import Solution
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result

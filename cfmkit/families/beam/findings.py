@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
-from cfmkit.families.beam.build import thickest_of, thinnest_of
+from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
 from cfmkit.families.beam.scalar_results import window_of, within
 from cfmkit.families.findings import finder, too_soft
 from cfmkit.specs.units import format_short
@@ -21,7 +21,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding

@@ -14,7 +14,7 @@ from cfmkit.elastica import PathStatus, gradient, trace
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.errors import CfmError
 from cfmkit.families.base import Sampled, SampledSlopes
-from cfmkit.families.beam.build import assemble
+from cfmkit.families.beam.network_from_spec import assemble
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
-    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
 _SMOOTH = re.compile(

@@ -20,15 +20,15 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
-from cfmkit.elastica.model.beam_arrays import coils
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
-from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
-from cfmkit.families.beam.output_columns import output_columns
+from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
+from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
-from cfmkit.families.beam.surface_following import curve_of, findings_along, ride, values_along
+from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.export.contours import (
     TOLERANCE,
     Contour,
@@ -27,9 +27,9 @@ from cfmkit.export.contours import (
     mark,
 )
 from cfmkit.export.union import quarter_pieces
-from cfmkit.families.beam.build import assemble, mirror_axis, thickest
-from cfmkit.families.beam.parts.spec import PartSpec
-from cfmkit.families.beam.strips import BeamStrip, mirrored, strips
+from cfmkit.families.beam.network_elements.spec import PartSpec
+from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, thickest
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
-    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
 PAD = 4.0

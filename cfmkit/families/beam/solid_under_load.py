@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica import trace
-from cfmkit.families.beam.build import assemble
+from cfmkit.families.beam.network_from_spec import assemble
 from cfmkit.families.beam.solution import Solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.solid.meshed_part import Part
 

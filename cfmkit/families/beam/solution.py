@@ -15,8 +15,8 @@ from cfmkit.arrays import ShortRepr, distinct, read_only
 from cfmkit.elastica.outcome.along_the_way import along_the_way
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.path import most_stressed
-from cfmkit.families.beam.build import Assembly, mirror_axis, thickest_of
-from cfmkit.families.beam.strips import BeamGap, mirrored, smallest_gap
+from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
+from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.mechanism.spec import Mechanism
-from cfmkit.families.beam.parts.spec import (
+from cfmkit.families.beam.network_elements.spec import (
     MaterialField,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
-from cfmkit.specs.data_files import DataSource
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target

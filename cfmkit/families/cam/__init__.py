@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
-from cfmkit.families.cam.build import resolve
 from cfmkit.families.cam.findings import FINDINGS
+from cfmkit.families.cam.mechanism_from_spec import resolve
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
 
@@ -17,15 +17,15 @@ FAMILY = Family(
     search=Search(findings=("overwritten", "plate_incomplete")),
     values=DEFINITIONS,
     resolve=resolve,
-    attribution="cfmkit.families.cam.deviation_causes",
+    attribution="cfmkit.families.cam.measured_deviation_causes",
     draw="cfmkit.families.cam.figures",
     scheme="cfmkit.families.cam.parameter_sketch",
     analyze_block=when_called("cfmkit.families.cam.many_designs.model:analyze_block"),
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.proposals_for_wish:propose",
     room="cfmkit.families.cam.bounding_box:room",
-    free="cfmkit.families.cam.yield_parameters:free",
-    errors="cfmkit.families.cam.yield_parameters:errors",
+    free="cfmkit.families.cam.yield_variables_and_errors:free",
+    errors="cfmkit.families.cam.yield_variables_and_errors:errors",
     headline=(
         "force_constant",
         "theoretical_force",

@@ -12,12 +12,12 @@ from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots import parts
-from cfmkit.plots.bands import limits_on
+from cfmkit.plots.bands_from_requirements import limits_on
+from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import place_labels
-from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.loop_figure import loop_figure
-from cfmkit.plots.moving_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.specs.units import to_border

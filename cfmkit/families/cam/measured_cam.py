@@ -27,10 +27,16 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
-from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.mechanism_from_spec import (
+    assemble,
+    check_first_pose,
+    check_springs,
+    displacement_origin,
+    until_overlap,
+)
 from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
     curve_cut_for,
@@ -47,7 +53,7 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import CurveFrame, Registration, feet, gaps_across, register, registered_where_it_is
 from cfmkit.numerics.smoothing import smoothed
 from cfmkit.results import Quantity, Result, Status, quantities
-from cfmkit.specs.data_files import DataSource
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.tables.measured_outline import read_sides
 
 if TYPE_CHECKING:

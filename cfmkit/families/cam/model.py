@@ -23,10 +23,16 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import Problem, SpecError
 from cfmkit.families.cam.bought_parts import parts_of
-from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
+from cfmkit.families.cam.mechanism_from_spec import (
+    CLOSE,
+    assemble,
+    check_first_pose,
+    check_springs,
+    displacement_origin,
+)
 from cfmkit.families.cam.scalar_results import contact_pressure, curve_cut_for, target_force, values_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Drawing, DrawnDimension, Edge, Line, Sheet, Smooth
-from cfmkit.families.cam.build import assemble_sides, flanks_crossing
+from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm, rate
 from cfmkit.families.no_mechanism import CannotBuild
 

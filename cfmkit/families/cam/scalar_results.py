@@ -13,9 +13,9 @@ from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.results import Quantity, quantities
-from cfmkit.specs.target_function import TargetCurve
+from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 

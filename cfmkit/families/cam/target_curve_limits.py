@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.cut import CamProfile
     from cfmkit.families.cam.spec import CamDesign
     from cfmkit.numerics.monotone_interpolation import ThroughPoints
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 def wanted_curve(target: CamDesign) -> TargetCurve | None:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search, when_called
-from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import FINDINGS
+from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
-from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES
+from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import CLASSES
 
 PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
 """One model for flexures and strips: the chain is another one."""
 
-SOLID = "cfmkit.families.slider_crank.printed.solid:analyze"
+SOLID = "cfmkit.families.slider_crank.printed.plane_fem_model:analyze"
 """The part as drawn, of flexures or a strip."""
 
 FAMILY = Family(
@@ -39,8 +39,8 @@ FAMILY = Family(
     draw="cfmkit.families.slider_crank.dispatch",
     scheme="cfmkit.families.slider_crank.parameter_sketch",
     outline="cfmkit.families.slider_crank.dispatch",
-    elastic_parts="cfmkit.families.slider_crank.printed.solid:elastic_parts",
-    elastic_networks="cfmkit.families.slider_crank.printed.solid:elastic_networks",
+    elastic_parts="cfmkit.families.slider_crank.printed.plane_fem_model:elastic_parts",
+    elastic_networks="cfmkit.families.slider_crank.printed.plane_fem_model:elastic_networks",
     levels=("design.force",),
     propose="cfmkit.families.slider_crank.proposals_for_wish:propose",
     room="cfmkit.families.slider_crank.bounding_box:room",

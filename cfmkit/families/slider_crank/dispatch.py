@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.export.contours import TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.base import function_named
-from cfmkit.families.slider_crank.build import resolve
+from cfmkit.families.slider_crank.linkage_from_spec import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Contour, Drawing, Edge
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.plots.moving_svg import Moving
+    from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Design, Result
 
 ROOMS = {"prb": "springs", "lumped": "printed", "beam": "printed", "solid": "printed"}

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.variables import around
+from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.families.base import Sampled
 from cfmkit.families.no_mechanism import CannotBuild
-from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.printed.assembly import elasticity
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.model import chain_of
-from cfmkit.families.slider_crank.printed.pressing import PressingEnd
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.stock.spec import sheet_of
 

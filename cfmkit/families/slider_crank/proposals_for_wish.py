@@ -21,8 +21,8 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.spec import MaterialSpec
-from cfmkit.stock.springs.catalogue import BENDING_SHARE
 from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
+from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run

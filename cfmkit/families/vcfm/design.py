@@ -4,7 +4,7 @@ With F_c = K h and dF = K dr the rise is h = F_c dr/dF. The stroke gives the thi
 (4 h/3) sqrt(1 - (pi/Q)^2) long; the stress gives the shortest leaf; K_n = K its width. The spring is as long as its
 stress at full travel and preload allows. Forces are exactly linear in the widths, so that the two factors that make the
 exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do. Where a sheet fixes
-the widths, lengths and numbers are found in a few passes (`sheet_sizing`).
+the widths, lengths and numbers are found in a few passes (`sizing_for_given_sheet`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from cfmkit.families.findings import at_least, mm, mpa, newton
 from cfmkit.families.no_mechanism import Infeasible, no_design
-from cfmkit.families.vcfm.build import parts, share_of
 from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
     RESCALES,
@@ -31,11 +31,12 @@ from cfmkit.families.vcfm.leaf_sizing import (
     sized_leaf,
     thickness_for,
 )
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.springs import Diamond
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
+from cfmkit.families.vcfm.leaves_around_bought_springs import with_bought_springs
 from cfmkit.families.vcfm.model import LawSampler, rest_of
-from cfmkit.families.vcfm.sheet_sizing import (
+from cfmkit.families.vcfm.sizing_for_given_sheet import (
     NEAR,
     PASSES,
     leaf_of_sheet,
@@ -44,7 +45,6 @@ from cfmkit.families.vcfm.sheet_sizing import (
     side_of_sheet,
     stress_unreachable,
 )
-from cfmkit.families.vcfm.spring_choice import with_bought_springs
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit.stock.spec import sheet_of
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 ROUNDS = 8

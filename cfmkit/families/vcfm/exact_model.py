@@ -1,7 +1,7 @@
 """The leaves as beams in large deflection: bending, stretching and shear, with the branch that they really take.
 
 One half-beam is traced and counted `half_beams` times; a shuttle that can turn needs both leaves of a V. Of the spring
-one leaf or one chain is traced, by symmetry. How that is interpolated, `traced_network` says.
+one leaf or one chain is traced, by symmetry. How that is interpolated, `interpolated_equilibrium_path` says.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.build import coils, parts, share_of, strip_of
+from cfmkit.families.vcfm.interpolated_equilibrium_path import traced
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
-from cfmkit.families.vcfm.traced_network import traced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.springs import Coils
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.fillet_table import numbered
-from cfmkit.families.vcfm.fillet_stress import fillets
+from cfmkit.families.fillet_stress_results import numbered
+from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
 from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.longest_window import flat_window
@@ -18,10 +18,10 @@ from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.plots import parts
+from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.line_chart import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.loop_figure import loop_figure
-from cfmkit.plots.moving_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import (
     BLACK,

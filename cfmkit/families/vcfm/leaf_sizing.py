@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.no_mechanism import Infeasible
-from cfmkit.families.vcfm.build import spring_room
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
+from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, buckled_stress, critical_force, overrated
 from cfmkit.specs.units import format_short
 from cfmkit.specs.units.windows import Share

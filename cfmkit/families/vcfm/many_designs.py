@@ -15,10 +15,10 @@ import numpy as np
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.findings import TOO_SOFT
-from cfmkit.families.vcfm.build import RIM, share_of
 from cfmkit.families.vcfm.findings import EXACT_FORM, PRESSED, ROUNDING, returns
+from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, share_of
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
-from cfmkit.families.vcfm.leaves.strip import LeafStrip
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import (
     FLAT_BUCKLED_ABOVE,
@@ -31,7 +31,7 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     overrated,
 )
 from cfmkit.families.vcfm.longest_window import extremes, flat_window
-from cfmkit.metrics.continuous_curves import extremes as extremes_next_to
+from cfmkit.metrics.continuous_means_and_extremes import extremes as extremes_next_to
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 
 if TYPE_CHECKING:

@@ -16,13 +16,13 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.bought_parts import parts_of
-from cfmkit.families.vcfm.build import parts, spring_room
 from cfmkit.families.vcfm.findings import findings_of, spring_closed
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_of
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
-from cfmkit.numerics.last_places import last_places
 from cfmkit.numerics.roots import bracketed_root
+from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import listed
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.vcfm.build import Parts
+    from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
     from cfmkit.families.vcfm.solution import PartSampler
     from cfmkit.families.vcfm.spec import VcfmSpec
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.build import RIM, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE, axial_root, pose
@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.leaves.v_beam import VBeam, critical_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import Bistable
 

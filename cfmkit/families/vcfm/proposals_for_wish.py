@@ -23,12 +23,12 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
-from cfmkit.families.vcfm.build import coils
 from cfmkit.families.vcfm.design import closed_form
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
-from cfmkit.stock.springs.catalogue import generic
+from cfmkit.stock.springs.offers_and_generic_series import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
@@ -315,8 +315,8 @@ def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.base import Run
     from cfmkit.families.flattest_window import flattest
-    from cfmkit.families.vcfm.build import spring_room
     from cfmkit.families.vcfm.exact_model import analyze
+    from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 
     wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
-from cfmkit.families.solid_definitions import unknown_to_beams
-from cfmkit.families.vcfm.build import share_of, strip_of
+from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_scalar_results import unknown_to_beams
+from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.results import Quantity

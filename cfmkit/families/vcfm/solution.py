@@ -15,7 +15,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
 from cfmkit.families.vcfm.longest_window import extreme, flat_window
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.build import Parts
+    from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 

@@ -26,7 +26,7 @@ from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, materi
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]

@@ -10,9 +10,9 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_text import odd_character
+from cfmkit.specs.units.number_reading import odd_character
 from cfmkit.specs.units.quantities import decimal_text
-from cfmkit.specs.yamlio.allowed_keys import Slot
+from cfmkit.specs.yamlio.allowed_at_path import Slot
 from cfmkit.specs.yamlio.scalars import read_plain
 
 WIDTH = 100

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import described
-from cfmkit.specs.units.number_text import shown
-from cfmkit.specs.yamlio.allowed_keys import Slot, Trace, expected, trace
+from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.yamlio.allowed_at_path import Slot, Trace, expected, trace
 from cfmkit.specs.yamlio.paths import Path, dotted
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from yaml.events import (
 )
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_text import shown
+from cfmkit.specs.units.number_reading import shown
 from cfmkit.specs.yamlio.scalars import check_text, read_plain
 from cfmkit.specs.yamlio.source_text import Fault, Unreadable, decode, without_odd_characters
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from math import log2
 
-from cfmkit.stock.springs.catalogue import BENDING_SHARE, SHEAR_SHARE
 from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
+from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE, SHEAR_SHARE
 
 INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 """Mean diameter of the coil over that of the wire: what is wound easily."""

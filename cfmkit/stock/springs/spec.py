@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
 
 from cfmkit.errors import DataError
-from cfmkit.specs.data_files import DataSource
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
 from cfmkit.stock.spec import Fatigue
-from cfmkit.stock.springs.catalogue import GENERIC, Offer, generic
 from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
+from cfmkit.stock.springs.offers_and_generic_series import GENERIC, Offer, generic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

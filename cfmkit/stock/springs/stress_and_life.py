@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
-    from cfmkit.stock.springs.catalogue import Offer
     from cfmkit.stock.springs.helical import Wound
+    from cfmkit.stock.springs.offers_and_generic_series import Offer
 
 WIRE_DEFINITIONS = {
     "wire_stress_max": (

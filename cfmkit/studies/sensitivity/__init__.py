@@ -3,9 +3,9 @@
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
 `oat`, `local`, `morris`, `sobol` and `tolerance`, with `distributions` (of the
-parameters), `intervals` (confidence) and `failed_sample_policy` (what a sample without a value
+parameters), `probability_confidence_intervals` (confidence) and `failed_sample_policy` (what a sample without a value
 means for an index: never "no influence").
 
 `parameters` reads the block `sensitivity:` against a specification, `setup` says what is to be done, `methods` joins
-method and engine, `findings` and `output` say what came out.
+method and engine, `result_types` and `output` say what came out.
 """

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.rows import ResultRows
+    from cfmkit.studies.point_evaluation import Study
+    from cfmkit.studies.row_blocks_for_journal import ResultRows
     from cfmkit.studies.sensitivity.parameters import Parameter
-    from cfmkit.studies.study import Study
 
 
 class Interrupted(Exception):

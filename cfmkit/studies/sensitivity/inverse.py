@@ -1,8 +1,8 @@
 """The inverse of a tolerance study: which tolerance on each parameter keeps the requested yield.
 
-Requirements become rows of force and stress at a few poses (`studies.margins`). How they move with each error alone is
-known exactly at some of its sizes and linear between; errors of several parameters add. With that the yield of any set
-of tolerances is estimated without one more solution. Three answers follow:
+Requirements become rows of force and stress at a few poses (`studies.redesign_for_yield`). How they move with each
+error alone is known exactly at some of its sizes and linear between; errors of several parameters add. With that the
+yield of any set of tolerances is estimated without one more solution. Three answers follow:
 
 - alone: how wide one tolerance may be while all others stay as they are stated;
 - together: all of them by one factor;

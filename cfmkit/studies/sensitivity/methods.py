@@ -9,13 +9,13 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
+from cfmkit.studies.point_evaluation import Metric
 from cfmkit.studies.sensitivity import inverse, local, morris, oat, sobol, tolerance
 from cfmkit.studies.sensitivity.distributions import draw, values_across, values_at
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
-from cfmkit.studies.sensitivity.findings import Findings, IndexLine, lines_of
-from cfmkit.studies.sensitivity.findings import stated as told
-from cfmkit.studies.study import Metric
+from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
+from cfmkit.studies.sensitivity.result_types import stated as told
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -236,7 +236,7 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
 
 def _answered(setup: Setup, errors: FloatArray, costs: FloatArray, wanted: float) -> inverse.ToleranceFactors:
     """Return the factors on the tolerances; limits are looked at again where these now end."""
-    from cfmkit.studies.margins import rows_along_errors
+    from cfmkit.studies.redesign_for_yield import rows_along_errors
 
     result, factors = setup.nominal.result, np.ones(len(setup.parameters))
     for _ in range(LOOKS):

@@ -9,7 +9,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.metrics import metrics_json
 from cfmkit.results import Finding, Quantity, Status
-from cfmkit.studies.sensitivity.intervals import LEVEL
+from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL
 from cfmkit.studies.sensitivity.setup import MADE
 from cfmkit.studies.tables import results_table
 from cfmkit.studies.varied_axes import written
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store.disk import Data
-    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
     from cfmkit.studies.sensitivity.tolerance import Yield
 
@@ -35,7 +35,7 @@ POLICIES = {
 def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
     """Yield every file of a study but the pictures as (name, content)."""
     from cfmkit.specs.yamlio import dump
-    from cfmkit.tables.jsontext import json_bytes
+    from cfmkit.tables.json_writing import json_bytes
 
     spec = found.setup.study.spec
     yield "results.csv", results_csv(found)

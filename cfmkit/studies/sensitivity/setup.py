@@ -16,8 +16,8 @@ from cfmkit.results import Finding
 from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
+from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
-from cfmkit.studies.study import Study
 from cfmkit.studies.variable_paths import length_to_vary
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Sensitivity, Spec
     from cfmkit.specs.units import Ends
+    from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.failed_sample_policy import Policy
     from cfmkit.studies.sensitivity.parameters import Parameter
-    from cfmkit.studies.study import Metric
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000, "inverse": 200}

@@ -15,7 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.studies.sensitivity.failed_sample_policy import Analysis, Index
-from cfmkit.studies.sensitivity.intervals import LEVEL, clopper_pearson, paired_difference, wilson
+from cfmkit.studies.sensitivity.probability_confidence_intervals import (
+    LEVEL,
+    clopper_pearson,
+    paired_difference,
+    wilson,
+)
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, varies_not
 
 if TYPE_CHECKING:
@@ -26,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.distributions import ParameterSpread
     from cfmkit.studies.sensitivity.failed_sample_policy import Policy
-    from cfmkit.studies.sensitivity.intervals import Interval
+    from cfmkit.studies.sensitivity.probability_confidence_intervals import Interval
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
 TIGHTER = 0.5

@@ -13,12 +13,12 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.findings import percent
 from cfmkit.specs.units import format_short, read_quantity
-from cfmkit.studies.suggest.proposal import ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, made
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from cfmkit.designing.starts import Clock
+    from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.wishes import Candidate, Wish
 
     Eased = tuple[Wish, str]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.families.wishes import Wish
-    from cfmkit.studies.suggest.proposal import Proposal
+    from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
 COLUMNS = 3
 

@@ -1,7 +1,8 @@
 """The share of a proposal's manufactured parts that would meet the wish: to first order, then by random parts.
 
-Parts have the tolerances that are assumed of the process (`studies.process_tolerances`). They are drawn as `cfmkit
-sensitivity` draws them of the block `sensitivity` that the proposal's file says, so that its answer is the same.
+Parts have the tolerances that are assumed of the process (`cfmkit.studies.stated_or_assumed_tolerances`). They are
+drawn as `cfmkit sensitivity` draws them of the block `sensitivity` that the proposal's file says, so that its answer
+is the same.
 """
 
 from __future__ import annotations
@@ -12,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Run
-from cfmkit.studies.design_tolerances import DesignTolerances, assumed, tolerances
-from cfmkit.studies.expected_yield import YieldUnknown, first_order_shares
 from cfmkit.studies.made_parts import judge
 from cfmkit.studies.sensitivity.parameters import parameters_of
+from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, assumed, tolerances
+from cfmkit.studies.yield_by_assumed_tolerances import YieldUnknown, first_order_shares
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from cfmkit.designing.starts import Clock
+    from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.wishes import Wish
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.design_tolerances import Assumed
+    from cfmkit.studies.stated_or_assumed_tolerances import Assumed
 
 PARTS = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""

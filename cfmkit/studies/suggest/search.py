@@ -18,17 +18,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.starts import Clock
+from cfmkit.designing.run_many_starts import Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family, names
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
-from cfmkit.store.identity import code_stamp, stable_hash
-from cfmkit.studies.executors import Lost
+from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import until
+from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest.eased_wish import nearest
-from cfmkit.studies.suggest.proposal import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
+from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -305,7 +305,7 @@ def distinct(proposals: Sequence[Proposal]) -> list[Proposal]:
 
     Examples
     --------
-    >>> from cfmkit.studies.suggest.proposal import Proposal
+    >>> from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     >>> sizes = ({"across": 0.034, "along": 0.051}, {"across": 0.069, "along": 0.023})
     >>> [one.variant for one in distinct([Proposal("cam", "2 springs", numbers=size) for size in sizes])]
     ['2 springs, 34 x 51 mm', '2 springs, 69 x 23 mm']

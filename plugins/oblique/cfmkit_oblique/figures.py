@@ -6,9 +6,9 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
+from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
-from cfmkit.plots.line_chart import Limit
-from cfmkit.plots.loop_figure import loop_figure
+from cfmkit.plots.stacked_line_diagrams import Limit
 from cfmkit.plots.style import styled
 from cfmkit.plots.text import Heading, value_text
 from cfmkit.results import Result

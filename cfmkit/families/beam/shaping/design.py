@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing import limits as design_limits
-from cfmkit.designing.starts import Clock, identity_of
-from cfmkit.designing.variables import at_bounds
-from cfmkit.families.beam.build import assemble, thickest_of
+from cfmkit.designing.bounds_and_rounding import at_bounds
+from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.findings import finding, percent
-from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
+from cfmkit.families.beam.network_from_spec import assemble, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, finished, met, widened
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, tolerated
 from cfmkit.families.beam.shaping.sqp_program import Flattest, Shaping
 from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:

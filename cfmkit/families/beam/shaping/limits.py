@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.beam.shaping.response import BeamAtPoses
 from cfmkit.numerics.sampled_extremes import largest, soft_least
 

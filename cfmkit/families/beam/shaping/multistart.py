@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.starts import Stage, done
-from cfmkit.families.beam.shaping.audit import Audit, audited
+from cfmkit.designing.run_many_starts import Stage, done
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, searched, widened
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
 
 if TYPE_CHECKING:

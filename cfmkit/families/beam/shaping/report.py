@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.audit import measured
+from cfmkit.designing.reported_values import measured
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
-from cfmkit.families.beam.shaping.audit import Audit, audited
 from cfmkit.families.beam.shaping.search import PLACES, Found
+from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Quantity, Searched
 from cfmkit.specs.units import format_short
@@ -25,8 +25,8 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.families.beam.shaping.audit import Drawn, NetworkScatter
     from cfmkit.families.beam.shaping.multistart import Explored
+    from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Drawn, NetworkScatter
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Result

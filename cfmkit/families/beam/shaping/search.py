@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.bounds_and_rounding import rounded as rounded_within
 from cfmkit.designing.limits import worst
-from cfmkit.designing.starts import Clock
-from cfmkit.designing.variables import rounded as rounded_within
+from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.limits import LIMITS

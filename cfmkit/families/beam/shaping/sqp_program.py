@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from cfmkit.designing import sqp_program
+from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.limits import LimitRows, worst
-from cfmkit.designing.sqp_program import SeenPoint
+from cfmkit.designing.objective_and_constraints import SeenPoint
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
@@ -88,11 +88,11 @@ class Shaping:
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return objective and constraints."""
-        return sqp_program.values(self, z, self.elastic)
+        return objective_and_constraints.values(self, z, self.elastic)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return their derivatives."""
-        return sqp_program.slopes(self, z, self.elastic)
+        return objective_and_constraints.slopes(self, z, self.elastic)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""

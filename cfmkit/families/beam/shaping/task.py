@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.elastica import Network
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 Objective = Literal["ripple", "range", "paper"]
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from cfmkit.elastica import Network, Polynomial
 from cfmkit.elastica.model.beam import fit
-from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.beam.network_from_spec import thickest_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.build import directions
 from cfmkit.families.cam.contact_pressure import worst
-from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
+from cfmkit.families.cam.dynamics.machine_from_spec import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure
 from cfmkit.families.cam.findings import finding, overstressed
+from cfmkit.families.cam.mechanism_from_spec import directions
 from cfmkit.families.findings import mm, newton
 from cfmkit.specs.units import format_short
 

@@ -59,7 +59,7 @@ class FlankLine:
     distance : float
         From the path to the flank, negative inwards [m].
     angle, height : float
-        See `cfmkit.families.cam.dynamics.moving_parts.Side`.
+        See `cfmkit.families.cam.dynamics.roller_curves_and_motion.Side`.
     ends : (float, float)
         First and last path coordinate of the flank [m].
     """

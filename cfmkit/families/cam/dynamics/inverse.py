@@ -31,13 +31,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.moving_parts import Moment
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.moving_parts import Constants, Machine, Stance
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Constants, Machine, Stance
 
     ComplexArray = NDArray[np.complex128]
 

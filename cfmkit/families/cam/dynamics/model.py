@@ -21,15 +21,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.cam.build import displacement_origin, flanks_cross, rollers_overlap
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.dynamics.build import build, stated_motion
 from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
+from cfmkit.families.cam.dynamics.machine_from_spec import build, stated_motion
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.findings import finding, rubbing_left_out
+from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.families.findings import mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, no_result
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine
     from cfmkit.families.cam.dynamics.multibody import Scheme
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 

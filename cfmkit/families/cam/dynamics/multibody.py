@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.dynamics.flank_by_height import FlankLine
-from cfmkit.families.cam.dynamics.moving_parts import Flank
+from cfmkit.families.cam.dynamics.roller_curves_and_motion import Flank
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.flank_by_height import FlankPoint
-    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine, Side, SideParts
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Side, SideParts
 
     ComplexArray = NDArray[np.complex128]
 

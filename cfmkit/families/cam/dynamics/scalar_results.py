@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.moving_parts import Machine
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Machine
     from cfmkit.families.cam.dynamics.solution import MotionSolution
 
 SLOW = 1.0

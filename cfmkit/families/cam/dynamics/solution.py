@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine, Moment
+    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine, Moment
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import CamSpec
 

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.specs.block import Model, NonNegativeLength, PositiveLength
-from cfmkit.specs.data_files import DataSource
+from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.target_curve import MOST_POINTS, Interpolation
 from cfmkit.specs.units import Length, Ratio
 

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.slope_law import brace_tangent, drop, rise_rate
-from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
+from cfmkit.families.cam.many_designs.forces_inside_given_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.statics import levers
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.continuous_means_and_extremes import extremes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.cam.build import assemble, weights
-from cfmkit.families.cam.geometry.many_tracks import ManyTracks
+from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
 from cfmkit.families.cam.many_designs.forces import Designs, Slab
 from cfmkit.families.cam.many_designs.measures import (
     BRANCHES,
@@ -31,6 +30,7 @@ from cfmkit.families.cam.many_designs.measures import (
 )
 from cfmkit.families.cam.many_designs.same_cam_other_parts import Around, BuiltSlab
 from cfmkit.families.cam.many_designs.undercut_forces import CornerSlab, shapes
+from cfmkit.families.cam.mechanism_from_spec import assemble, weights
 from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
-from cfmkit.families.cam.geometry.many_tracks import Poses, sign_changes
+from cfmkit.families.cam.geometry.many_tracks_one_cam import Poses, sign_changes
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
-from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
+from cfmkit.families.cam.many_designs.forces_inside_given_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
 from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.results import WINDOW_OUTSIDE
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.many_tracks import ManyTracks
+    from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
     from cfmkit.families.cam.solution import Assembly
 
     Rows = NDArray[np.intp]

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.variables import at_bounds
+from cfmkit.designing.bounds_and_rounding import at_bounds
 from cfmkit.families.findings import mm, mpa
-from cfmkit.families.slider_crank.printed.assembly import strip_chain
-from cfmkit.families.slider_crank.printed.pressing import PressingEnd
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import strip_chain
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solution, first_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.chain import Strip
-    from cfmkit.families.slider_crank.printed.search import FoundStrip
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Strip
     from cfmkit.families.slider_crank.printed.sqp_program import Form
+    from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip
 
 
 PLACES = 240

@@ -15,18 +15,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.audit import measured, searched
-from cfmkit.designing.starts import Clock, identity_of
-from cfmkit.designing.variables import rounded
+from cfmkit.designing.bounds_and_rounding import rounded
+from cfmkit.designing.reported_values import measured, searched
+from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import CannotBuild, no_design
-from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
-from cfmkit.families.slider_crank.printed.search import (
+from cfmkit.families.slider_crank.printed.spec import StripSpec
+from cfmkit.families.slider_crank.printed.sqp_program import Form, Task
+from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     LOOSE,
     SHORTEST,
     FoundStrip,
@@ -36,9 +39,6 @@ from cfmkit.families.slider_crank.printed.search import (
     uniform_for_stroke,
     uniform_for_width,
 )
-from cfmkit.families.slider_crank.printed.sizing import design_flexures
-from cfmkit.families.slider_crank.printed.spec import StripSpec
-from cfmkit.families.slider_crank.printed.sqp_program import Form, Task
 from cfmkit.numerics.sqp import SearchEnding
 from cfmkit.results import Design, Finding, Searched, Status
 from cfmkit.stock.spec import sheet_of

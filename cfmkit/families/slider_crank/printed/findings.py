@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.elastica import hindered_curling
 from cfmkit.families.findings import mm, mpa, newton, too_soft
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
 
 if TYPE_CHECKING:

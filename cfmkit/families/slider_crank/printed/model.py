@@ -15,9 +15,9 @@ from cfmkit.curves import Column, Curve
 from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.slider_crank.build import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.assembly import (
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
     elasticity,
     lumped_chain,
     pins_of,
@@ -25,8 +25,8 @@ from cfmkit.families.slider_crank.printed.assembly import (
     strip_of,
     travel_direction,
 )
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd, kept_clear
 from cfmkit.families.slider_crank.printed.findings import findings_of
-from cfmkit.families.slider_crank.printed.pressing import PressingEnd, kept_clear
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS, numbers
 from cfmkit.families.slider_crank.printed.solution import Solution
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.linkage import Linkage
-    from cfmkit.families.slider_crank.printed.pressing import Chain
+    from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 

@@ -26,8 +26,8 @@ from cfmkit.export.contours import (
     polygon,
 )
 from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
-from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of, travel_direction
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
 from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import PaddedPart
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.chain import Strip
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Strip
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.printed.chain import kink
-from cfmkit.families.solid_definitions import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

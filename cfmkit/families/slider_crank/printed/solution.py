@@ -16,9 +16,9 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.verification.corotational import recheck as by_elements
-from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
-from cfmkit.families.slider_crank.printed.pressing import PressingEnd
-from cfmkit.metrics.continuous_curves import mean
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
+from cfmkit.metrics.continuous_means_and_extremes import mean
 from cfmkit.numerics.chebyshev_panels import nodes_of, resolved
 from cfmkit.numerics.roots import bracketed_root
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.chain import Elasticity
-    from cfmkit.families.slider_crank.printed.pressing import Chain, Pressed
+    from cfmkit.families.slider_crank.printed.equilibrium_path import Chain, Pressed
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
     from cfmkit.numerics.chebyshev_panels import ChebyshevPanels
 
 

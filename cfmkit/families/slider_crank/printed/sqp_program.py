@@ -24,22 +24,22 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.designing import sqp_program
+from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.limits import LimitRows
-from cfmkit.designing.sqp_program import SeenPoint
+from cfmkit.designing.objective_and_constraints import SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
-from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP, Strip, spread
-from cfmkit.families.slider_crank.printed.pressing import FIRST_STEP
+from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP, Strip, spread
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
-    from cfmkit.families.slider_crank.printed.chain import Elasticity
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 SMALL = 1e-3
@@ -179,7 +179,7 @@ class State:
 
 @dataclass
 class StripProgram:
-    """Objective and constraints of a task over a form, as `cfmkit.designing.sqp_program` wants them.
+    """Objective and constraints of a task over a form, as `cfmkit.designing.objective_and_constraints` wants them.
 
     The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
     """
@@ -251,11 +251,11 @@ class StripProgram:
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return the objective and the constraints, at least zero where they hold."""
-        return sqp_program.values(self, z)
+        return objective_and_constraints.values(self, z)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of objective and constraints."""
-        return sqp_program.slopes(self, z)
+        return objective_and_constraints.slopes(self, z)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""

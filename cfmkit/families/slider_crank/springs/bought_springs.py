@@ -15,11 +15,11 @@ from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.best_sets import best_sets
-from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.catalogue import Miss, Offer, nearest
+from cfmkit.stock.springs.offers_and_generic_series import Miss, Offer, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 

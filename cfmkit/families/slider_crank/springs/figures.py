@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.stiffness_classes import NEGATIVE
+from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import NEGATIVE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
-from cfmkit.plots.bands import limits_on
+from cfmkit.plots.bands_from_requirements import limits_on
+from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
-from cfmkit.plots.line_chart import Diagram, Limit, Scale, Series, diagram_figure
-from cfmkit.plots.loop_figure import loop_figure
-from cfmkit.plots.moving_svg import Moving, chosen
+from cfmkit.plots.poses_in_one_svg import Moving, chosen
+from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 from cfmkit.specs.units import format_short, to_border

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.assembly import coupler_angle
+from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
 
 @dataclass(frozen=True)

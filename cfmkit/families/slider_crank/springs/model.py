@@ -22,12 +22,12 @@ from cfmkit.arrays import distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
-from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.springs.assembly import TURN, assemble, default_motion
+from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.scalar_results import values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
+from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.branch_windows import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
     from cfmkit.results import Finding
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
-from cfmkit.families.slider_crank.build import linkage_of
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

@@ -17,19 +17,19 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.families.slider_crank.springs.assembly import reactions
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
-from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
-from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, Classified, classify, signs
-from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
+from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
+from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import CLASSES, Classified, classify, signs
+from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone
 from cfmkit.numerics.roots import bracketed_root
-from cfmkit.numerics.turning_points import Monotone, monotone
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 

@@ -12,7 +12,7 @@ from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffn
 from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
-    from cfmkit.specs.target_function import TargetCurve
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
     from cfmkit.stock.springs.helical import Kind, Wound
 
 PositiveAngle = Annotated[Angle, Field(gt=0)]

@@ -11,15 +11,15 @@ import numpy as np
 
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.springs.assembly import assemble, mean_effort_per_angle
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
+from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
 
 FREE = ("crank_length", "offset", "unloaded_offset")

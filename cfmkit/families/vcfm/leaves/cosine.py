@@ -22,7 +22,7 @@ from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends

@@ -17,7 +17,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 SLENDER, CRUSHED = 6.0, 0.25

@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.leaves.s_form import s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 def leaf_compliance(strip: LeafStrip) -> Any:
@@ -33,7 +33,7 @@ def leaf_compliance(strip: LeafStrip) -> Any:
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    >>> from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     >>> leaf = LeafStrip(25e-3, np.radians(7), 1.5e-3, 10e-3, 1477e6, 0.3)
     >>> float((1e-3 / leaf_compliance(leaf)).round(6))
     3.202276

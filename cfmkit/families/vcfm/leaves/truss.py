@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class TrussLeaf:
 
         Examples
         --------
-        >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+        >>> from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
         >>> leaf = TrussLeaf(LeafStrip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3))
         >>> float(leaf.force(1e-3).round(6))
         2.541452

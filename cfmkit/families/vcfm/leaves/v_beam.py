@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
     Law = Callable[[LeafStrip, FloatArray], Any]
 
@@ -74,7 +74,7 @@ def negative_stiffness(strip: LeafStrip) -> Any:
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.leaves.strip import LeafStrip
+    >>> from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     >>> leaf = LeafStrip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3)
     >>> float(negative_stiffness(leaf).round(3))
     681.202

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
 
 
 Sampled = tuple["FloatArray", "FloatArray"]

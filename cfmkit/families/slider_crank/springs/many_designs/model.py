@@ -12,8 +12,7 @@ import numpy as np
 
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.no_mechanism import CannotBuild
-from cfmkit.families.slider_crank.build import resolve
-from cfmkit.families.slider_crank.springs.assembly import TURN, assemble
+from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.many_designs.solution import EACH, PLACES, Base, Slab
 from cfmkit.families.slider_crank.springs.model import (
@@ -24,7 +23,8 @@ from cfmkit.families.slider_crank.springs.model import (
     window_of,
 )
 from cfmkit.families.slider_crank.springs.solution import GRID
-from cfmkit.families.slider_crank.springs.stiffness_classes import (
+from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble
+from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import (
     BOUNDARY,
     SNAPS,
 )

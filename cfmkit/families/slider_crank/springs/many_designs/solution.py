@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
-from cfmkit.families.slider_crank.springs.assembly import mean_effort_per_angle
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
@@ -23,10 +23,10 @@ from cfmkit.families.slider_crank.springs.model import (
     target_of,
     window_of,
 )
-from cfmkit.families.slider_crank.springs.motion_extremes import MotionExtremes
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
-from cfmkit.families.slider_crank.springs.stiffness_classes import (
+from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
+from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import (
     Classified,
     classify,
     scale_factors,
@@ -34,7 +34,7 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
 )
 from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.branch_windows import between_ends
-from cfmkit.metrics.continuous_curves import extremes, mean
+from cfmkit.metrics.continuous_means_and_extremes import extremes, mean
 from cfmkit.metrics.ranges_many import (
     UNIFORM_POINTS,
     ManyBranches,
@@ -43,7 +43,7 @@ from cfmkit.metrics.ranges_many import (
     usable_interval,
 )
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
-from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
+from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone, sharpened
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Measure
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
+    from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 

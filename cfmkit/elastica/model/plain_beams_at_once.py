@@ -1,0 +1,195 @@
+"""All beams of a network at once: shapes fitted between their ends, tables of the compiled code.
+
+Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams. The
+others are fitted and tabulated one by one (`cfmkit.elastica.model.beam`, `cfmkit.elastica.equilibrium.mesh`).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.model.beam import GAUSS, Fit
+from cfmkit.elastica.model.section import Taper
+from cfmkit.elastica.model.shapes import Polynomial, direction
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.model.section import Section
+
+
+COILED = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
+
+
+class Bundle:
+    """The beams of a network between given ends.
+
+    Attributes
+    ----------
+    plain : list of int
+        Beams with a polynomial angle and one thickness; `others` has the rest.
+    coefficients : (plain, m) array
+        Of the angle, rotation of the fit included in the first.
+    length : (plain,) array
+        Arc length as used [m].
+    """
+
+    def __init__(self, network: Network, ends: Any, beam_end: Any) -> None:
+        """Fit the plain beams; `ends` (places, 2) [m] has the attachments, `beam_end` those of each beam."""
+        self.names, self.beams = list(network.beams), list(network.beams.values())
+        plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
+        self.plain = plain
+        self._compliances: Any = None
+        self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
+        if plain:
+            self._fit_plain(ends, beam_end if not self.others else beam_end[plain])
+
+    def _fit_plain(self, ends: Any, beam_end: Any) -> None:
+        beams = [self.beams[k] for k in self.plain]
+        shapes: list[Any] = [beam.shape for beam in beams]
+        given = [shape.coefficients or (0.0,) for shape in shapes]
+        most = max(map(len, given))
+        if any(len(own) < most for own in given):
+            given = [(*own, *(0.0,) * (most - len(own))) for own in given]
+        c = np.array(given) + 0.0
+        both = ends[beam_end]
+        reach = both[:, 1] - both[:, 0]
+        dx, dy = reach.T
+        distance = np.sqrt(dx * dx + dy * dy)
+        if most == 1:
+            cx, cy = np.cos(c[:, 0]), np.sin(c[:, 0])
+            own = np.ones(len(beams))
+        else:
+            angle = c @ powers(most)
+            cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
+            own = np.sqrt(cx * cx + cy * cy)
+        self._check(distance, own)
+        nominal = [shape.length for shape in shapes]
+        first = distance
+        if any(nominal):
+            first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
+        self.reach, self.drawn = reach, (first, cx, cy)
+        turned = most > 1 or c.any()
+        rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy) if turned else direction(dx, dy)
+        self.length, self.scale = distance / own, distance / (own * first)
+        closures = [beam.closure for beam in beams]
+        if "raw" in closures:
+            raw = np.array([closure == "raw" for closure in closures])
+            rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
+            self.length = np.where(raw, first, self.length)
+        self.rotation = rotation
+        self.coefficients = c if c.dtype == rotation.dtype else c + 0j
+        self.coefficients[:, 0] += rotation
+        self._set_rigidities()
+
+    @property
+    def wide(self) -> bool:
+        """Whether any beam is a wide strip: all tables then have the columns that those need."""
+        return any(self.beams[k].section.wide for k in self.others)
+
+    @property
+    def curved(self) -> bool:
+        """Whether any beam is known not to be straight before it is loaded, or may not be."""
+        return bool(self.others) or self.coefficients.shape[1] > 1
+
+    @property
+    def gap(self) -> Any:
+        """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
+        first, cx, cy = self.drawn
+        return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
+
+    def _set_rigidities(self) -> None:
+        """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
+        sections = [self.beams[k].section for k in self.plain]
+        known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
+        self.bending, self.stretch, self.slip = np.array([known[id(section)] for section in sections]).T
+
+    @property
+    def sections(self) -> Any:
+        """Young's modulus, width, thickness, axial, shear, Poisson's ratio and shear factor, (7, plain)."""
+        values = [
+            (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
+            for s in (self.beams[k].section for k in self.plain)
+        ]
+        return np.array(values).T
+
+    def _check(self, distance: Any, own: Any) -> None:
+        """Refuse beams without length, and shapes that return to their start."""
+        if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
+            return
+        for k, far, reach in zip(self.plain, np.real(distance), np.real(own), strict=True):
+            beam = self.beams[k]
+            if not far > 0:
+                raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
+            if not reach > 1e-9:
+                raise InputError(
+                    f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted"
+                )
+
+    def fit_of(self, name: str) -> Fit | None:
+        """Return the fit of a plain beam, None of another."""
+        number = self.names.index(name)
+        if number not in self.plain:
+            return None
+        k = self.plain.index(number)
+        shape: Any = self.beams[number].shape
+        chord = self.length[k] / self.scale[k]
+        return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
+
+    def sizes(self, fits: dict[str, Fit] | None) -> tuple[Any, Any]:
+        """Return the lengths of all beams and the bending rigidities at their middles, real."""
+        lengths, middles = (self.length.real, self.bending.real) if self.plain else (np.empty(0), np.empty(0))
+        if fits is None:
+            return lengths, middles
+        others = [self.beams[k] for k in self.others]
+        far = [float(np.real(fits[self.names[k]].length)) for k in self.others]
+        stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
+        return np.append(lengths, far), np.append(middles, stiff)
+
+    def table(self, powers: Any, shares: Any, units: FloatArray) -> Any:
+        """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
+
+        powers (m, n), shares (n, 5): see `cfmkit.elastica.equilibrium.mesh.Grid.rows`; what the table holds:
+        `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
+        """
+        if self._compliances is None:
+            g = self.length
+            self._compliances = np.array([g, g / self.bending, g * self.stretch, g * self.slip, g]).T * units
+        kind = (self.coefficients if self.coefficients.dtype.kind == "c" else self._compliances).dtype
+        out = np.empty((len(self.plain), powers.shape[1], 6), dtype=kind)
+        np.matmul(self.coefficients, powers, out=out[:, :, 0])
+        np.multiply(self._compliances[:, None], shares, out=out[:, :, 1:])
+        return out
+
+
+def is_plain(beam: Beam) -> bool:
+    """Tell whether a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
+    if beam.section.wide or isinstance(beam.section.thickness, Taper):
+        return False
+    return isinstance(beam.shape, Polynomial) and not coils(beam)
+
+
+def coils(beam: Beam) -> bool:
+    """Tell whether the angle of a beam, a polynomial, may turn by more than COILED."""
+    return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > COILED
+
+
+def _rigidities(s: Section) -> tuple[Any, Any, Any]:
+    """Return bending rigidity and the compliances of stretching and shearing of a section of one thickness."""
+    thickness: Any = s.thickness
+    pull = s.youngs_modulus * s.width * thickness
+    slip = 2 * (1 + s.poisson_ratio) / (s.shear_factor * pull) if s.shear else 0.0
+    return pull * thickness * thickness / 12, s.axial / pull, slip
+
+
+@lru_cache(maxsize=32)
+def powers(count: int) -> Any:
+    """Return the powers (count, n) of the Gauss nodes of the whole beam."""
+    powers = np.vander(GAUSS[0], count, increasing=True).T.copy()
+    powers.setflags(write=False)
+    return powers

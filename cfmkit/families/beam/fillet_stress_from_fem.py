@@ -1,0 +1,74 @@
+"""The largest stress of a beam mechanism's part in each of its fillets, with the node and the beams that it joins.
+
+Nominal stresses are those of the network that the part is drawn from, with stretching and shear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.families.beam.network_elements.spec import PartSpec
+from cfmkit.families.beam.network_from_spec import mirror_axis
+from cfmkit.families.beam.strips_and_gaps import mirrored, strips
+from cfmkit.families.fillet_stress_results import FilletRow, with_nominal
+from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Displacement, Rotation
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.solid.meshed_part import MeshSolution
+
+EXACT = 1e-6
+"""Lines between points of a beam are no farther from its edges than this [m]."""
+
+
+def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> tuple[FilletRow, ...]:
+    """Return the fillets with their largest stress in a window [m or rad]; those of a mirrored half with a prime."""
+    from cfmkit.solid.fillet_stress import stressed_fillets
+
+    spec = assembly.spec
+    beams, nodes = _named(assembly)
+    rows = []
+    for one in stressed_fillets(solved, (spec.mechanism.part or PartSpec()).fillet):
+        joined = one.arc.touched(beams)
+        node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
+        if (found := one.largest(*window)) is not None:
+            rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
+    travel = np.array([row.motion for row in rows])
+    paths = partial(both_images, assembly.network, partial(_drive, assembly))
+    return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described, assembly)))
+
+
+def _drive(assembly: Assembly, travel: FloatArray) -> Displacement | Rotation:
+    """Return the drive through some travels [m or rad]: a solid has no other than these two."""
+    drive: Any = assembly.drive()
+    moved: Displacement | Rotation = replace(drive, points=travel)
+    return moved
+
+
+def _described(assembly: Assembly, points: FloatArray) -> FloatArray:
+    """Return points of the part (m, 2), and where in the half that is described they are if they are mirrored [m]."""
+    axis = mirror_axis(assembly)
+    return points if axis is None else np.concatenate([points, mirrored(points, *axis)])
+
+
+def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
+    """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
+    network, axis = assembly.network, mirror_axis(assembly)
+    fits = Layout(network, assembly.drive()).fits
+    beams = {
+        name: [polygon for strip in strips(network, fits, name, EXACT) for polygon in strip.polygons]
+        for name in network.beams
+    }
+    nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
+    if axis is not None:
+        beams |= {f"{name}'": [mirrored(one, *axis) for one in own] for name, own in beams.items()}
+        others = {name: mirrored(place[None], *axis)[0] for name, place in nodes.items()}
+        nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > EXACT}
+    return beams, nodes

@@ -1,0 +1,388 @@
+"""From a specification to the network, the drive and the controls of the beam engine.
+
+The closure "chain": beams keep their shapes and lengths, and the nodes go where the beams end. From the nodes that are
+held in place, each beam in the given order whose one end is placed carries its other end with it; a beam between two
+nodes that are placed already is turned and scaled. A guided node is carried like a free one: its guide goes with it, as
+in the reference values of Table 3.
+
+Stages in series: each stands, with its supports, on the moving part of the one before [Lan, Fig. 15]. They carry the
+same force and add their displacements. All of them are in the network, so that a stack in which one stage snaps ahead
+of the others is found like any other bifurcation.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010).
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, assert_never
+
+import numpy as np
+
+from cfmkit import elastica as engine
+from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.network import FREE, Link, Network, Node
+from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
+from cfmkit.families.beam.network_elements.spec import HELD
+from cfmkit.specs.units import between
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.network import LoadOn, Spring
+    from cfmkit.elastica.model.shapes import Shape
+    from cfmkit.families.beam.network_elements.spec import (
+        LoadSpec,
+        MemberSpec,
+        NodeSpec,
+        ShapeSpec,
+        SpringSpec,
+        Thickness,
+    )
+    from cfmkit.families.beam.spec import BeamSpec
+
+
+_LARGEST_TURN = 0.35  # of a rotation in one step [rad]
+_SMOOTH = 0.07  # the same where every step is a point of the curve
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A mechanism as the engine takes it.
+
+    Attributes
+    ----------
+    spec : BeamSpec
+        What it was built from.
+    network : Network
+        One half, or one leg; all stages in series.
+    driven : str
+        The node that is driven, in the last stage.
+    parallel : int
+        How many of the network act side by side: forces of the mechanism are so many times those of the network.
+    allowable_stress : float or None
+        Yield strength over safety factor, the smallest of all beams [Pa].
+    """
+
+    spec: BeamSpec
+    network: engine.Network
+    driven: str
+    parallel: int
+    allowable_stress: float | None
+
+    @property
+    def direction(self) -> float:
+        """Direction of the drive [rad], exactly that of the support where the node slides; of a rotation, none."""
+        asked = float(getattr(self.spec.mechanism.drive, "direction", 0.0))
+        support = self.network.nodes[self.driven].support
+        if not support.across:
+            return asked
+        return support.direction if math.cos(asked - support.direction) > 0 else support.direction + math.pi
+
+    @property
+    def _even(self) -> FloatArray:
+        return np.linspace(0.0, self.spec.extent, self.spec.analysis.points)
+
+    @property
+    def places(self) -> FloatArray:
+        """Motions that are requested, in the order of the drive: those of the curve, and ends of windows between."""
+        even, extent = self._even, self.spec.extent
+        if self.spec.analysis.through_folds:
+            return even
+        ends = np.array([end for _, window in self.spec.windows() for end in between(window, (0.0, extent))])
+        close = 1e-6 * abs(extent) / len(even)  # an end that all but meets a point needs none of its own
+        apart = np.abs(ends[:, None] - even).min(axis=1, initial=np.inf) > close
+        inside = apart & (ends * np.sign(extent) > 0) & (np.abs(ends) < abs(extent))
+        return np.array(sorted({*even.tolist(), *ends[inside].tolist()}, key=abs))
+
+    @property
+    def on_curve(self) -> NDArray[np.bool_]:
+        """Which of `places` are points of the curve."""
+        even = set(self._even.tolist())
+        return np.array([place in even for place in self.places.tolist()])
+
+    def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
+        """Return what is done to the network, from rest to the end: at even steps, and where windows end between."""
+        spec, drive = self.spec, self.spec.mechanism.drive
+        points = self.places if drive.kind in ("displacement", "rotation") else self._even
+        if drive.kind == "displacement":
+            return engine.Displacement(self.driven, self.direction, points, self.growing(spec.extent))
+        if drive.kind == "rotation":
+            return engine.Rotation(self.driven, points, self.growing(spec.extent))
+        if drive.kind == "loads":
+            return engine.Loading((*map(_load, drive.loads), *self.growing(spec.extent)), points)
+        x, y = math.cos(self.direction), math.sin(self.direction)
+        own = (
+            engine.PointLoad(self.driven, moment=1.0)
+            if drive.kind == "moment"
+            else engine.PointLoad(self.driven, x, y, follows=drive.follows)
+        )
+        return engine.Loading((own, *self.growing(spec.extent / self.parallel)), points / self.parallel)
+
+    @property
+    def effort_unit(self) -> float:
+        """Force or moment of all copies for one of the engine; of a drive by loads its reference [N]."""
+        drive = self.spec.mechanism.drive
+        return drive.reference if drive.kind == "loads" else float(self.parallel)
+
+    def masses(self) -> NetworkMasses | None:
+        """Return what the parts weigh; None where a density is not known."""
+        mechanism = self.spec.mechanism
+        # stages in series have the names of the first, with a number behind a dot
+        materials = {
+            name: mechanism.beams[name.split(".")[0]].material or mechanism.material for name in self.network.beams
+        }
+        density = {name: one.density for name, one in materials.items() if one.density is not None}
+        if len(density) < len(materials):
+            return None
+        nodes = {name: mechanism.nodes[name.split(".")[0]] for name in self.network.nodes}
+        return NetworkMasses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
+
+    def hold(self) -> tuple[str, float | None]:
+        """Return what stands still while the drive is held: a node, along a direction [rad] or turned (None)."""
+        turned = self.spec.mechanism.drive.kind in ("rotation", "moment")
+        return self.driven, None if turned else self.direction
+
+    def growing(self, end: float) -> tuple[LoadOn, ...]:
+        """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""
+        if self.spec.analysis.loads_first:
+            return ()
+        return tuple(_load(load, 1.0 / end) for load in self.spec.mechanism.loads)
+
+    def control(self) -> engine.Control:
+        """Return how the path is followed."""
+        analysis = self.spec.analysis
+        return engine.Control(
+            tolerance=analysis.tolerance,
+            through_folds=analysis.through_folds,
+            largest_turn=_SMOOTH if analysis.through_folds else _LARGEST_TURN,
+            branch=analysis.branch,
+            sign=-1 if analysis.other_side else 1,
+            imperfection=analysis.imperfection,
+        )
+
+
+def assemble(spec: BeamSpec) -> Assembly:
+    """Return the mechanism that a specification describes, as the engine takes it."""
+    mechanism, copies = spec.mechanism, spec.mechanism.copies
+    network = engine.Network(
+        nodes={name: _node(node) for name, node in mechanism.nodes.items()},
+        beams={name: _beam(spec, beam) for name, beam in mechanism.beams.items()},
+        links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
+        springs=tuple(_spring(spring) for spring in mechanism.springs.values()),
+        loads=tuple(_load(load) for load in mechanism.loads) if spec.analysis.loads_first else (),
+    )
+    if mechanism.closure == "chain":
+        network = chained(network)
+    driven = mechanism.drive.node
+    if copies is not None and copies.layers > 1:
+        network, driven = stacked(network, driven, copies.layers, copies.layer_pitch)
+    return Assembly(spec, network, driven, parallel_parts(spec), allowable_stress(spec))
+
+
+def parallel_parts(spec: BeamSpec) -> int:
+    """Return how many of the part that is described act side by side."""
+    copies = spec.mechanism.copies
+    return 1 if copies is None else copies.legs * (1 if copies.mirror is None else 2)
+
+
+def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
+    """Return a point [m] and the direction [rad] of the mirror axis; None where nothing is mirrored."""
+    copies = assembly.spec.mechanism.copies
+    if copies is None or copies.mirror is None:
+        return None
+    return complex(*copies.mirror), assembly.direction
+
+
+def allowable_stress(spec: BeamSpec) -> float | None:
+    """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
+    mechanism = spec.mechanism
+    materials = [beam.material or mechanism.material for beam in mechanism.beams.values()]
+    limits = [one.allowable(mechanism.safety_factor) for one in materials]
+    return min((limit for limit in limits if limit is not None), default=None)
+
+
+def thickest(thickness: Thickness) -> float:
+    """Return the largest of a thickness along a beam [m]."""
+    return max(value for _, value in thickness) if isinstance(thickness, tuple) else thickness
+
+
+def thickest_of(section: engine.Section) -> float:
+    """Return the largest thickness of a section as the engine has it [m]."""
+    thickness = section.thickness
+    return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))
+
+
+def thinnest_of(section: engine.Section) -> float:
+    """Return the smallest thickness of a section as the engine has it [m]."""
+    thickness = section.thickness
+    return float(thickness if isinstance(thickness, float | int) else np.min(thickness.values))
+
+
+def _node(node: NodeSpec) -> engine.Node:
+    moved = (0.0, 0.0, 0.0)
+    if node.moved is not None:
+        moved = (node.moved.along, node.moved.across, node.moved.rotation)
+    return engine.Node(*node.at, engine.Support(*HELD[node.support], node.direction or 0.0, moved))
+
+
+def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
+    mechanism = spec.mechanism
+    of = beam.material or mechanism.material
+    section = engine.Section(
+        of.modulus,
+        beam.width or mechanism.width,
+        _thickness(beam.thickness or mechanism.thickness),
+        axial=spec.fidelity != "inextensible",
+        shear=spec.fidelity in ("reissner", "solid"),
+        poisson_ratio=of.poisson,
+        wide=mechanism.wide_beams,
+    )
+    return engine.Beam(
+        beam.start,
+        beam.end,
+        section,
+        _shape(beam.shape),
+        "raw" if mechanism.closure == "raw" and getattr(beam.shape, "length", None) else "rotscale",
+        beam.start_joint,
+        beam.end_joint,
+        beam.start_offset or (0.0, 0.0),
+        beam.end_offset or (0.0, 0.0),
+    )
+
+
+def _thickness(given: Thickness) -> float | engine.Taper:
+    if isinstance(given, tuple):
+        return engine.Taper(np.array([place for place, _ in given]), np.array([value for _, value in given]))
+    return given
+
+
+def _shape(shape: ShapeSpec) -> Shape:
+    if shape.kind == "straight":
+        return engine.STRAIGHT
+    if shape.kind == "polynomial":
+        return engine.Polynomial(shape.coefficients, shape.length)
+    if shape.kind == "arc":
+        return engine.arc(shape.sweep)
+    if shape.kind == "cosine":
+        return engine.CosineArch(shape.rise, 0.5 if shape.half else 1.0)
+    if shape.kind == "polyline":
+        return engine.Polyline(np.array(shape.points))
+    if shape.kind == "spline":
+        return engine.Spline(np.array(shape.points))
+    assert_never(shape)
+
+
+def _spring(spring: SpringSpec) -> Spring:
+    if spring.kind == "line":
+        return engine.LineSpring(
+            spring.start, spring.end, spring.stiffness, spring.free_length, spring.ground or (0.0, 0.0)
+        )
+    if spring.kind == "torsion":
+        return engine.TorsionSpring(spring.start, spring.end, spring.stiffness, spring.free_angle)
+    return engine.SlideSpring(spring.node, spring.direction, spring.stiffness, spring.free_displacement)
+
+
+def _load(load: LoadSpec, share: float = 1.0) -> LoadOn:
+    """Return a share of a load."""
+    if load.kind == "point":
+        return engine.PointLoad(load.node, share * load.fx, share * load.fy, share * load.moment, load.follows)
+    return engine.LineLoad(load.beam, share * load.wx, share * load.wy)
+
+
+def resolve(spec: BeamSpec) -> BeamSpec:
+    """Return the specification with everything derived written out: the model and what counts as stress."""
+    fidelity = spec.fidelity
+    switches = {"axial": fidelity != "inextensible", "shear": fidelity in ("reissner", "solid")}
+    analysis = spec.analysis.model_copy(update={"fidelity": fidelity, "stress": spec.stress})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})
+
+
+def chained(network: Network) -> Network:
+    """Return the network with its free nodes moved to where the beams end."""
+    placed = {
+        name: complex(node.x, node.y)
+        for name, node in network.nodes.items()
+        if node.support.along and node.support.across
+    }
+    waiting = dict(network.beams)
+    while ready := [name for name, beam in waiting.items() if beam.start in placed or beam.end in placed]:
+        beam = waiting.pop(ready[0])
+        chord = _own_chord(network, beam)
+        if beam.end not in placed:
+            placed[beam.end] = placed[beam.start] + complex(*beam.start_offset) + chord - complex(*beam.end_offset)
+        elif beam.start not in placed:
+            placed[beam.start] = placed[beam.end] + complex(*beam.end_offset) - chord - complex(*beam.start_offset)
+    nodes = {
+        name: replace(node, x=placed[name].real, y=placed[name].imag) if name in placed else node
+        for name, node in network.nodes.items()
+    }
+    return Network(nodes, network.beams, network.links, network.springs, network.loads)
+
+
+def _own_chord(network: Network, beam: Beam) -> complex:
+    """Return the vector between the ends of a beam as its shape is given [m]; as fitted where it has no own length."""
+    start, end = network.nodes[beam.start], network.nodes[beam.end]
+    reach = complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
+    if getattr(beam.shape, "length", None) is None:
+        return reach
+    found = fit(beam, (reach.real, reach.imag))
+    return reach * cmath.exp(-1j * float(np.real(found.rotation))) / float(np.real(found.scale))
+
+
+_ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
+
+
+def stacked(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
+    """Return `count` equal stages in series, and the moving part of the last.
+
+    Parameters
+    ----------
+    network : Network
+        One stage, of beams and links; all supports but that of `driven` are clamped.
+    driven : str
+        Its moving part.
+    count : int
+        Number of stages; those after the first have names with ``.2``, ``.3``, ...
+    pitch : float, optional
+        Distance of the stages along the way of the moving part [m].
+    """
+    nodes, beams, links = dict(network.nodes), dict(network.beams), list(network.links)
+    dx, dy = _step(network, driven, pitch)
+    for stage in range(2, count + 1):
+        below = _named(driven, stage - 1)
+        for name, node in network.nodes.items():
+            clamped = node.support.along and name != driven
+            moved = Node(node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE if clamped else node.support)
+            nodes[_named(name, stage)] = moved
+            if clamped:
+                links.append(Link(below, _named(name, stage)))
+        for name, beam in network.beams.items():
+            beams[_named(name, stage)] = _moved_beam(beam, stage)
+        links += [Link(_named(link.master, stage), _named(link.node, stage)) for link in network.links]
+    return Network(nodes, beams, tuple(links)), _named(driven, count)
+
+
+def _named(name: str, stage: int) -> str:
+    return name if stage == 1 else f"{name}.{stage}"
+
+
+def _moved_beam(beam: Beam, stage: int) -> Beam:
+    return replace(beam, start=_named(beam.start, stage), end=_named(beam.end, stage))
+
+
+def _step(network: Network, driven: str, pitch: float | None) -> tuple[float, float]:
+    """Return the vector from one stage to the next: along the way of the moving part, away from the supports."""
+    top = network.nodes[driven]
+    c, s = math.cos(top.support.direction), math.sin(top.support.direction)
+    grounds = [node for name, node in network.nodes.items() if node.support.along and name != driven]
+    ahead = [(top.x - node.x) * c + (top.y - node.y) * s for node in grounds]
+    mean = sum(ahead) / len(ahead) if ahead else 0.0
+    size = math.copysign(_ROOM * max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
+    return size * c, size * s

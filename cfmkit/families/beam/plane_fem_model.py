@@ -1,0 +1,455 @@
+"""The part as it is drawn, as a planar solid: what nodes, fillets and pads change against beams.
+
+Assumes: plane stress; pads and what joins the moving pads of two halves are rigid from the root plane on, as in the
+model of beams; an eye turns about its hole as one piece. No contact, no plasticity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import GeometryError
+from cfmkit.families.beam.fillet_stress_from_fem import fillets
+from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.network_elements.spec import PartSpec
+from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, resolve, thinnest_of
+from cfmkit.families.beam.node_motions_from_fem import SolidNodes
+from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.requested_node_columns import output_columns
+from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.beam.solid_under_load import driven_by_load, load_of_one, moved_far_enough
+from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
+from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.findings import bracket
+from cfmkit.results import Quantity, Result, Status, quantities
+from cfmkit.specs.units import between, format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+    from cfmkit.elastica.input_deck import DrivenNetwork
+    from cfmkit.families.base import Run
+    from cfmkit.families.beam.network_from_spec import Assembly
+    from cfmkit.families.beam.outline import HeldPlace
+    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.fillet_stress_results import FilletRow
+    from cfmkit.results import Finding
+    from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
+    from cfmkit.solid.under_load import LoadPath
+    from cfmkit.tables import Table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SolidSolution(ShortRepr):
+    """A part that was solved on two meshes.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The network that the part is drawn from.
+    meshes : TwoMeshes
+    motion : (n,) array
+        Travel of the points of the curve [m or rad].
+    reached : LoadPath or None
+        How far a load leads that drives the part; None where its motion is given.
+    """
+
+    assembly: Assembly
+    meshes: TwoMeshes
+    motion: FloatArray = field(default_factory=lambda: np.zeros(0))
+    reached: LoadPath | None = None
+
+    @property
+    def spec(self) -> BeamSpec:
+        """The specification; that of a part under a load has its motion instead."""
+        return self.assembly.spec
+
+    @property
+    def end(self) -> float:
+        """Where the travel was to end, or a load's did [m or rad]."""
+        return self.spec.extent if self.reached is None else self.reached.end
+
+    @property
+    def fine(self) -> MeshSolution:
+        """The finer mesh, whose values are reported."""
+        return self.meshes.fine
+
+    @property
+    def copies(self) -> int:
+        """How many of the drawn part act side by side."""
+        copies = self.spec.mechanism.copies
+        return copies.legs if copies is not None else 1
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """Force [N] or torque [N m] at the points of the curve, of all parts: cubics between the poses."""
+        return read_only(self.copies * self.fine.course.effort(self.motion))
+
+    @cached_property
+    def accurate(self) -> NDArray[np.bool_]:
+        """Every point of the curve: no pose is kept that did not converge."""
+        return np.ones(len(self.motion), bool)
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
+        from scipy.interpolate import PchipInterpolator
+
+        rising = np.argsort(self.fine.course.travel)
+        cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
+        return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
+
+    @property
+    def densely(self) -> SolidSolution:
+        """The same at many points: what is found along a surface does not depend on how many rows a curve has."""
+        return replace(self, motion=read_only(np.linspace(0.0, self.motion[-1], LOOKED_AT)))
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether the equilibrium of each point is stable; under a load also the drive gives way if its force falls."""
+        travel = self.fine.course.travel
+        at_pose = np.array([pose.unstable == 0 for pose in self.fine.course.poses])
+        before = np.clip(np.searchsorted(np.abs(travel), np.abs(self.motion) * (1 + 1e-12)) - 1, 0, None)
+        stable = at_pose[before]
+        return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
+
+    @property
+    def everywhere(self) -> None:
+        """Nothing: a pose between two of these takes seconds."""
+
+    @property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """The same, by part."""
+        return {"part": (self.stress, np.zeros_like(self.stress))}
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where stress is judged, from the smaller end on [m or rad]; without a window the whole travel."""
+        end, window = self.end, self.spec.analysis.window
+        low, high = sorted((0.0, end) if window is None else between(window, (0.0, end)))
+        return low, high
+
+    @cached_property
+    def worst(self) -> tuple[float, FloatArray] | None:
+        """Largest stress of the poses in the window [Pa] and its place in the unloaded part (2,) [m]; None without any.
+
+        Without a window over the whole travel.
+        """
+        travel, (low, high) = self.fine.course.travel, self.window
+        slack = 1e-9 * abs(self.spec.extent)  # an end of the window is a pose, but for rounding
+        inside = np.flatnonzero((travel >= low - slack) & (travel <= high + slack))
+        if not len(inside):
+            return None
+        stresses, places = self.fine.peaks
+        pose = inside[stresses[inside].argmax()]
+        return float(stresses[pose]), places[pose]
+
+    @cached_property
+    def error(self) -> MeshError:
+        """What the two meshes differ by."""
+        return self.meshes.error
+
+    @cached_property
+    def fillets(self) -> tuple[FilletRow, ...]:
+        """Stress fillet by fillet."""
+        return fillets(self.assembly, self.fine, self.window)
+
+
+def analyze(spec: BeamSpec, run: Run) -> Result:
+    """Return the force-displacement curve of the part as drawn, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        The mechanism; its node is moved or turned, or a force or a moment acts on it.
+    run : Run
+        Its progress is reported.
+
+    Returns
+    -------
+    Result
+        PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
+    """
+
+    try:
+        assembly, meshes = _solved(spec, run)
+    except GeometryError as error:
+        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
+    if why := meshes.no_curve(2):
+        keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
+        message = f"no curve: {why}; look at mechanism.drive, {keys}, analysis.solid.mesh"
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
+    solution = _under_load(spec, assembly, meshes) if driven_by_load(spec) else _moved(assembly, meshes)
+    message = _ended(solution)
+    if len(solution.motion) < 2:
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
+    curves: tuple[Curve, ...] = (_curve(solution),)
+    values, warnings = _values(solution), tuple(_findings(solution))
+    status = Status.PARTIAL if message else Status.COMPLETE
+    if (along := ride(solution.densely)) is not None:
+        curves += (curve_of(along),) if len(along.place) > 1 else ()
+        values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
+        if along.missing and status is Status.COMPLETE:
+            status, message = Status.PARTIAL, along.missing
+    return Result(
+        spec=resolve(spec),
+        status=status,
+        message=message,
+        curves=curves,
+        values=values,
+        warnings=warnings,
+        travel=(0.0, solution.end),
+        reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
+        allowable_stress=assembly.allowable_stress,
+        tables={"fillets": partial(_fillet_table, solution)},
+        state=solution,
+    )
+
+
+def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, TwoMeshes]:
+    """Return the network that a part is drawn from and the part on two meshes, moved far enough where a load drives it.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the part cannot be meshed.
+    """
+    if driven_by_load(spec):
+        spec = moved_far_enough(spec, part_of, run.progress)
+    assembly = assemble(spec)
+    return assembly, driven_part(spec, assembly).solved(run.progress)
+
+
+def _moved(assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+    """Return the points of the curve of a part that is moved: even ones, as far as its path leads."""
+    spec, travel = assembly.spec, meshes.fine.course.travel
+    asked, forwards = np.linspace(0.0, spec.extent, spec.analysis.points), np.sign(spec.extent)
+    reached = forwards * asked <= forwards * travel[-1] * (1 + 1e-12)
+    return SolidSolution(assembly, meshes, read_only(asked[reached]))
+
+
+def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+    """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
+    from cfmkit.solid.under_load import travels_at, up_to_load, with_poses
+
+    load, through = load_of_one(spec), spec.analysis.through_folds
+    fine, reached = up_to_load(meshes.fine, load, through)
+    meshes = replace(meshes, fine=with_poses(fine, _ends_of_windows(spec, reached.end)))
+    if through:
+        motion = read_only(np.linspace(0.0, reached.end, spec.analysis.points))
+    else:
+        motion = travels_at(fine.course, np.linspace(0.0, load, spec.analysis.points))
+    return SolidSolution(assembly, meshes, motion, reached)
+
+
+def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
+    """Return the part as it is solved: its outline, with what is held and driven."""
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
+
+    frame = standing_frame(spec)
+    cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
+    beam = next(iter(spec.mechanism.beams.values()))
+    material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
+    law = LAWS[material.law](material.modulus, material.poisson)
+    places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
+    return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places), obstacles=frame)
+
+
+def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
+    """Return what bends: without the frame, which stands, and the holes in it."""
+    from cfmkit.export.ground_frame import outside
+
+    part = spec.mechanism.part
+    if not frame or part is None or part.frame is None:
+        return spec
+    pads = [one for place in regions(spec) for one in place.shapes if len(one) == 4]
+    kept = outside([one.at for one in part.holes], frame, pads)
+    holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
+    alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update={"part": alone})})
+
+
+def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
+    """Return the part with the travels that it is solved for."""
+    from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
+
+    part = part_of(spec, assembly)
+    return DrivenPart("beams", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+
+
+def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
+    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
+    spec = spec.replace({"analysis.fidelity": "solid"})
+    if driven_by_load(spec):
+        spec = moved_far_enough(spec, part_of)
+    return (driven_part(spec, assemble(spec)),)
+
+
+def elastic_networks(spec: BeamSpec) -> tuple[DrivenNetwork, ...]:
+    """Return the same as beams, for decks of other solvers; none where a node is turned that is free to move."""
+    from cfmkit.elastica import Displacement, Rotation
+    from cfmkit.elastica.input_deck import DrivenNetwork
+
+    assembly = assemble(spec)
+    drive = assembly.drive()
+    if isinstance(drive, Rotation):
+        support = assembly.network.nodes[drive.node].support
+        return (DrivenNetwork("beams", assembly.network, drive),) if support.along and support.across else ()
+    return (DrivenNetwork("beams", assembly.network, drive),) if isinstance(drive, Displacement) else ()
+
+
+def _thinnest(assembly: Assembly) -> float:
+    return min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+
+
+def _stops(spec: BeamSpec) -> list[float]:
+    """Return the travels to solve for [m or rad]: even ones, and the ends of every window."""
+    end = spec.extent
+    inside = [place for place in _ends_of_windows(spec, end) if 0.0 < place / end < 1.0]
+    even = np.linspace(0.0, end, spec.analysis.solid.poses)
+    found = np.unique(np.concatenate([even, inside]))
+    # ends of windows that are an even pose but for rounding are that pose
+    near = np.abs(np.diff(found)) < 1e-9 * abs(end)
+    return [float(place) for place in np.delete(found, np.flatnonzero(near) + 1)[:: 1 if end > 0 else -1]]
+
+
+def _ends_of_windows(spec: BeamSpec, end: float) -> list[float]:
+    """Return where every window starts and ends on a travel [m or rad]."""
+    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    return [place for window in windows if window is not None for place in between(window, (0.0, end))]
+
+
+def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
+    """Return how a region is driven, (3,), and which motions it is free in, (3, f)."""
+    about = assembly.network.nodes[place.node].support
+    flip = place.name != place.node
+    direction = about.direction
+    if flip and (axis := mirror_axis(assembly)) is not None:
+        direction = 2 * axis[1] - direction
+    driven = np.zeros(3)
+    along, across, turn = about.along, about.across, about.rotation
+    if place.node == assembly.driven:
+        if assembly.spec.mechanism.drive.kind == "rotation":
+            driven[2], turn = (-1.0 if flip else 1.0), True
+        else:
+            direction, along = assembly.direction, True
+            driven[:2] = np.cos(direction), np.sin(direction)
+    c, s = np.cos(direction), np.sin(direction)
+    ways = ((along, (c, s, 0.0)), (across, (-s, c, 0.0)), (turn, (0.0, 0.0, 1.0)))
+    return driven, np.array([way for held, way in ways if not held]).reshape(-1, 3).T
+
+
+def _ended(solution: SolidSolution) -> str:
+    """Return why the curve ends early, and where; empty if it does not."""
+    from cfmkit.solid.under_load import LoadEnd
+
+    course, turns = solution.fine.course, _turns(solution.spec)
+    where = format_short(solution.end if solution.reached else float(course.travel[-1]), "angle" if turns else "length")
+    if solution.reached is not None and solution.reached.how is LoadEnd.MAXIMUM:
+        largest = format_short(solution.copies * solution.reached.effort, "torque" if turns else "force")
+        told = f"the part snaps at {largest}, at {where}: the load cannot grow further"
+        return f"{told}; follow the curve beyond its maximum (analysis.through_folds)"
+    if course.ended:
+        return f"{course.ended}, at {where}"
+    if solution.reached is not None and solution.reached.how is LoadEnd.SHORT:
+        return f"the part does not carry the load within {where}"
+    return ""
+
+
+def _turns(spec: BeamSpec) -> bool:
+    return spec.mechanism.drive.kind == "rotation"
+
+
+def _curve(solution: SolidSolution) -> Curve:
+    course, motion = solution.fine.course, solution.motion
+    solved = np.isclose(motion[:, None], course.travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(axis=1)
+    extra = {
+        "max_stress": Column(solution.stress, "stress"),
+        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
+    } | _outputs(solution)
+    kind: Kind = "torque" if _turns(solution.spec) else "force"
+    return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), solution.stable, extra, kind)
+
+
+def _outputs(solution: SolidSolution) -> dict[str, Column]:
+    """Return the motions and reactions that the specification names, of one copy."""
+    nodes = SolidNodes(solution.assembly, solution.fine)
+    return output_columns(
+        solution.spec.analysis.outputs,
+        lambda name: read_only(nodes.motion(name)(solution.motion)),
+        lambda name: read_only(nodes.reaction(name)(solution.motion)),
+    )
+
+
+def _fillet_table(solution: SolidSolution) -> Table:
+    return fillet_table(solution.fillets, ("angle", "angle") if _turns(solution.spec) else ("displacement", "length"))
+
+
+def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; None where the model does not know a value."""
+    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
+        "allowable_stress": solution.assembly.allowable_stress,
+        **solution.error.values(),
+    }
+    if solution.worst is not None:
+        numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
+    if not _turns(solution.spec):
+        numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | _limit(solution)
+        numbers |= ranges(solution) if solution.reached is None else {}
+    return quantities(DEFINITIONS, numbers) | largest_concentration(solution.fillets)
+
+
+def _limit(solution: SolidSolution) -> dict[str, float | None]:
+    """Return the first maximum of a load; nothing of parts that are moved."""
+    from cfmkit.solid.under_load import LoadEnd, first_maximum
+
+    reached, course = solution.reached, solution.fine.course
+    if reached is None:
+        return {}
+    if reached.how is LoadEnd.MAXIMUM:
+        return {"limit_force": solution.copies * reached.effort}
+    sense = float(np.sign(reached.end))
+    first = first_maximum(course, sense)
+    law = course.law(sense)
+    return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
+
+
+def _findings(solution: SolidSolution) -> Iterator[Finding]:
+    spec, course = solution.spec, solution.fine.course
+    if told := _ended(solution):
+        yield finding("ends_early" if course.touching is None else "self_contact", told)
+    for place in course.bifurcations:
+        at = format_short(place, "angle" if _turns(spec) else "length")
+        yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
+    if (spec.mechanism.part or PartSpec()).fillet == 0:
+        yield finding(
+            "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
+        )
+    for name, told in solution.error.too_large():
+        yield finding(name, told)
+    thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())
+    if told := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson):
+        yield finding("wide_beam", told)
+    allowable = solution.assembly.allowable_stress
+    if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
+        largest, spot = solution.worst
+        at = ", ".join(format_short(one, "length") for one in spot.tolist())
+        yield finding(
+            "overstressed",
+            f"the stress reaches {format_short(largest, 'stress')} at ({at}); the allowable stress is "
+            f"{format_short(allowable, 'stress')}",
+        )

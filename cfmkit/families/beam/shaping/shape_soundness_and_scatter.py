@@ -1,0 +1,190 @@
+"""The judgement of a shape on terms that the search does not use.
+
+The stable branch, true gaps and crossings, and what is left of the constant force when nodes and coefficients are off
+by their tolerances. Force and stress are judged by the analysis of the specification that is written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica import Control, Displacement, PathStatus, trace
+from cfmkit.elastica.continuation.batch import trace_many
+from cfmkit.families.beam.network_from_spec import thickest_of
+from cfmkit.families.beam.shaping.limits import pairs
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
+    from cfmkit.families.beam.shaping.limits import Pair
+    from cfmkit.families.beam.shaping.search import Found
+    from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.families.beam.shaping.variables import Variables
+
+POSES = 61
+STRICT = 0.05
+_JOINED = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
+
+
+@dataclass(frozen=True)
+class NetworkScatter:
+    """Standard deviations of node coordinates [m] and shape coefficients [rad], and how many networks are drawn."""
+
+    nodes: float
+    coefficients: float
+    samples: int
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Whether a mechanism exists as drawn.
+
+    Attributes
+    ----------
+    complete, stable : bool
+        Whether the whole way is reached, and stable at all poses.
+    crossings : int
+        Poses, of 61 from rest to the end, at which beams cross.
+    gap : float or None
+        Least distance of surfaces away from joints at any pose [m].
+    """
+
+    complete: bool
+    stable: bool
+    crossings: int
+    gap: float | None
+
+    @property
+    def sound(self) -> bool:
+        """Whether the mechanism exists as drawn, all the way."""
+        return self.complete and self.stable and self.crossings == 0
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Networks drawn within the tolerances.
+
+    Attributes
+    ----------
+    bands, ranges : (n,) array
+        Half bands and strict shares of those that could be followed.
+    lost : int
+        Those that could not.
+    """
+
+    bands: FloatArray
+    ranges: FloatArray
+    lost: int
+
+
+def audited(variables: Variables, found: Found) -> Audit:
+    """Return the judgement of a design."""
+    task, network = variables.task, variables.build(found.x)
+    at = np.linspace(0.0, task.window[1], POSES)
+    path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
+    return Audit(
+        path.status is PathStatus.COMPLETE,
+        bool(path.stable.all()),
+        sum(crossing(task, path, int(k)) for k in path.at_requested),
+        _least_gap(task, path),
+    )
+
+
+def half_band(at: FloatArray, force: FloatArray, start: float) -> float:
+    """Return (max - min)/(max + min) of a force from `start` on; between poses a cubic."""
+    from scipy.interpolate import CubicSpline
+
+    inside = CubicSpline(at, force)(np.linspace(start, at[-1], 201))
+    return float(np.ptp(inside) / (inside.max() + inside.min()))
+
+
+def strict_share(at: FloatArray, force: FloatArray) -> float:
+    """Return the largest share of the travel up to its end over which (max - min) <= 5 % of max."""
+    from scipy.interpolate import CubicSpline
+
+    fine = np.linspace(0.0, at[-1], 2001)
+    values = CubicSpline(at, force)(fine)[::-1]
+    tops, bottoms = np.maximum.accumulate(values), np.minimum.accumulate(values)
+    good = tops - bottoms <= STRICT * tops
+    count = len(good) if good.all() else int(good.argmin())
+    return (count - 1) / (len(fine) - 1)
+
+
+def tolerated(variables: Variables, found: Found, spread: NetworkScatter) -> Drawn:
+    """Return what is left of the constant force in networks within the tolerances."""
+    task, rng = variables.task, np.random.default_rng([spread.seed, 1])
+    places = len(task.coordinates)
+    sizes = np.full(variables.count, spread.coefficients)
+    sizes[:places] = spread.nodes / task.size
+    at = np.linspace(0.0, task.window[1], POSES)
+    noise = rng.standard_normal((spread.samples, variables.count)) * sizes
+    drive = Displacement(task.driven, task.direction, at)
+    networks = (variables.build(found.x + one) for one in noise)
+    outcomes = [one.value for one in trace_many(networks, drive, Control(tolerance=1e-5)) if one.status == "COMPLETE"]
+    bands = np.array([half_band(at, one.effort, found.start) for one in outcomes])
+    ranges = np.array([strict_share(at, one.effort) for one in outcomes])
+    return Drawn(bands, ranges, spread.samples - len(outcomes))
+
+
+def crossing(task: Task, path: Path, pose: int) -> bool:
+    """Tell whether centre lines of different beams cross at a pose, or one crosses itself."""
+    lines = {name: path.shape(name, pose) for name in task.network.beams}
+    shared = {pair.beams: pair.joints for pair in pairs(task.network)}
+    return any(
+        lines_cross(lines[one], lines[other], bool(shared[one, other])) for one, other in combinations(lines, 2)
+    ) or any(lines_cross(line, line, True) for line in lines.values())
+
+
+def lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
+    """Tell whether two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
+    p, q = one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1]
+    a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
+    first = _side(a, b, c) * _side(a, b, d)
+    second = _side(c, d, a) * _side(c, d, b)
+    hit = (first < 0) & (second < 0)
+    if joined:
+        size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
+        near = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
+        hit &= near > _JOINED * size
+    return bool(hit.any())
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    return np.asarray(np.imag(np.conj(b - a) * (c - a)))
+
+
+def _least_gap(task: Task, path: Path) -> float | None:
+    """Return the least distance of surfaces of different beams, away from where they meet [m]."""
+    least = np.inf
+    for pair in pairs(task.network):
+        if not pair.alone:
+            least = min(least, _gap(task, path, pair))
+    return float(least) if np.isfinite(least) else None
+
+
+def _gap(task: Task, path: Path, pair: Pair) -> float:
+    sections = [task.network.beams[name].section for name in pair.beams]
+    thickness = 0.5 * sum(thickest_of(section) for section in sections)
+    wanted = thickness + (task.limits.clearance or 0.0)
+    least = np.inf
+    for pose in path.at_requested:
+        p, q = (path.shape(name, int(pose)) @ [1, 1j] for name in pair.beams)
+        distance = abs(p[:, None] - q[None, :])
+        away = np.full(distance.shape, np.inf)
+        for i, j in pair.joints:
+            away = np.minimum(away, _along(p, i)[:, None] + _along(q, j)[None, :])
+        far = task.limits.opening * away >= wanted
+        if far.any():
+            least = min(least, float(distance[far].min()) - thickness)
+    return least
+
+
+def _along(line: FloatArray, end: int) -> FloatArray:
+    """Return the way along a line from its first (0) or last (1) point."""
+    way = np.append(0.0, np.cumsum(abs(np.diff(line))))
+    return way[-1] - way if end else way

@@ -1,0 +1,57 @@
+"""Which values of a designed mechanism may move for a yield: those that its own design chooses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.stock.spec import sheet_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.beam.shaping.spec import Optimise
+    from cfmkit.families.beam.spec import BeamSpec
+
+_TURN = 0.4
+"""How far a coefficient of a shape may turn from the design [rad]: farther off it is another shape."""
+
+
+def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
+    """Return places of nodes and coefficients of shapes that were searched; of a rescaled mechanism width or thickness.
+
+    Parameters
+    ----------
+    given : BeamSpec
+        With the `design` block.
+    designed : BeamSpec
+        What came out.
+    """
+    design = given.design
+    if design is None:
+        return {}
+    if design.optimise is not None:
+        return dict(_of_shapes(design.optimise, designed))
+    mechanism, found = designed.mechanism, dict[str, tuple[float, float]]()
+    name = None if design.rescale is None else design.rescale.adapted(sheet_of(mechanism.part))
+    if name is not None and name != "size":
+        value = getattr(mechanism, name)
+        found |= {f"mechanism.{name}": around(value)} if isinstance(value, float) else {}
+    return found
+
+
+def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield what a search of shapes may vary, with the ranges of the search or as far as a shape stays what it is."""
+    box = wanted.limits.envelope
+    for name, node in wanted.free.items():
+        inside = (box.x, box.y) if node.x is None and node.y is None and box is not None else (node.x, node.y)
+        for axis, ends in enumerate(inside):
+            if ends is not None:
+                yield f"mechanism.nodes.{name}.at.{axis}", (float(ends[0]), float(ends[1]))
+    limit = float(wanted.coefficient_limit)
+    for name in wanted.beams if wanted.beams is not None else designed.mechanism.beams:
+        shape = designed.mechanism.beams[name].shape
+        for k, value in enumerate(getattr(shape, "coefficients", ())):
+            if k:  # the first turns with the chord
+                path = f"mechanism.beams.{name}.shape.coefficients.{k}"
+                yield path, (max(-limit, float(value) - _TURN), min(limit, float(value) + _TURN))

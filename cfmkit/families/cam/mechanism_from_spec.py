@@ -1,0 +1,494 @@
+"""From a cam specification to the parts that the model works with, and whether these can be where it puts them.
+
+Rollers must have room beside each other, each flank must stay on its own side of the axis, the cam
+can push a roller but not pull it, and springs that hold the rollers must not go slack. A mechanism whose first pose
+breaks one of these is not assembled; where a later pose does, what follows does not happen. Springs that are
+slack at the start and tighten later can be built: the force is zero until they do (`spring_slack` warns of it).
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.mounted_roller_track import Track
+from cfmkit.families.cam.geometry.path import RollerPath, reach
+from cfmkit.families.cam.geometry.slope_law import SlopeLaw
+from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
+from cfmkit.families.cam.geometry.track_states import NoTrack
+from cfmkit.families.cam.solution import Assembly
+from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
+from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
+from cfmkit.families.findings import mm
+from cfmkit.families.no_mechanism import CannotBuild
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.slope_law import Real
+    from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
+    from cfmkit.results import Finding
+
+
+CLOSE = 1e-6
+"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
+
+
+def resolve(spec: CamSpec) -> CamSpec:
+    """Return the spec with the cut profile written out: what was left to follow the mechanism is now fixed."""
+    mechanism = spec.mechanism
+    profile = mechanism.profile
+    stroke = profile.stroke or spec.analysis.travel or (spec.design.stroke if spec.design else None)
+    if stroke is None:
+        stroke = 0.5 * mechanism.brace_length
+    written = {
+        "brace_length": profile.brace_length or mechanism.brace_length,
+        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
+        "roller_radius": profile.roller_radius or mechanism.roller_radius,
+        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
+        "stroke": stroke,
+    }
+    changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
+    if mechanism.left and mechanism.left.profile:
+        changes["left"] = _resolved_left(mechanism, mechanism.left, stroke)
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
+
+
+def _resolved_left(mechanism: Mechanism, left: Left, stroke: float) -> Left:
+    """Return the left side with its own flank written out: what that leaves out follows the left side."""
+    profile = left.profile
+    if profile is None:
+        return left
+    written = {
+        "brace_length": profile.brace_length or left.brace_length or mechanism.brace_length,
+        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
+        "roller_radius": profile.roller_radius or left.roller_radius or mechanism.roller_radius,
+        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
+        "stroke": profile.stroke or stroke,
+    }
+    return left.model_copy(update={"profile": profile.model_copy(update=written)})
+
+
+def left_side(spec: CamSpec) -> CamSpec:
+    """Return the spec whose right side is the left side of a resolved one."""
+    mechanism, left = spec.mechanism, spec.mechanism.left
+    if left is None:
+        return spec
+    changes = {
+        "brace_length": left.brace_length or mechanism.brace_length,
+        "roller_radius": left.roller_radius or mechanism.roller_radius,
+        "profile": left.profile or mechanism.profile,
+    }
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
+
+
+def slope_law(spec: CamSpec) -> SlopeLaw:
+    """Return the slope law of a resolved spec's profile."""
+    profile = spec.mechanism.profile
+    plain = SlopeLaw(
+        force_constant=profile.force_constant,
+        rest_half_width=float(profile.rest_half_width or 0.0),
+        brace_length=float(profile.brace_length or 0.0),
+        friction=profile.friction,
+        slope_factor=profile.slope_factor,
+        preload=0.5 * (profile.preload or 0.0),
+    )
+    if profile.curve is None:
+        return plain
+    return with_curve(plain, profile.curve.shape, float(profile.stroke or 0.0))
+
+
+def hanging_weights(masses: Masses | None) -> tuple[float, float]:
+    """Return the weight that hangs on one roller and on the slider [N]: each brace counts half at each end."""
+    if masses is None:
+        return 0.0, 0.0
+    return weights(masses.slider, masses.brace, masses.roller)
+
+
+def weights(slider: Real, brace: Real, roller: Real) -> tuple[Real, Real]:
+    """Return the weights that hang on one roller and on the slider [N] from the masses of the parts [kg]."""
+    return GRAVITY * (roller + 0.5 * brace), GRAVITY * (slider + brace)
+
+
+class Weights(NamedTuple):
+    """Weight on one roller and on the slider, against the slider's way out and across it; and what the guide carries.
+
+    All in newtons, `off_plane` that of all parts.
+    """
+
+    along: tuple[float, float] = (0.0, 0.0)
+    sideways: tuple[float, float] = (0.0, 0.0)
+    off_plane: float = 0.0
+
+
+def directions(mounting: Mounting | None) -> tuple[float, float, float]:
+    """Return the shares of gravity against the slider's way out, to the right of it and out of the cam's plane."""
+    if mounting is None:
+        return 1.0, 0.0, 0.0
+    across = _exact(cos(mounting.elevation))
+    return _exact(sin(mounting.elevation)), across * _exact(cos(mounting.roll)), across * _exact(sin(mounting.roll))
+
+
+def _exact(share: float) -> float:
+    """Return a share without the rounding that is left of a right angle."""
+    return 0.0 if abs(share) < 1e-15 else share
+
+
+def weights_of(mechanism: Mechanism) -> Weights:
+    """Return what the parts weigh, in the directions that the mounting gives."""
+    roller, slider = hanging_weights(mechanism.masses)
+    along, right, off = directions(mechanism.mounting)
+    return Weights((along * roller, along * slider), (right * roller, right * slider), off * (2.0 * roller + slider))
+
+
+def losses_of(mechanism: Mechanism) -> Losses | None:
+    """Return the friction of bearings, pins and guide; None where nothing rubs but the rollers."""
+    bearings, pins, guide = mechanism.bearings, mechanism.pins, mechanism.guide
+    bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
+    pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
+    if not bearing and not pin and not (guide and (guide.friction or guide.drag)):
+        return None
+    return Losses(
+        rolling=mechanism.rolling_friction,
+        roller_radius=mechanism.roller_radius,
+        bearing=bearing,
+        pin=pin,
+        guide=guide.friction if guide else 0.0,
+        drag=guide.drag if guide else 0.0,
+        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+    )
+
+
+def loads_of(spec: CamSpec, stiffness: float, rest: float) -> Loads:
+    """Return what acts on rollers and slider with springs of a stiffness that are at rest at a half width."""
+    weights, brace = weights_of(spec.mechanism) if spec.gravity else Weights(), spec.mechanism.brace_length
+    acting = (*weights.along, weights.sideways, weights.off_plane)
+    return Loads(stiffness, rest, brace, *acting, losses=losses_of(spec.mechanism))
+
+
+def assemble(spec: CamSpec) -> Assembly:
+    """Return the mechanism put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist; the finding says why.
+    """
+    spec = resolve(spec)
+    mechanism, law = spec.mechanism, slope_law(spec)
+    stroke, radius = float(mechanism.profile.stroke or 0.0), float(mechanism.profile.roller_radius or 0.0)
+    missing = max(-mechanism.profile.offset, 0.0)
+    check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
+    path, end = reach(law, stroke, spec.analysis.path_method)
+    reached = float(path.travel(end))
+    shortfall = _shortfall(law, stroke, reached)
+    profile = cut_profile(path, radius, end)
+    # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
+    track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
+    loads = loads_of(spec, mechanism.springs.total, mechanism.springs_rest)
+    return Assembly(spec, profile, track, loads, reached, shortfall)
+
+
+def assemble_sides(spec: CamSpec) -> tuple[Assembly, Assembly]:
+    """Return the right and the left side put together; one and the same where nothing differs on the left.
+
+    Raises
+    ------
+    CannotBuild
+        If one of them cannot exist; the finding says why.
+    """
+    right = assemble(spec)
+    return right, assemble(left_side(right.spec)) if spec.mechanism.left else right
+
+
+def displacement_origin(assembly: Assembly) -> float:
+    """Return what turns travel into the displacement that the spec asks for [m]."""
+    origin = assembly.spec.analysis.origin
+    if origin == "path-start":
+        return 0.0
+    below = cam_start_height(assembly.profile) if origin == "slider-from-cam" else 0.0
+    return assembly.track.start - below
+
+
+def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
+    """Raise if there is no mechanism to begin with, whatever the force constant.
+
+    Parameters
+    ----------
+    law : SlopeLaw
+        The slope of the path.
+    rollers : (float, float)
+        Radius and brace length of each roller: the one built in, the one the cam is cut for [m].
+
+    Raises
+    ------
+    CannotBuild
+        If the braces do not reach, the rollers have no room, or the path does not rise.
+    """
+    x0, shortest = law.rest_half_width, min(brace for _, brace in rollers)
+    if x0 >= shortest * (1 - 1e-6):
+        raise CannotBuild(
+            finding(
+                "brace_too_short",
+                f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
+                f"{mm(x0)} from it; use a brace longer than {mm(x0)} ('mechanism.brace_length')",
+            )
+        )
+    for radius, brace in rollers:
+        if radius >= brace:
+            raise CannotBuild(
+                finding(
+                    "rollers_collide",
+                    f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
+                    "use smaller rollers ('mechanism.roller_radius')",
+                )
+            )
+    p = float(law.frictionless(x0))
+    if p + law.friction <= 0 or law.friction * p >= 1:
+        raise CannotBuild(
+            finding(
+                "design_singular",
+                f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
+                f"{p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
+            )
+        )
+
+
+def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
+    """Return why the profile ends at `reached` and not at `stroke` [m]; None if it does not."""
+    if reached >= stroke * (1 - CLOSE):
+        return None
+    ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"
+    if law.friction > 0 and law.vertical_at < law.brace_length:
+        return finding(
+            "path_vertical",
+            f"cut for a friction of {law.friction:g} the path turns vertical at x = {mm(law.vertical_at)}: {ends}; "
+            "use less friction or a larger force constant ('friction' and 'force_constant' of 'mechanism.profile', or "
+            "of 'design')",
+        )
+    if reached <= 0:
+        raise CannotBuild(
+            finding(
+                "design_singular",
+                f"a profile cut for a friction of {law.friction:g} self-locks: the slider cannot rise anywhere as the "
+                "rollers move out; use less friction or a smaller force constant ('friction' and "
+                "'force_constant' of "
+                "'mechanism.profile')",
+            )
+        )
+    return finding(
+        "brace_too_short",
+        f"the brace of {mm(law.brace_length)} turns horizontal too early: {ends}; use a longer brace "
+        "('mechanism.brace_length') or a smaller force constant ('force_constant' of 'mechanism.profile', or of "
+        "'design')",
+    )
+
+
+def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
+    """Return the flank for a roller along a path up to x = `end` [m].
+
+    Raises
+    ------
+    CannotBuild
+        If nothing of it is left, or a part that the roller needs is missing beyond the start.
+    """
+    try:
+        profile = cut(path, roller_radius, end)
+        _check_bend(profile)
+        return profile
+    except WholeCamUndercut:
+        smallest = float(path.law.curvature_radius(path.law.rest_half_width))
+        raise CannotBuild(
+            finding(
+                "undercut_total",
+                f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
+                f"curvature ({mm(smallest)} at the start), and it would pivot on the cam's corner over the "
+                f"whole stroke; "
+                "use a smaller roller ('mechanism.roller_radius'), a larger force constant or a longer stroke "
+                "('force_constant' and 'stroke' of 'mechanism.profile')",
+            )
+        ) from None
+
+
+def _check_bend(profile: CamProfile) -> None:
+    """Raise where a path for hanging weights, which may be bent most behind its start, is bent too tightly there."""
+    law = profile.path.law
+    if isinstance(law, CurveSlopeLaw):
+        check_bends(law, profile)
+        return
+    if law.slope_factor >= 1.0:
+        return
+    x = np.linspace(profile.start, profile.end, 1001)
+    radius = law.curvature_radius(x)
+    tightest = int(np.argmin(radius))
+    if tightest and radius[tightest] < profile.roller_radius:
+        raise CannotBuild(
+            finding(
+                "undercut_total",
+                f"the path that lets the weights help is bent to a radius of {mm(float(radius[tightest]))} at "
+                f"x = {mm(float(x[tightest]))}, inside a roller of {mm(profile.roller_radius)}; use a smaller roller "
+                "('mechanism.roller_radius') or leave the weight uncompensated ('design.gravity: false')",
+            )
+        )
+
+
+def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
+    try:
+        return Track(profile, mechanism.roller_radius, mechanism.brace_length, max(mechanism.profile.offset, 0.0))
+    except NoTrack as problem:
+        brace = mechanism.brace_length
+        if problem.reason == "brace":
+            raise CannotBuild(
+                finding(
+                    "brace_too_short",
+                    f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
+                    f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)} "
+                    "('mechanism.brace_length')",
+                )
+            ) from None
+        if problem.reason == "crossed":
+            raise CannotBuild(
+                finding(
+                    "flanks_collide",
+                    f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam "
+                    "with a larger rest half width ('mechanism.profile.rest_half_width'), or rollers nearer to "
+                    "those it "
+                    "is cut for ('mechanism.roller_radius')",
+                )
+            ) from None
+        raise CannotBuild(
+            finding(
+                "dead_point",
+                f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on "
+                "this cam; use a longer brace ('mechanism.brace_length'), or a cam cut for this one "
+                "('mechanism.profile.brace_length')",
+            )
+        ) from None
+
+
+def cam_start_height(profile: CamProfile) -> float:
+    """Return the height of the flank's first point, before trimming, above the path's start [m]."""
+    return float(profile.flank(profile.path.law.rest_half_width)[1])
+
+
+def room_between(x: tuple[FloatArray, FloatArray], y: tuple[FloatArray, FloatArray], radii: float) -> FloatArray:
+    """Return the gap between the right and the left roller, negative where they overlap [m].
+
+    Parameters
+    ----------
+    x, y : pair of (n,) array
+        Axis of the right roller, and of the left one as seen in a mirror [m].
+    radii : float
+        Sum of both radii [m].
+    """
+    return np.asarray(np.hypot(x[0] + x[1], y[0] - y[1]) - radii)
+
+
+def rollers_overlap(gap: float, place: str = "at the start") -> Finding:
+    """Return what to say about rollers that overlap, `gap` [m] being negative."""
+    return finding(
+        "rollers_collide",
+        f"the rollers overlap by {mm(-gap)} {place}; use smaller rollers ('mechanism.roller_radius') or a longer "
+        "spring rest length ('mechanism.rest_half_width', of a cam that is cut 'mechanism.profile.rest_half_width')",
+    )
+
+
+def flanks_cross(x: float) -> Finding:
+    """Return what to say about a flank whose contact is across the axis, at `x` [m]."""
+    return finding(
+        "flanks_collide",
+        f"the flanks cross the axis (x = {mm(x)}): no plate is left between them; use a smaller roller "
+        "('mechanism.roller_radius') or springs with a longer rest length ('mechanism.rest_half_width')",
+    )
+
+
+def flanks_crossing(profile: CamProfile, offset: float = 0.0) -> Finding | None:
+    """Return what to say where the flanks meet or cross, so that there is no plate between them.
+
+    Parameters
+    ----------
+    profile : CamProfile
+        The cam as cut.
+    offset : float
+        Material left on it beyond the profile [m].
+    """
+    x = float(profile.shifted(profile.start, offset - profile.roller_radius)[0])
+    return None if x > 0 else flanks_cross(x)
+
+
+def check_first_pose(assembly: Assembly) -> None:
+    """Raise if flanks or rollers are in each other's way where the slider is lowest.
+
+    The rollers of a symmetric mechanism move apart as the slider rises: what has room at the start has it later.
+
+    Raises
+    ------
+    CannotBuild
+        The finding says what is in the way.
+    """
+    track, mechanism = assembly.track, assembly.spec.mechanism
+    if crossing := flanks_crossing(track.profile, max(mechanism.profile.offset, 0.0)):
+        raise CannotBuild(crossing)
+    x = float(track.states(np.array([track.start])).x[0])
+    if (gap := 2.0 * (x - mechanism.roller_radius)) < -1e-12 * mechanism.brace_length:
+        raise CannotBuild(rollers_overlap(gap))
+
+
+def until_overlap(
+    travel: FloatArray, slider: FloatArray, x: tuple[FloatArray, FloatArray], mechanism: Mechanism
+) -> tuple[int, Finding | None]:
+    """Return the number of points before the rollers overlap, and what to say if they do.
+
+    Parameters
+    ----------
+    travel, slider : (n,) array
+        Travel, and position of the slider [m].
+    x : pair of (n,) array
+        Axes of both rollers, outwards [m].
+    mechanism : Mechanism
+        Whose rollers and braces they are.
+
+    Raises
+    ------
+    CannotBuild
+        If they overlap at the first point.
+    """
+    brace = mechanism.brace_length
+    right, left = (slider - np.sqrt((brace - across) * (brace + across)) for across in x)
+    gap = room_between(x, (right, left), 2.0 * mechanism.roller_radius)
+    overlap = np.flatnonzero(gap < -1e-12 * brace)
+    if not overlap.size:
+        return len(travel), None
+    first = int(overlap[0])
+    if first < 2:
+        raise CannotBuild(rollers_overlap(float(gap[first])))
+    return first, rollers_overlap(float(gap.min()), f"from {mm(float(travel[first]))} of travel on")
+
+
+def check_springs(elongation: FloatArray, held: FloatArray, rest_half_width: float) -> None:
+    """Raise if nothing holds the rollers on the cam anywhere: springs that are slack over the whole travel.
+
+    Parameters
+    ----------
+    elongation, held : (n,) array
+        Of the springs [m], and the contact force [N].
+    rest_half_width : float
+        Half width at which the springs are at rest [m].
+
+    Raises
+    ------
+    CannotBuild
+        If no contact is pressed and no spring is stretched.
+    """
+    if elongation.max() < 0 and not (held > 0).any():
+        short = mm(-float(elongation.max()))
+        raise CannotBuild(
+            finding(
+                "spring_slack",
+                f"the springs are slack over the whole travel, by at least {short}: nothing holds the rollers on the "
+                f"cam; use shorter springs ('mechanism.rest_half_width', here {mm(rest_half_width)})",
+            )
+        )

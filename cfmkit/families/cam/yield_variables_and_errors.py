@@ -1,0 +1,40 @@
+"""What a yield of cams depends on: values of the design that may change for it, and values that a process errs in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.designing.bounds_and_rounding import around
+
+if TYPE_CHECKING:
+    from cfmkit.families.cam.spec import CamSpec
+
+
+def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
+    """Return the force constant of the cut, and the rate of the springs where the design may choose it.
+
+    Parameters
+    ----------
+    given : CamSpec
+        With the `design` block.
+    designed : CamSpec
+        What came out.
+    """
+    wanted, mechanism = given.design, designed.mechanism
+    if wanted is None:
+        return {}
+    found = {}
+    found["mechanism.profile.force_constant"] = around(mechanism.profile.force_constant)
+    rate = mechanism.springs.stiffness
+    if wanted.choose == "stiffness" and isinstance(rate, float):
+        found["mechanism.springs.stiffness"] = around(rate)
+    return found
+
+
+PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.roller_radius"
+"""Holes of the braces and the slider, and the contour: one that lies farther out by e meets a roller larger by e."""
+
+
+def errors(_spec: CamSpec) -> dict[str, str]:
+    """Return which values a process errs in: where holes and the contour lie; springs are bought."""
+    return dict.fromkeys(PLACES, "position")

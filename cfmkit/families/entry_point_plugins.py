@@ -1,0 +1,174 @@
+"""Families of other packages, by the entry points of what is installed: listed without importing anything.
+
+A package adds a family by an entry point of the group ``cfmkit.families``, its name that of the family and its value
+``module:record``. Reading the entry points is left to `os.scandir` and a few small files: importing
+`importlib.metadata` alone takes longer than the list may. As there, the first of two folders of one package on the
+path counts. What lies in zip files is not found.
+
+A family that is needed is imported, which runs code of that package.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import UsageError, visible
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from cfmkit.families.base import Family
+
+SECTION = "[cfmkit.families]"
+"""What stands above the entry points of the group."""
+
+_INFO = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
+"""Folders in which an installer says what it has installed."""
+
+
+class Unusable(UsageError):
+    """A family of another package that cannot be used."""
+
+
+@dataclass(frozen=True)
+class InstalledFamily:
+    """A family that an installed package offers.
+
+    Attributes
+    ----------
+    name : str
+        Of the family.
+    target : str
+        ``module:record``.
+    package, version : str
+        What was installed.
+    """
+
+    name: str
+    target: str
+    package: str
+    version: str
+
+    @property
+    def source(self) -> str:
+        """The package and its version."""
+        return f"{self.package} {self.version}".rstrip()
+
+
+def offers() -> tuple[InstalledFamily, ...]:
+    """Return what the packages on the path offer, in the order of the names."""
+    return _offers_on(tuple(sys.path))
+
+
+@lru_cache(maxsize=8)
+def _offers_on(path: Sequence[str]) -> tuple[InstalledFamily, ...]:
+    found: list[InstalledFamily] = []
+    seen: set[str] = set()
+    for folder in path:
+        for info, package, version in _installed_in(folder or "."):
+            if package not in seen:
+                seen.add(package)
+                found += (InstalledFamily(name, target, package, version) for name, target in _entries(info))
+    return tuple(sorted(found, key=lambda one: (one.name, one.package)))
+
+
+def _installed_in(folder: str) -> Iterator[tuple[str, str, str]]:
+    """Yield (folder with its entry points, name, version) of each package that is installed in a folder."""
+    try:
+        names = sorted(os.listdir(folder))
+    except OSError:  # not a folder: a zip file, or the hook of an editable install
+        return
+    for name in names:
+        if name.endswith("-info") and (known := _INFO.fullmatch(name)):
+            package = re.sub(r"[-_.]+", "-", known["package"]).lower()
+            yield os.path.join(folder, name), package, known["version"] or ""
+
+
+def _entries(info: str) -> Iterator[tuple[str, str]]:
+    """Yield (name, target) of the entry points of the group."""
+    try:
+        with open(os.path.join(info, "entry_points.txt"), encoding="utf-8", errors="replace") as file:
+            text = file.read()
+    except OSError:
+        return
+    inside = False
+    for line in map(str.strip, text.splitlines() if SECTION in text else ()):
+        if line.startswith("["):
+            inside = line == SECTION
+        elif inside and "=" in line and not line.startswith(("#", ";")):
+            name, _, target = line.partition("=")
+            yield name.strip(), target.partition("[")[0].strip()
+
+
+def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
+    """Return the names that are offered once and not taken; nothing is imported."""
+    own = [one.name for one in offers()]
+    return tuple(name for name in own if own.count(name) == 1 and name not in set(taken))
+
+
+def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
+    """Return the family that a package offers; its code is imported.
+
+    Raises
+    ------
+    Unusable
+        With the reason in one line, if it cannot be used.
+    """
+    found = _clash(offer, taken) or _imported(offer)
+    if isinstance(found, str):
+        raise Unusable(f"the family {visible(offer.name)!r} of the package {offer.source} cannot be used: {found}")
+    return found
+
+
+def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
+    """Return why a name is not free; empty if it is."""
+    if offer.name in taken:
+        return "cfmkit itself has a family of this name"
+    others = [one.package for one in offers() if one.name == offer.name and one != offer]
+    return f"{' and '.join(others)} offers one of this name, too; uninstall one of them" if others else ""
+
+
+@lru_cache(maxsize=64)
+def _imported(offer: InstalledFamily) -> Family | str:
+    """Return the record, or why there is none."""
+    from cfmkit.families.base import INTERFACE, Family, function_named
+
+    try:
+        with redirect_stdout(sys.stderr):  # standard output is for results
+            record = function_named(offer.target)
+    except (Exception, SystemExit) as error:  # whatever the package does when it is imported
+        told = " ".join(str(error).split())
+        return f"it cannot be imported: {type(error).__name__}{': ' if told else ''}{visible(told)}"
+    if not isinstance(record, Family):
+        return f"{offer.target} is a {type(record).__name__}, not a Family"
+    if record.name != offer.name:
+        return f"its record is called {record.name!r}"
+    if record.interface != INTERFACE:
+        made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
+        return f"its record {made}, this cfmkit has interface {INTERFACE}; another version of one of them is needed"
+    return record
+
+
+def code_of(offer: InstalledFamily) -> dict[str, str]:
+    """Return what computes a family of another package: the package, its version and the SHA-256 of its files."""
+    from pathlib import Path
+
+    from cfmkit.store.content_hashes_and_versions import file_hash, tree_hash
+
+    try:
+        found = find_spec(offer.target.partition(":")[0].partition(".")[0])
+    except (ImportError, ValueError):  # no name of a module: then nothing is computed by it either
+        found = None
+    content = ""
+    if found is not None and found.submodule_search_locations:
+        content = "".join(tree_hash(Path(folder)) for folder in found.submodule_search_locations)
+    elif found is not None and found.origin:
+        content = file_hash(Path(found.origin).resolve()) or ""
+    return {"package": offer.package, "version": offer.version, "content": content}

@@ -1,0 +1,164 @@
+"""From a specification to the chain that is pressed: lumped flexures or a strip, on the linkage's joints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
+    STRIP,
+    Elasticity,
+    Flexure,
+    Strip,
+    flexure_ends,
+    joints,
+    kink,
+    lumped,
+    spread,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network, Path
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.printed.spec import Printed, StripSpec
+
+
+FLEXURE_SHARE = 0.2
+"""Length of a flexure where none is given, in crank lengths: that of [B, Table 2]."""
+
+
+def elasticity(printed: Printed) -> Elasticity:
+    """Return what the part is made of.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If no material is given.
+    """
+    given = printed.material
+    if given is None:
+        raise InputError("a part of flexures or a strip needs 'mechanism.material'")
+    return Elasticity(given.modulus, given.poisson, given.allowable(printed.safety_factor), printed.wide_beams)
+
+
+def flexures_of(printed: Printed) -> tuple[Flexure, ...]:
+    """Return the flexures from the ground to the slider."""
+    if printed.flexures is None:
+        return ()
+    return tuple(Flexure(one.length, one.thickness, one.width, one.before) for one in printed.flexures.all)
+
+
+def corners(printed: Printed, beam: StripSpec | None, linkage: Linkage, unloaded: float) -> FloatArray:
+    """Return the centre line of a strip: through the ends of the flexures unless it is given [m]."""
+    if beam is not None and beam.centreline is not None:
+        return np.array(beam.centreline)
+    own = flexures_of(printed)
+    if beam is not None and beam.flexure_length is not None:
+        own = ()
+        length = beam.flexure_length
+    else:
+        length = FLEXURE_SHARE * linkage.crank
+    lengths = [one.length for one in own] or [length] * 3
+    before = [one.before for one in own] or [0.5] * 3
+    return flexure_ends(joints(linkage, unloaded), lengths, before)
+
+
+def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
+    """Return the strip as it is printed.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If 'shares' does not fit the pieces of the centre line.
+    """
+    beam = printed.beam
+    if beam is None:
+        raise InputError("there is no 'mechanism.beam'")
+    line = corners(printed, beam, linkage, unloaded)
+    if beam.shares is None:
+        places = np.linspace(0.0, 1.0, len(beam.values))
+    elif len(beam.shares) != len(line) - 1:
+        raise InputError(
+            f"mechanism.beam.shares lists {len(beam.shares)} pieces, the centre line has {len(line) - 1}; "
+            "give [] for a piece without stations"
+        )
+    else:
+        places = spread(line, beam.shares)
+    return Strip(line, beam.width, np.array(beam.values) + beam.offset, places)
+
+
+def lumped_chain(printed: Printed, linkage: Linkage, unloaded: float) -> Chain:
+    """Return flexures and rigid links as a chain to press."""
+    return chain_of_flexures(flexures_of(printed), elasticity(printed), linkage, unloaded)
+
+
+def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
+    """Return given flexures, with rigid links between them, as a chain to press."""
+    pins = joints(linkage, unloaded)
+    ends = flexure_ends(pins, [one.length for one in parts], [one.before for one in parts])
+
+    def knee(path: Path, index: int) -> FloatArray:
+        dx, dy, turn = path.motion("crank")[index]
+        x, y = pins[1] - ends[1]  # the crank is rigid and takes its pin along
+        cosine, sine = np.cos(turn), np.sin(turn)
+        place: FloatArray = ends[1] + np.array([dx + cosine * x - sine * y, dy + sine * x + cosine * y])
+        return place
+
+    return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), knee)
+
+
+def pins_of(printed: Printed, linkage: Linkage, unloaded: float) -> FloatArray:
+    """Return the three points of a chain that say where it is kinked, (3, 2) [m].
+
+    Pivot, crank pin and slider pin; of a strip with a centre line of its own the ends, and between them the corner
+    farthest off the line through them, or the middle of a straight one.
+    """
+    line = None if printed.beam is None else printed.beam.centreline
+    if line is None:
+        return joints(linkage, unloaded)
+    points = np.array(line)
+    off = [abs(kink(np.array([points[0], point, points[-1]]))) for point in points[1:-1]]
+    middle = points[1 + int(np.argmax(off))] if off else 0.5 * (points[0] + points[-1])
+    return np.array([points[0], middle, points[-1]])
+
+
+def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: float) -> Chain:
+    """Return a strip as a chain to press, kinked as three points of it say, in a direction of travel [rad]."""
+
+    def build(points: FloatArray) -> Network:
+        return Strip(points, strip.width, strip.thickness, strip.places).network(made_of)
+
+    looked_up: list[tuple[Path, int, FloatArray]] = []  # of the path asked last: it is asked once for every point
+
+    def knee(path: Path, index: int) -> FloatArray:
+        if not looked_up or looked_up[0][0] is not path:
+            before = _unloaded_samples(path)
+            nearest = int(np.hypot(*(before - pins[1]).T).argmin())
+            looked_up[:] = [(path, nearest, pins[1] - before[nearest])]
+        _, row, offset = looked_up[0]
+        place: FloatArray = offset + path.shape(STRIP, index)[row]
+        return place
+
+    return Chain(strip.corners, pins, build, direction, knee)
+
+
+def travel_direction(linkage: Linkage) -> float:
+    """Return the direction in which the slider moves towards the pivot [rad]."""
+    return float(np.pi) if linkage.branch > 0 else 0.0
+
+
+def _unloaded_samples(path: Path) -> FloatArray:
+    """Return where the samples of a strip lie before any load, (k, 2) [m].
+
+    The strip passes a kink on a chord, and a little off the crank pin: motions are those of its own points.
+    """
+    line = np.asarray(path.layout.network.beams[STRIP].shape.points)  # type: ignore[union-attr]
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    place = path.places(STRIP) * marks[-1]
+    return np.column_stack([np.interp(place, marks, line[:, 0]), np.interp(place, marks, line[:, 1])])

@@ -1,0 +1,422 @@
+"""Pressing the slider of a chain: the path that starts at rest, and the branch on the other side.
+
+A nearly straight chain yields like a column: within the first micrometres the force rises to a buckling load and
+stays there. Ordinary steps from rest jump over that corner, onto a higher mode with ten times the force, so the first
+step is a hundred-thousandth of the travel and every point must be stable. Two cases cannot be reached from rest: the
+chain that is straight, or so nearly that rounding decides, and the branch to which a kinked chain does not go by
+itself. Their equilibria are solved from those of a chain that is bowed, or kinked, to the requested side.
+
+Beams are lines to the equations, which know nothing of contact: a slider that runs on the line of its anchor passes it.
+So it is looked at afterwards where the chain crosses itself, or is pressed through its own anchor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
+from cfmkit.elastica.equilibrium.network_solver import Points
+from cfmkit.elastica.kernels.status_codes import REQUESTED
+from cfmkit.elastica.outcome.between_points import between_points
+from cfmkit.elastica.sensitivity.neighbour import neighbouring
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, kink, mirrored
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network
+    from cfmkit.elastica.equilibrium.network_solver import Spot
+
+
+FIRST_STEP = 1e-5
+"""Of the travel."""
+
+STRAIGHT, CLEAR = 1e-9, 2e-4
+"""Offset of the crank pin, in lengths of the chain: below the first there is no kink, above the second it decides."""
+
+BOW = 2e-3
+"""Offset that a chain is given to send it to one side, in lengths of the chain."""
+
+FEWEST = 2
+"""A curve has at least so many points."""
+
+NEAR_LIMIT = 1e-12
+"""Last step back towards the limit point of a branch, as a share of the travel at which the branch is known: the force
+there goes with the root of the distance, and is right to 1e-6."""
+
+BESIDE = 1e-4
+"""Where the slope of the branch is taken, as a share of the travel at its first known point."""
+
+ASTRAY = 0.3
+"""How far unknowns may be from their prediction in such a step, as a share of their change; else another branch."""
+
+BENT = 0.1
+"""Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
+
+
+class PressingEnd(Enum):
+    """How pressing a chain ended."""
+
+    COMPLETE = "every requested point is a stable equilibrium on the requested branch"
+    LIMIT_POINT = "there is no equilibrium for a further displacement of the slider: a limit point of the travel"
+    UNSTABLE = "stability is lost: the chain would jump"
+    NOT_CONVERGED = "no step converged, or the tolerance was not reached"
+    WRONG_BRANCH = "the chain bends to the side opposite to the requested one"
+    CROSSES = "the chain crosses to the side opposite to the requested one"
+    BLOCKED = "the chain meets its own anchor, or itself"
+    STARTS_LATE = "this branch exists only beyond some travel"
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The equilibria of a pressed chain.
+
+    Attributes
+    ----------
+    path : Path
+        Converged points only.
+    ending : PressingEnd
+        Why it ended, or that it is complete.
+    message : str
+        One sentence with the place.
+    side : int
+        1: the crank pin is to the left of the line from pivot to slider pin; -1: to its right.
+    """
+
+    path: Path
+    ending: PressingEnd
+    message: str
+    side: int = 0
+
+    @property
+    def travel(self) -> FloatArray:
+        """Slider travel at the requested points that were reached [m]."""
+        travel: FloatArray = self.path.drive[self.path.at_requested]
+        return travel
+
+    @property
+    def force(self) -> FloatArray:
+        """Force against the travel there [N]."""
+        force: FloatArray = self.path.effort[self.path.at_requested]
+        return force
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A chain ready to be pressed.
+
+    Attributes
+    ----------
+    points : (k, 2) array
+        What the network is built on, from the clamped end to the slider [m].
+    pins : (3, 2) array
+        Pivot, crank pin and slider pin [m].
+    build : callable
+        From such points to the network.
+    direction : float
+        Of the travel [rad]: pi where the slider moves towards smaller x.
+    knee : callable
+        From a path and a point of it to where the crank pin is [m].
+    """
+
+    points: FloatArray
+    pins: FloatArray
+    build: Callable[[FloatArray], Network]
+    direction: float
+    knee: Callable[[Path, int], FloatArray]
+
+    @property
+    def side(self) -> int:
+        """To which side the chain is kinked, +1 or -1; 0 where it is straight."""
+        off = kink(self.pins)
+        return int(np.sign(off)) if abs(off) > STRAIGHT * self.length else 0
+
+    @property
+    def length(self) -> float:
+        """Distance of pivot and slider pin [m]."""
+        return float(np.hypot(*(self.pins[2] - self.pins[0])))
+
+    @property
+    def reach(self) -> float:
+        """How far the slider pin could be from the pivot, the chain pulled straight [m]."""
+        return max(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in (self.pins, self.points))
+
+    def _reach(self, travel: FloatArray) -> FloatArray:
+        """Return the distance of slider pin and pivot after some travel [m]."""
+        way = np.array([np.cos(self.direction), np.sin(self.direction)])
+        distance: FloatArray = np.hypot(*(self.pins[2] - self.pins[0] + np.outer(travel, way)).T)
+        return distance
+
+    def press(self, travel: FloatArray, side: int = 0, tolerance: float = 1e-7) -> Pressed:
+        """Return the equilibria at travels on one side, that of the kink unless asked otherwise.
+
+        Parameters
+        ----------
+        travel : (n,) array
+            From the unloaded position, increasing [m]; may start with 0.
+        side : int
+            1, -1, or 0 for the side of the kink (left where there is none).
+        tolerance : float
+            As in `cfmkit.elastica.Control`.
+        """
+        taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
+        if len(taut):
+            near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
+            text = f"the chain is taut before {travel[taut[0]] * 1e3:.4g} mm; beyond, it could only be torn"
+            return (
+                replace(near, ending=PressingEnd.LIMIT_POINT, message=text)
+                if near.ending is PressingEnd.COMPLETE
+                else near
+            )
+        drive = Displacement(SLIDER, self.direction, travel)
+        wanted = side or self.side or 1
+        clear = abs(kink(self.pins)) > CLEAR * self.length
+        if wanted == self.side and clear:
+            path = _trace(self.build(self.points), drive, tolerance)
+            if path.status is PathStatus.COMPLETE:
+                return self._judged(path, wanted)
+        other = clear and wanted != self.side
+        helper = mirrored(self.points, self.pins) if other else self._bowed(wanted)
+        return self._from(helper, drive, wanted, tolerance, other)
+
+    def _bowed(self, side: int) -> FloatArray:
+        """Return the points with the crank pin moved a little to one side: a chain that cannot go the wrong way."""
+        axis = (self.pins[2] - self.pins[0]) / self.length
+        along = (self.points - self.pins[0]) @ axis
+        knee = float((self.pins[1] - self.pins[0]) @ axis)
+        hat = np.interp(along, [0.0, knee, self.length], [0.0, 1.0, 0.0])
+        moved: FloatArray = self.points + np.outer(side * BOW * self.length * hat, np.array([-axis[1], axis[0]]))
+        return moved
+
+    def _from(self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, other: bool) -> Pressed:
+        """Return the equilibria nearest to those of a chain that is kinked to the side wanted.
+
+        The branch to which the kink does not lead begins with a limit point: nothing before it, nor rest, is on it.
+        """
+        known = _trace(self.build(helper), drive, tolerance)
+        if known.status is not PathStatus.COMPLETE:
+            return self._judged(known, wanted, helped=True)
+        path = neighbouring(known, self.build(self.points), drive)
+        first = _beginning(path, drive) if other else 0
+        if other and 0 < first < len(drive.points):
+            path = _from_its_limit(_since(path, first), drive.points[:first])
+            text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
+            return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
+        return self._judged(path, wanted)
+
+    def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
+        """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
+        ending, message = _ENDINGS.get(path.status, PressingEnd.NOT_CONVERGED), path.message
+        if helped or not len(path.at_requested):
+            ending = PressingEnd.NOT_CONVERGED if ending is PressingEnd.COMPLETE else ending
+            return Pressed(path, ending, message)
+        sides = self._sides(path, wanted)
+        side = int(sides[-1])
+        stable = path.stable[path.at_requested]
+        if ending is PressingEnd.COMPLETE and not stable.all():
+            first = path.drive[path.at_requested][~stable][0]
+            ending, message = PressingEnd.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
+        chain_like = abs(kink(self.pins)) <= BENT * self.length
+        if ending is PressingEnd.COMPLETE and side != wanted and (chain_like or wanted != self.side):
+            return self._crossed(path, sides, wanted)
+        return Pressed(path, ending, message, side)
+
+    def _sides(self, path: Path, wanted: int) -> FloatArray:
+        """Return to which side the chain is bent at the requested points: the side wanted, or the other one.
+
+        It is bent to the other side where the crank pin has moved there, and is beyond the line from pivot to slider
+        pin, too: far on its way a chain turns with that line, and the pin comes back past where the line had been.
+        """
+        way = np.array([np.cos(self.direction), np.sin(self.direction)])
+        last = path.at_requested.tolist()
+        pins = np.array([self.knee(path, at) for at in last])
+        moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - kink(self.pins)
+        ends = self.pins[2] + np.outer(path.drive[path.at_requested], way)
+        off = np.array([kink(np.array([self.pins[0], *pose])) for pose in zip(pins, ends, strict=True)])
+        sides: FloatArray = np.where((np.sign(moved) == wanted) | (np.sign(off) == wanted), wanted, np.sign(moved))
+        begins = np.flatnonzero(path.drive[path.at_requested] > 0.0)
+        if len(begins) and sides[-1] != wanted and np.sign(moved[begins[0]]) != wanted:
+            sides[:] = -wanted  # it went there at once, whatever its kink says
+        return sides
+
+    def _crossed(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
+        """Return what there is before the chain bends to the other side: nothing where it does so at once."""
+        first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
+        if first < FEWEST:
+            return Pressed(path, PressingEnd.WRONG_BRANCH, PressingEnd.WRONG_BRANCH.value, -wanted)
+        places = path.drive[path.at_requested][first - 1 : first + 1] * 1e3
+        text = f"between {places[0]:.4g} and {places[1]:.4g} mm {PressingEnd.CROSSES.value}"
+        kept = part_of(path, np.isin(path.requested, path.requested[path.at_requested][:first]))
+        return Pressed(kept, PressingEnd.CROSSES, text, wanted)
+
+
+_ENDINGS = {
+    PathStatus.COMPLETE: PressingEnd.COMPLETE,
+    PathStatus.LIMIT_POINT: PressingEnd.LIMIT_POINT,
+    PathStatus.JUMPS: PressingEnd.UNSTABLE,
+}
+
+
+def _beginning(path: Path, drive: Displacement) -> int:
+    """Return the number of the first point from which on nothing is missing, rest not counted."""
+    found = np.zeros(len(drive.points), dtype=bool)
+    found[path.requested] = True
+    found &= drive.points != 0.0
+    return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
+
+
+def _since(path: Path, first: int) -> Path:
+    """Return a path from the point with a number on."""
+    return part_of(path, path.requested >= first)
+
+
+def _from_its_limit(path: Path, missing: FloatArray) -> Path:
+    """Return a path that is followed back to the limit point that it begins with, which becomes its first point.
+
+    Parameters
+    ----------
+    path : Path
+        Without the first of the points that were requested.
+    missing : (m,) array
+        The travels that were requested before it begins [m]; those behind the limit point are found on the way.
+    """
+    found = _followed_back(path)
+    if not found:
+        return path
+    back = Points.none(path.solver.size).joined(*(Points.of(spot, -1) for spot in reversed(found)))
+    longer = _with_points_before(path, back)
+    between, places = between_points(longer), missing[missing > longer.drive[0]]
+    if between is None:
+        return path
+    more = between.at(places)
+    number = len(missing) - len(places)
+    info = np.concatenate([back.info, more.points.info])
+    info[0, REQUESTED], info[len(back) :, REQUESTED] = number - 1, np.arange(number, len(missing))
+    drives, y = np.concatenate([back.drive, more.points.drive]), np.concatenate([back.y, more.points.y])
+    kept = np.concatenate([np.ones(len(back), dtype=bool), more.accurate])
+    order = [k for k in np.argsort(drives, kind="stable").tolist() if kept[k]]
+    return _with_points_before(path, Points(y[order], drives[order], info[order]))
+
+
+def _followed_back(path: Path) -> list[Spot]:
+    """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
+    solver, y, drive = path.solver, path.points.y[0], float(path.points.drive[0])
+    beside = solver.solve(y, drive * (1.0 + BESIDE))  # tells the slope
+    if beside is None:
+        return []
+    before, last, step = beside.y, beside.drive, BESIDE * drive
+    unstable, found = int(path.points.unstable[0]), []
+    while step > NEAR_LIMIT * path.points.drive[0]:
+        guess = y + (y - before) * (step / (last - drive))
+        spot = solver.solve(guess, drive - step)
+        off = np.inf if spot is None else np.abs(spot.y - guess).max()
+        if spot is None or spot.unstable > unstable or off > ASTRAY * np.abs(guess - y).max():
+            step *= 0.5
+            continue
+        y, before, drive, last = spot.y, y, spot.drive, drive
+        found.append(spot)
+        step = min(2.0 * step, 0.5 * drive)
+    return found
+
+
+def _with_points_before(path: Path, points: Points) -> Path:
+    """Return a path with more points before its first."""
+    return replace(
+        path,
+        points=points.joined(path.points),
+        branch=np.concatenate([np.repeat(path.branch[:1], len(points)), path.branch]),
+        accurate=read_only(np.concatenate([np.ones(len(points), dtype=bool), path.accurate]), np.bool_),
+    )
+
+
+def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
+    """Return some of the points of a path."""
+    return replace(
+        path,
+        points=path.points.take(keep),
+        branch=path.branch[keep],
+        accurate=path.accurate[keep],
+        status=PathStatus.COMPLETE,
+    )
+
+
+def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
+    """Follow the path from rest; where steps of the travel do not get through, by its arc length."""
+    path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=tolerance))
+    if path.status is PathStatus.COMPLETE:
+        return path
+    arc = trace(network, drive, Control(tolerance=tolerance, through_folds=True))
+    good = arc.status is PathStatus.COMPLETE and bool(arc.stable[arc.at_requested].all())
+    return arc if good and len(arc.at_requested) == len(drive.points) else path
+
+
+COARSE = 60
+"""Straight pieces of the line that are looked at for crossings."""
+
+
+def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
+    """Return the outcome up to where the chain meets its anchor, or itself.
+
+    Parameters
+    ----------
+    pressed : Pressed
+        Any outcome.
+    thickness : float
+        At the ends of the chain [m]: nearer than this the slider's end touches the anchor.
+    """
+    places = pressed.path.at_requested.tolist()
+    if not places:
+        return pressed
+    lines = [_line(pressed.path, at) for at in places]
+    for number, line in enumerate(lines):
+        what = _met(line, lines[0][-1], thickness)
+        if what:
+            at = pressed.path.drive[places[number]] * 1e3
+            text = f"at {at:.4g} mm the chain {what}: no such part exists from there on; end 'analysis.travel' before"
+            kept = part_of(pressed.path, np.isin(np.arange(len(pressed.path.drive)), places[:number]))
+            return replace(pressed, path=kept, ending=PressingEnd.BLOCKED, message=text)
+    return pressed
+
+
+def _line(path: Path, index: int) -> FloatArray:
+    """Return the line of a chain from its anchor to its slider, (n, 2) [m]."""
+    shapes = [path.shape(name, index) for name in path.layout.network.beams]
+    line: FloatArray = np.concatenate(shapes)
+    return line
+
+
+def _met(line: FloatArray, start: FloatArray, thickness: float) -> str:
+    """Return what a chain meets; nothing while it is clear."""
+    anchor, end = line[0], line[-1]
+    way = end - start
+    share = float(np.clip((anchor - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0))
+    if np.hypot(*(start + share * way - anchor)) < thickness:
+        return "is pressed through its own anchor"
+    rows = np.unique(np.linspace(0, len(line) - 1, COARSE + 1).astype(int))
+    return "crosses itself" if _crosses(line[rows]) else ""
+
+
+def _crosses(line: FloatArray) -> bool:
+    """Return whether two pieces of a line cross that are not neighbours."""
+    first, last = line[:-1], line[1:]
+    step = last - first
+    # what is straight but for rounding crosses nothing
+    slack = 1e-9 * float(np.ptp(line, axis=0).max()) * np.hypot(*step.T)[:, None]
+
+    def sides(points: FloatArray) -> FloatArray:
+        """Return on which side of each piece (rows) points lie (columns): 1, -1, or 0 for on it."""
+        away = points[None] - first[:, None]
+        left = step[:, None, 0] * away[..., 1] - step[:, None, 1] * away[..., 0]
+        return np.where(np.abs(left) > slack, np.sign(left), 0.0)
+
+    parted: NDArray[np.bool_] = sides(first) * sides(last) < 0.0
+    apart = np.abs(np.subtract.outer(np.arange(len(first)), np.arange(len(first)))) > 1
+    return bool((parted & parted.T & apart).any())

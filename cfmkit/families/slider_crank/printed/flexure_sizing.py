@@ -1,0 +1,329 @@
+"""Flexures for given springs and a stroke: thickness from stress, width from rate, then both corrected by the beams.
+
+A flexure of length L in pure bending turns by psi = M L / EI, so its rate is K = E b h^3 / (12 L) and its
+stress is sigma = E h psi / (2 L) [B, eq. 12]. Solved for the section: h from the stress, then b from the rate.
+One of finite length pushes harder, and its stress is higher where the moment is larger than on average: the beams say
+by how much, and force and stress follow from width and thickness in proportion, so that a few corrections are enough.
+
+Reference
+---------
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2; its Table 2 contains such a factor, 1.099.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.designing.reported_values import searched
+from cfmkit.errors import InputError
+from cfmkit.families.findings import mm
+from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.linkage_from_spec import side_of
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
+    FLEXURE_SHARE,
+    chain_of_flexures,
+    elasticity,
+    flexures_of,
+)
+from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Flexure
+from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
+from cfmkit.families.slider_crank.unit_springs import along_slider
+from cfmkit.results import Design, Status
+from cfmkit.specs.units import format_short
+from cfmkit.stock.spec import sheet_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+PEAK_FACTOR = 1.09
+"""Largest stress of a flexure of finite length over that of pure bending, at the stroke that the stress allows:
+the moment is not constant along it, and the normal force adds its part."""
+
+
+def thickness_from_stress(stress: float, length: float, youngs_modulus: float, rotation: float) -> float:
+    """Return the largest thickness that may be turned by `rotation` [rad]: h = 2 sigma L / (E psi) [m].
+
+    Examples
+    --------
+    >>> round(thickness_from_stress(42.5e6, 10.8e-3, 1.8e9, 0.531250) * 1e3, 3)
+    0.96
+    """
+    return 2.0 * stress * length / (youngs_modulus * rotation)
+
+
+def width_from_stiffness(rate: float, length: float, youngs_modulus: float, thickness: float) -> float:
+    """Return the width that gives a rate [N m/rad]: b = 12 K L / (E h^3) [m].
+
+    Examples
+    --------
+    >>> round(width_from_stiffness(32.206848e-3, 10.8e-3, 1.8e9, 0.960e-3) * 1e3, 3)
+    2.621
+    """
+    return 12.0 * rate * length / (youngs_modulus * thickness**3)
+
+
+def sized(rate: float, length: float, youngs_modulus: float, stress: float, rotation: float) -> Flexure:
+    """Return the flexure that turns by `rotation` [rad] within `stress` [Pa] and has the rate [N m/rad].
+
+    Its width grows with the third power of the rotation: b = 3 K E^2 psi^3 / (2 sigma^3 L^2).
+    """
+    thickness = thickness_from_stress(stress, length, youngs_modulus, rotation)
+    return Flexure(length, thickness, width_from_stiffness(rate, length, youngs_modulus, thickness))
+
+
+def rotations(linkage: Linkage, unloaded: float, travel: FloatArray) -> FloatArray:
+    """Return how far the three joints have turned where the slider has travelled, (3, n) [rad]."""
+    from cfmkit.families.slider_crank.unit_springs import along_slider
+
+    side = -1 if linkage.knee(unloaded) < 0 else 1
+    return along_slider(linkage, unloaded, side, np.asarray(travel)).turn[:3]
+
+
+_ROUNDS = 8
+
+_POINTS = 40
+
+_SLENDER = 2.0  # length over thickness below which a flexure is none
+
+
+@dataclass(frozen=True)
+class Sized:
+    """Flexures, and what the beams made of the closed forms.
+
+    Attributes
+    ----------
+    flexures : tuple of Flexure
+        From the ground to the slider.
+    force_factor : float
+        Force of the closed forms' flexures over that of the springs.
+    stress_factor : float
+        Their largest stress over that of pure bending.
+    over : float
+        Largest stress at last over the allowable one.
+    """
+
+    flexures: tuple[Flexure, ...]
+    force_factor: float
+    stress_factor: float
+    over: float
+
+
+@dataclass(frozen=True)
+class FixedWidth:
+    """Flexures of a width that stays, that of a sheet: thicknesses follow from the force, lengths from the stress.
+
+    Attributes
+    ----------
+    shortest : tuple of float
+        Lengths as stated; they grow where the stress asks for it [m].
+    stays : bool
+        Whether they do not.
+    """
+
+    shortest: tuple[float, ...]
+    stays: bool
+
+    def corrected(self, parts: Sequence[Flexure], by_force: float, by_stress: float) -> tuple[Flexure, ...]:
+        """Return flexures whose force is smaller by a factor, and whose stress is the allowable one or less.
+
+        The force goes with h^3/L and the stress with h/L.
+        """
+        least = max(length / one.length for length, one in zip(self.shortest, parts, strict=True))
+        longer = 1.0 if self.stays else max(least, np.sqrt(by_stress**3 / by_force))
+        thicker = (longer / by_force) ** (1.0 / 3.0)
+        return tuple(
+            Flexure(float(one.length * longer), float(one.thickness * thicker), one.width, one.before) for one in parts
+        )
+
+
+def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Design:
+    """Return the specification with flexures that have the springs' rates and bear the stroke.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If springs, travel or strength are missing.
+    """
+    wanted = spec.design
+    assert wanted is not None
+    assert wanted.flexures is not None
+    springs, made_of = spec.mechanism.springs, elasticity(spec.mechanism)
+    rates = np.array([springs.pivot, springs.crank_pin, springs.slider_pin])
+    if not (rates > 0).all() or wanted.travel is None or made_of.allowable_stress is None:
+        raise InputError(
+            "flexures are sized for the rates of 'pivot', 'crank_pin' and 'slider_pin' in 'mechanism.springs', "
+            "'design.travel' and the 'yield_strength' of 'mechanism.material'"
+        )
+    own = flexures_of(spec.mechanism)
+    length = wanted.flexures.length or FLEXURE_SHARE * linkage.crank
+    lengths = [length] * 3 if wanted.flexures.length or not own else [one.length for one in own]
+    stroke = float(wanted.travel[1])
+    side = side_of(spec, linkage, unloaded)
+    turn = np.abs(rotations(linkage, unloaded, np.array([stroke]))[:, 0])
+    sheet, stays = sheet_of(spec.mechanism.part), wanted.flexures.length is not None
+    first = (
+        one_width(rates, lengths, turn, made_of)
+        if sheet is None
+        else of_width(rates, lengths, turn, made_of, sheet, stays)
+    )
+    stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
+    if stubby is not None:
+        text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
+        cure = "make them longer ('design.flexures.length'), or the stroke larger ('design.travel')"
+        return no_design(finding("target_unreachable", f"{text}: no flexure; {cure}"))
+    travel = np.linspace(0.1 * stroke, stroke, _POINTS)
+    springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
+    kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
+    found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact, kept)
+    if found is None:
+        return no_design(
+            finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
+        )
+    if found.over > 1.0 + 1e-6 and sheet is not None:
+        # the stress goes with the power -2/3 of the length
+        longer = mm(1.01 * max(lengths) * found.over**1.5)
+        text = (
+            f"flexures of {mm(max(lengths))} from a sheet of {mm(sheet)} have {found.over:.4g} times the stress allowed"
+        )
+        return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
+    over = (
+        "over that of the springs, on average, of flexures by the closed forms",
+        "over that of pure bending, of those",
+    )
+    factors: dict[str, tuple[float | None, str, str]] = {
+        "closed_form_force": (found.force_factor, "factor", f"force {over[0]}"),
+        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {over[1]}"),
+    }
+    return Design(
+        _written(spec, found.flexures, stroke),
+        Status.COMPLETE,
+        _message(found, wanted.flexures.exact),
+        search=searched(factors, "lumped", (0.1 * stroke, stroke)),
+    )
+
+
+def one_width(
+    rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity
+) -> tuple[Flexure, ...]:
+    """Return flexures of one width that have the rates [N m/rad] and bear the rotations [rad], by the closed forms.
+
+    The flexure that needs the largest width gets it; the others are then thinner than the stress allows.
+    """
+    stress = (made_of.allowable_stress or np.inf) / PEAK_FACTOR
+    young = made_of.youngs_modulus
+    widest = max(
+        sized(float(rate), length, young, stress, float(psi)).width
+        for rate, length, psi in zip(rates, lengths, turn, strict=True)
+    )
+    thickness = [
+        (12.0 * rate * length / (young * widest)) ** (1.0 / 3.0) for rate, length in zip(rates, lengths, strict=True)
+    ]
+    return tuple(Flexure(length, float(h), widest) for length, h in zip(lengths, thickness, strict=True))
+
+
+def of_width(
+    rates: FloatArray, lengths: Sequence[float], turn: FloatArray, made_of: Elasticity, width: float, stays: bool
+) -> tuple[Flexure, ...]:
+    """Return flexures of a width [m] with the rates [N m/rad], by the closed forms.
+
+    Where their stress would be too large they are longer than stated, unless their lengths stay.
+    """
+    stress, young = (made_of.allowable_stress or np.inf) / PEAK_FACTOR, made_of.youngs_modulus
+    found = []
+    for rate, length, psi in zip(rates, lengths, turn, strict=True):
+        thickness = (12.0 * rate * length / (young * width)) ** (1.0 / 3.0)
+        over = thickness / thickness_from_stress(stress, length, young, float(psi))
+        # h goes with the cube root of L, so the stress with its power -2/3
+        longer = 1.0 if stays else max(1.0, over**1.5)
+        found.append(Flexure(float(length * longer), float(thickness * longer ** (1.0 / 3.0)), width))
+    return tuple(found)
+
+
+def corrected(
+    flexures: Sequence[Flexure],
+    made_of: Elasticity,
+    built_in: tuple[Linkage, float],
+    travel: FloatArray,
+    force: FloatArray,
+    exact: bool,
+    fixed: FixedWidth | None = None,
+) -> Sized | None:
+    """Return flexures whose beams have a mean force and the allowable stress; None without equilibrium.
+
+    Parameters
+    ----------
+    flexures : sequence of Flexure
+        Of the closed forms.
+    made_of : Elasticity
+        With the stress allowed.
+    built_in : (Linkage, float)
+        Linkage and crank angle unloaded.
+    travel, force : (n,) arrays
+        Where the force is compared, and that of the springs [m, N].
+    exact : bool
+        Whether to correct; else the factors are found only.
+    fixed : FixedWidth, optional
+        How, where the width stays.
+    """
+    parts, factors = tuple(flexures), (1.0, 1.0)
+    limit = made_of.allowable_stress or np.inf
+    for number in range(_ROUNDS if fixed is None else 4 * _ROUNDS):
+        pressed = chain_of_flexures(parts, made_of, *built_in).press(travel)
+        if pressed.ending is not PressingEnd.COMPLETE:
+            return None
+        by_force = float(pressed.force.mean() / force.mean())
+        by_stress = float(pressed.path.peak_stress().value.max() / limit)
+        if number == 0:
+            factors = (by_force, by_stress * PEAK_FACTOR)
+        if not exact or max(abs(by_force - 1.0), abs(by_stress - 1.0)) < 1e-9:
+            break
+        if fixed is not None:
+            before, parts = parts, fixed.corrected(parts, by_force, by_stress)
+            if all(abs(one.length / old.length - 1.0) < 1e-9 for one, old in zip(parts, before, strict=True)) and (
+                abs(by_force - 1.0) < 1e-9
+            ):
+                break
+            continue
+        parts = tuple(
+            Flexure(one.length, one.thickness / by_stress, one.width / by_force * by_stress**3, one.before)
+            for one in parts
+        )
+    return Sized(parts, *factors, by_stress)
+
+
+def _written(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> SliderCrankSpec:
+    blocks = [
+        FlexureSpec(
+            length=round(one.length, 9),
+            thickness=float(np.floor(one.thickness * 1e8) / 1e8),
+            width=round(one.width, 8),
+            before=one.before,
+        )
+        for one in parts
+    ]
+    flexures = Flexures(pivot=blocks[0], crank_pin=blocks[1], slider_pin=blocks[2])
+    mechanism = spec.mechanism.model_copy(update={"flexures": flexures})
+    changes = {"travel": (0.0, stroke), "fidelity": None if mechanism.beam is None else "lumped", "drive": "force"}
+    analysis = spec.analysis.model_copy(update=changes)
+    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _message(found: Sized, exact: bool) -> str:
+    parts = ", ".join(mm(one.thickness) for one in found.flexures)
+    done = "corrected for it" if exact else "not corrected for it"
+    harder = format_short(found.force_factor - 1.0, "ratio")
+    return (
+        f"thickness of pivot, crank pin and slider pin: {parts}, width {mm(found.flexures[0].width)}; flexures push "
+        f"{harder} harder than springs and have {found.stress_factor:.3g} times the stress of pure bending, {done}"
+    )

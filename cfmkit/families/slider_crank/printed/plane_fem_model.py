@@ -1,0 +1,287 @@
+"""A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
+
+The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
+they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it.
+
+Assumes: plane stress. No contact, no plasticity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import GeometryError, InputError
+from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.findings import bracket
+from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
+from cfmkit.families.slider_crank.printed.fillet_stress_from_fem import fillets
+from cfmkit.families.slider_crank.printed.findings import friction_left_out
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
+from cfmkit.families.slider_crank.printed.model import as_run, chain_of
+from cfmkit.families.slider_crank.printed.outline import solved_piece
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
+from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
+from cfmkit.results import Quantity, Result, Status
+from cfmkit.specs.units import between, format_short
+from cfmkit.stock.spec import PaddedPart
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.input_deck import DrivenNetwork
+    from cfmkit.families.base import Run
+    from cfmkit.families.fillet_stress_results import FilletRow
+    from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Finding
+    from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
+
+GATHERED = 3.0
+"""Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
+LARGEST = 4.0
+"""Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
+ELSEWHERE = "the model of the part as a solid does not compute it"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SolidSolution(ShortRepr):
+    """A part that was solved on two meshes.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With every default written out.
+    meshes : TwoMeshes
+    travel : (n,) array
+        Of the slider, at the points of the curve [m].
+    chain : Chain
+        The leg as beams.
+    """
+
+    spec: SliderCrankSpec
+    meshes: TwoMeshes
+    travel: FloatArray
+    chain: Chain
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Of all legs, at the points of the curve [N]: cubics between the poses."""
+        return read_only(self.spec.mechanism.sets * self.fine.course.effort(self.travel))
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Largest along a free edge [Pa]; between poses by cubics that stay between their values."""
+        from scipy.interpolate import PchipInterpolator
+
+        found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
+        return read_only(np.maximum(found, 0.0))
+
+    @property
+    def fine(self) -> MeshSolution:
+        """The finer mesh, whose values are reported."""
+        return self.meshes.fine
+
+    @cached_property
+    def error(self) -> MeshError:
+        """What the two meshes differ by."""
+        return self.meshes.error
+
+    @cached_property
+    def fillets(self) -> tuple[FilletRow, ...]:
+        """Stress fillet by fillet."""
+        return fillets(self.spec, self.chain, self.fine, self.window)
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where metrics are taken [m]."""
+        ends = self.spec.analysis.travel or (0.0, 0.0)
+        return ends if self.spec.analysis.window is None else between(self.spec.analysis.window, ends)
+
+    @cached_property
+    def level(self) -> float:
+        """Mean force in the window [N]."""
+        low, high = max(self.window[0], self.travel[0]), min(self.window[1], self.travel[-1])
+        places = np.linspace(low, high, 401)
+        return float(self.spec.mechanism.sets * self.fine.course.effort(places).mean())
+
+
+def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+    """Return the force of the part as drawn over its slider's travel, with everything that is wrong with it.
+
+    PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
+    """
+    from cfmkit.solid.path_following import PathEnd
+
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        spec = as_run(spec, linkage, unloaded)
+        meshes = driven_part(spec).solved(run.progress)
+    except CannotBuild as problem:
+        return no_result(spec, problem.finding)
+    except GeometryError as error:
+        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        return Result(spec, Status.NO_EQUILIBRIUM, message)
+    except InputError as problem:
+        return Result(spec, Status.INVALID, str(problem))
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    if why := meshes.no_curve(3):
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; look at analysis.solid.mesh")
+    asked = np.linspace(low, high, spec.analysis.points)
+    course = meshes.fine.course
+    reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
+    solution = SolidSolution(spec, meshes, reached, chain_of(spec, linkage, unloaded))
+    complete = course.ending is PathEnd.COMPLETE
+    found = (*_findings(solution), *friction_left_out(spec))
+    return Result(
+        spec=spec,
+        status=Status.COMPLETE if complete else Status.PARTIAL,
+        message="" if complete else found[0].message,
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=found,
+        travel=(low, high),
+        target=spec.design.force if spec.design else None,
+        reference=spec.analysis.reference_travel,
+        allowable_stress=elasticity(spec.mechanism).allowable_stress,
+        tables={"fillets": partial(fillet_table, solution.fillets)},
+        state=solution,
+    )
+
+
+def part_of(spec: SliderCrankSpec) -> Part:
+    """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
+
+    piece = solved_piece(spec)
+    made_of, material = elasticity(spec.mechanism), spec.mechanism.material
+    way = travel_direction(linkage_of(spec.mechanism))
+    driven = np.array([np.cos(way), np.sin(way), 0.0])
+    places = tuple(
+        HeldOrDriven(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
+        for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
+    )
+    assert material is not None  # or `elasticity` had refused
+    law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
+    regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
+    rings = rings_of((piece.contour, *piece.holes))
+    return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST, piece.frame)
+
+
+def driven_part(spec: SliderCrankSpec) -> DrivenPart:
+    """Return one leg with the travels that it is solved for."""
+    from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
+
+    part = part_of(spec)
+    return DrivenPart("slider-crank", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+
+
+def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
+    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
+    spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
+    linkage = linkage_of(spec.mechanism)
+    return (driven_part(as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))),)
+
+
+def elastic_networks(spec: SliderCrankSpec) -> tuple[DrivenNetwork, ...]:
+    """Return the same leg as beams, for decks of other solvers."""
+    from cfmkit.elastica import Displacement
+    from cfmkit.elastica.input_deck import DrivenNetwork
+    from cfmkit.families.slider_crank.printed.beam_chain_from_spec import lumped_chain, strip_of
+    from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER
+
+    spec = resolve(spec)
+    linkage = linkage_of(spec.mechanism)
+    unloaded = unloaded_angle(spec.mechanism, linkage)
+    _, end = as_run(spec, linkage, unloaded).analysis.travel or (0.0, 0.0)
+    if spec.piece == "beam":
+        network = strip_of(spec.mechanism, linkage, unloaded).network(elasticity(spec.mechanism))
+    else:
+        chain = lumped_chain(spec.mechanism, linkage, unloaded)
+        network = chain.build(chain.points)
+    return (DrivenNetwork("slider-crank", network, Displacement(SLIDER, travel_direction(linkage), np.array([end]))),)
+
+
+def _stops(spec: SliderCrankSpec) -> list[float]:
+    """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** GATHERED
+    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    ends = [low, *(place for window in windows if window is not None for place in between(window, (low, high)))]
+    found = np.unique(np.concatenate([own, [place for place in ends if 0.0 < place < high]]))
+    return [float(place) for place in np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * high) + 1)]
+
+
+def _curve(solution: SolidSolution) -> Curve:
+    course, travel = solution.fine.course, solution.travel
+    solved = np.isclose(travel[:, None], course.travel, rtol=0, atol=1e-9 * travel[-1]).any(axis=1)
+    stable = np.array([pose.unstable == 0 for pose in course.poses])
+    before = np.clip(np.searchsorted(course.travel, travel * (1 + 1e-12)) - 1, 0, None)
+    extra = {
+        "max_stress": Column(solution.stress, "stress"),
+        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
+    }
+    return Curve(travel, solution.force, np.repeat("load", len(travel)), stable[before], extra)
+
+
+def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; those that a solid does not know have no value."""
+    limit = elasticity(solution.spec.mechanism).allowable_stress
+    known: dict[str, float | None] = {
+        "kink": kink(solution.chain.pins),
+        "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
+        "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
+        "allowable_stress": limit,
+        "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
+        **solution.error.values(),
+    }
+    names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
+    about = OF_SPRINGS | DEFINITIONS
+    found = {
+        name: Quantity(known.get(name), *about[name], ELSEWHERE if known.get(name) is None else "") for name in names
+    }
+    return found | largest_concentration(solution.fillets)
+
+
+def _findings(solution: SolidSolution) -> Iterator[Finding]:
+    from cfmkit.solid.path_following import PathEnd
+
+    names = {PathEnd.LIMIT_POINT: "limit_point", PathEnd.UNSTABLE: "unstable", PathEnd.CONTACT: "self_contact"}
+    course = solution.fine.course
+    if course.ending is not PathEnd.COMPLETE:
+        where = format_short(float(course.travel[-1]), "length")
+        yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
+    if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
+        told = "without fillets the stress in inside corners has no value"
+        yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
+    for name, told in solution.error.too_large():
+        yield finding(name, told)
+    piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
+    if told := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
+        yield finding("wide_beam", told)
+    limit = made_of.allowable_stress
+    peaks, places = solution.fine.peaks
+    if limit is not None and peaks.max() > limit:
+        worst = int(peaks.argmax())
+        at = ", ".join(format_short(one, "length") for one in places[worst].tolist())
+        yield finding(
+            "overstressed",
+            f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at ({at}) of the drawing, at "
+            f"{format_short(float(course.travel[worst]), 'length')} of travel; the allowable stress is "
+            f"{format_short(limit, 'stress')}",
+        )

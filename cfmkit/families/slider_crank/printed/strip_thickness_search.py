@@ -1,0 +1,416 @@
+"""From a task to a strip: the uniform one first, then more and more thicknesses, each from the one before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.designing.run_many_starts import NEVER, Clock, Stage, done
+from cfmkit.families.base import Run
+from cfmkit.families.findings import mm, mpa, newton, percent
+from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.sqp_program import SMALL, Form, StripProgram
+from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
+from cfmkit.results import Design, Status
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.sqp_program import Task
+
+
+VIOLATION = 5e-3
+"""Of a constraint that counts as none: 0.005 % of the force, 0.05 % of the stress allowed."""
+
+
+def descend(
+    program: StripProgram,
+    start: FloatArray,
+    bounds: FloatArray,
+    steps: int = 100,
+    tolerance: float = 1e-6,
+    clock: Clock = NEVER,
+) -> Optimum:
+    """Return where the steps from a start end.
+
+    Parameters
+    ----------
+    program : StripProgram
+        What is minimised.
+    start : (n,) array
+        Moved into the bounds first.
+    bounds : (n, 2) array
+        Smallest and largest values.
+    steps : int
+        At most.
+    tolerance : float
+        Change of the objective that ends the search.
+    clock : Clock
+        When it is late, the search ends, too.
+    """
+    return minimize(
+        program, start, bounds, Effort(steps, tolerance, VIOLATION, clock.late, last=True, patience=PATIENCE)
+    )
+
+
+PATIENCE = 20
+"""Evaluations without a smaller violation after which a search is stuck: two of the solver's line searches."""
+
+COARSE = 5
+"""Thicknesses of the first tapered strip; then twice as many intervals each time."""
+
+LOOSE = 0.01
+"""Ripple within which the coarse strip is sought: few thicknesses cannot keep less."""
+
+SCATTER = 0.15
+"""Standard deviation of the logarithm of the thicknesses that other starts begin with."""
+
+SHORTEST = 2e-3
+"""Length of the band that is sought at least [m]."""
+
+WIDEST, NARROWING = 0.1, 5
+"""Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
+
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Smallest and largest value of every number of a form, (n, 2) in its units, and of the stroke [m]."""
+
+    form: FloatArray
+    longest: float
+
+
+@dataclass(frozen=True)
+class FoundStrip:
+    """A strip that was found.
+
+    Attributes
+    ----------
+    task, form, ranges : Task, Form, Ranges
+        What was asked.
+    program : StripProgram
+        Of the last search.
+    descent : Optimum
+        Its outcome.
+    uniform : Optimum or None
+        That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
+    lost : tuple of str
+        Why processes died that searched from other starts.
+    """
+
+    task: Task
+    form: Form
+    ranges: Ranges
+    program: StripProgram
+    descent: Optimum
+    uniform: Optimum | None
+    lost: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> FloatArray:
+        """Numbers of the form."""
+        return self.descent.z[: self.form.size]
+
+
+def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
+    """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
+
+    The force follows the third power of the thickness but for stretching and shear: a few corrections do.
+    """
+    program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+    thickness = guess
+    for _ in range(_ROUNDS):
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return guess
+        level = 0.5 * (state.force.max() + state.force.min())
+        wanted = np.asarray(task.share(program.travel(np.array([thickness / SMALL, 1.0]))))
+        factor = float((0.5 * task.force * (wanted.max() + wanted.min()) / level) ** (1.0 / 3.0))
+        thickness *= factor
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness
+
+
+def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] | None:
+    """Return thickness and width [m] of the strip that has the allowable stress at the stroke, and the force.
+
+    The stress does not depend on the width and the force is proportional to it: first the thickness from
+    the stress, then the width from the force. None where there is no stress limit or no equilibrium.
+    """
+    limit = task.material.allowable_stress
+    if limit is None:
+        return None
+    thickness, width = guess, 5e-3
+    for _ in range(_ROUNDS):
+        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
+        level = 0.5 * (state.force.max() + state.force.min())
+        width *= task.force / level
+        factor = limit / worst
+        thickness *= factor
+        width /= factor**3
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness, width
+
+
+def uniform_for_width(task: Task, width: float, guess: float = 1e-3) -> tuple[float, float] | None:
+    """Return thickness [m] and largest stress at the stroke [Pa] of the strip of a width [m] that has the force.
+
+    The force goes nearly with the cube of the thickness. None where there is no equilibrium.
+    """
+    thickness = guess
+    for _ in range(_ROUNDS):
+        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
+        factor = (2.0 * task.force / (state.force.max() + state.force.min())) ** (1.0 / 3.0)
+        if abs(factor - 1.0) < 1e-10:
+            break
+        thickness *= factor
+    return thickness, worst
+
+
+@dataclass(frozen=True)
+class OneStart:
+    """What a process does: from the number of a start to a record of the strip that it led to.
+
+    The first one climbs from the uniform strip, from few thicknesses to all; the others begin with all of them, random.
+    """
+
+    task: Task
+    form: Form
+    ranges: Ranges
+    uniform: Optimum | None
+    seed: int
+    clock: Clock
+
+    def __call__(self, number: int) -> dict[str, Any]:
+        """Return the record."""
+        steps, factors = _ladder(self.form), None
+        if number:
+            steps = (self.form.count,)
+            drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
+            factors = np.exp(SCATTER * drawn)
+        found = _climb(self, steps, factors).descent
+        kept = {"z": found.z.tolist(), "objective": float(found.objective), "constraints": found.constraints.tolist()}
+        kept |= {"ending": found.ending.name, "evaluations": found.evaluations, "allowed": found.allowed}
+        return {"found": kept, "late": self.clock.late()}
+
+    def read(self, record: dict[str, Any]) -> FoundStrip:
+        """Return the strip of a record."""
+        kept = record["found"]
+        arrays = {name: np.array(kept[name]) for name in ("z", "constraints")}
+        descent = Optimum(**{**kept, **arrays, "ending": SearchEnding[kept["ending"]]})
+        return FoundStrip(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
+
+
+def search(
+    task: Task, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
+) -> FoundStrip | Design:
+    """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
+
+    Parameters
+    ----------
+    task : Task
+        What the strip is to do.
+    form : Form
+        How it is described.
+    ranges : Ranges
+        Of its numbers.
+    starts : int
+        How many, the uniform strip included.
+    run : Run
+        Seed of the random ones, progress, processes, notes.
+    identity : str
+        Of everything that decides the outcome of a start but its number.
+    clock : Clock
+        When it is late, no more is tried.
+
+    Returns
+    -------
+    FoundStrip or Design
+        Why there is none, where no start came to an end.
+    """
+
+    def tell(records: Mapping[int, Any]) -> None:
+        count = len(records)
+        run.progress(count / starts, f"start {count + 1} of {starts}" if count < starts else "done")
+
+    work = OneStart(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
+    means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
+    outcome = done(Stage(work, tuple(range(starts)), identity), means, clock, tell)
+    if not outcome.records:
+        return _nothing(outcome.lost)
+    found = [work.read(outcome.records[number]) for number in sorted(outcome.records)]
+    best = min(found, key=lambda one: _rank(one.descent))
+    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
+        best = min(filter(None, (best, _tightened(work))), key=lambda one: _rank(one.descent))
+    return replace(best, lost=outcome.lost)
+
+
+def _nothing(lost: tuple[str, ...]) -> Design:
+    """Return why no start led to anything."""
+    if lost:
+        return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(lost)}")
+    return no_design(
+        finding("target_unreachable", "the time budget ended before any start led to a strip: give it more")
+    )
+
+
+def _rank(descent: Optimum) -> tuple[bool, float]:
+    return not descent.feasible, descent.objective if descent.feasible else descent.violation
+
+
+def _ladder(form: Form) -> tuple[int, ...]:
+    """Return the numbers of thicknesses that are gone through."""
+    if form.per_piece or form.shares or form.count <= COARSE:
+        return (form.count,)
+    count, steps = COARSE, [COARSE]
+    while 2 * count - 1 < form.count:
+        count = 2 * count - 1
+        steps.append(count)
+    return (*steps, form.count)
+
+
+def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) -> FoundStrip:
+    """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
+    task, form, ranges = start.task, start.form, start.ranges
+    x, last = _begin(task, form, ranges, start.uniform, steps[0])
+    if factors is not None:
+        x[: steps[0]] *= factors
+    for count in steps:
+        now = replace(form, count=count)
+        own = len(x) - (form.size - form.count)
+        x = np.concatenate([_refined(x[:own], count), x[own:]])
+        coarse = count < steps[-1]
+        goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
+        program = StripProgram(goal, now)
+        bounds = _bounds(task, ranges, form, count)
+        begin = np.append(x, last) if program.extra else x
+        effort = (20, 1e-3) if coarse else (100, _precise(task))
+        descent = descend(program, begin, bounds, *effort, start.clock)
+        x = descent.z[: now.size]
+        last = descent.z[-1]
+    return FoundStrip(task, form, ranges, program, descent, start.uniform)
+
+
+def _tightened(start: OneStart) -> FoundStrip | None:
+    """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
+
+    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
+    where a wide band is missed by more than its own width: a narrower one is not reached from there.
+    """
+    task, form, ranges, uniform = start.task, start.form, start.ranges, start.uniform
+    x, last = _begin(task, form, ranges, uniform, form.count)
+    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, WIDEST)
+    loose = max(task.ripple, LOOSE) + missed
+    for ripple in np.geomspace(loose, task.ripple, NARROWING):
+        program = StripProgram(replace(task, ripple=float(ripple)), form)
+        begin = np.append(x, last)
+        descent = descend(program, begin, _bounds(task, ranges, form, form.count), clock=start.clock)
+        if ripple > task.ripple and 0.01 * descent.violation > ripple:
+            return None
+        x, last = descent.z[: form.size], descent.z[-1]
+    return FoundStrip(task, form, ranges, program, descent, uniform)
+
+
+def _precise(task: Task) -> float:
+    return 1e-9 if task.goal == "rms" else 1e-6
+
+
+def _refined(values: FloatArray, count: int) -> FloatArray:
+    """Return thicknesses on more nodes, the same strip."""
+    old = np.linspace(0.0, 1.0, len(values))
+    return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
+
+
+def _begin(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None, count: int) -> tuple[FloatArray, float]:
+    """Return the first numbers, and the first value of the goal."""
+    low, high = ranges.form.T
+    middle = 0.5 * (low + high)
+    if form.per_piece or form.shares or uniform is None:
+        x = middle.copy()
+        return x, _first_goal(task, uniform)
+    x = np.concatenate([np.full(count, uniform.z[0]), middle[form.count :]])
+    return x, _first_goal(task, uniform)
+
+
+def _first_goal(task: Task, uniform: Optimum | None) -> float:
+    if task.goal == "stroke":
+        known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
+        return known if known is not None else 100.0 * task.stroke
+    return 2.0
+
+
+def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
+    """Return the bounds of a search with another number of thicknesses, and of its goal."""
+    own = ranges.form
+    thickness = own[: form.count] if count == form.count else np.tile(own[0], (count, 1))
+    rows = np.concatenate([thickness, own[form.count :]])
+    if task.goal == "rms":
+        return rows
+    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
+    return np.concatenate([rows, [goal]])
+
+
+def _uniform(task: Task, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
+    """Return the best strip of one thickness."""
+    own = ranges.form
+    width = form.width or float(own[-1].mean()) * SMALL
+    first = uniform_thickness(task, width, float(own[0].mean()) * SMALL) / SMALL
+    program = StripProgram(replace(task, ripple=max(task.ripple, LOOSE)), Form(1, width=width))
+    last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
+    bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
+    start = np.array([first, *last]) if program.extra else np.array([first])
+    found = descend(program, start, bounds, clock=clock)
+    return None if found.ending is SearchEnding.NO_ANSWER else found
+
+
+def infeasible(found: FoundStrip) -> Design:
+    """Return what the nearest strip misses, and the target that it would meet."""
+    descent, program, task = found.descent, found.program, found.task
+    if descent.ending is SearchEnding.NO_ANSWER:
+        why = "could not begin: the first strip has no equilibrium over 'design.travel'; reduce it, or "
+        why += "for other ranges in 'design.beam'"
+        return no_design(finding("target_unreachable", f"the search {why}"))
+    if descent.ending is SearchEnding.OUT_OF_TIME:
+        text = "the time budget ended before a strip met its targets: give it more"
+        return no_design(finding("target_unreachable", text))
+    state = program.state(descent.z)
+    if state is None:
+        return no_design(
+            finding("target_unreachable", f"the search {descent.ending.value}; change 'design.travel' or 'design.beam'")
+        )
+    low, high = float(state.force.min()), float(state.force.max())
+    level, missed, nearest = 0.5 * (low + high), [], {}
+    ratio, limit = state.force / task.force - task.share(program.travel(descent.z)), task.material.allowable_stress
+    off = float(np.abs(ratio).max())
+    if off > program.ripple(descent.z):
+        missed.append(f"is up to {percent(off)} off the force")
+        flat = task.shape is None and high - low <= 2.0 * level * program.ripple(descent.z)
+        name = "design.force" if flat else "design.tolerance"
+        nearest[name] = newton(level) if flat else format_short(off, "ratio")
+    worst = float(state.stress.max())
+    if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
+        missed.append(f"has a stress of {mpa(worst)}")
+        nearest["allowable stress"] = mpa(worst)
+    text = (
+        f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
+        f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value}); change "
+        "'design.force', 'design.travel' or the ranges in 'design.beam'"
+    )
+    return no_design(finding("target_unreachable", text), nearest)

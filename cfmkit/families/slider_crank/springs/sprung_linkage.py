@@ -1,0 +1,360 @@
+"""A slider-crank with springs put together: linkage, rates, the motion that it can run through, the forces inside.
+
+The coupler is in equilibrium under the forces at its ends and the moments of the springs at crank pin and
+slider pin; the slider passes on its own spring's force and what drives it.
+
+The trim by the unloaded angle: what turning it does to the effort while the slider's places are kept. Whoever turns
+the crank angle at which the springs are relaxed (the anchors of the torsion springs, or the block that a strip is
+clamped in) deflects all springs by the same at every place: an effort q q' becomes (q + dq) q'. Unlike the anchor of
+the slider's spring, that adds most where a joint turns most per travel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.unit_springs import (
+    UnitCurves,
+    along_crank,
+    along_slider,
+    crank_efforts,
+    slider_forces,
+)
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
+
+
+TURN = 2.0 * math.pi
+
+SHORT_OF_END = 1e-3
+"""Share of an arc that a motion stays away from its ends, where efforts are unbounded."""
+
+CLOSEST = 1e-6
+"""Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
+
+
+@dataclass(frozen=True)
+class Rubbing:
+    """What rubs in a slider-crank.
+
+    Attributes
+    ----------
+    pin : float
+        Friction couple per load of each pin, mu d/2 [m].
+    guide, drag : float
+        Friction of the slider's guide, and what it takes without load [N].
+    tilt : float
+        Distance of the force from the guide's middle line over half the guide's length.
+    mirrored : bool
+        Whether a mirrored pair keeps the guide free of load.
+    """
+
+    pin: float = 0.0
+    guide: float = 0.0
+    drag: float = 0.0
+    tilt: float = 0.0
+    mirrored: bool = False
+
+    @property
+    def there(self) -> bool:
+        """Whether anything rubs."""
+        return bool(self.pin or self.guide or self.drag)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A slider-crank put together.
+
+    Attributes
+    ----------
+    linkage : Linkage
+        The lengths, the coupler's written out.
+    unloaded : float
+        Crank angle with all springs relaxed [rad].
+    rates : (4,) array
+        Of the springs of all legs together [N m/rad; the last N/m].
+    drive : {"torque", "force"}
+        What the motion is: the crank's angle or the slider's travel.
+    side : int
+        Of a force drive: 1 beyond, -1 before the stretched position.
+    anchor : float
+        How far the anchor of the slider's spring is screwed beyond where that spring is relaxed [m].
+    rubbing : Rubbing
+        Friction of its pins and guide; efforts of `units` and `forces` are without.
+    """
+
+    linkage: Linkage
+    unloaded: float
+    rates: FloatArray
+    drive: Kind = "torque"
+    side: int = 1
+    anchor: float = 0.0
+    rubbing: Rubbing = Rubbing()
+
+    def units(self, motion: FloatArray) -> UnitCurves:
+        """Return what unit springs do along the motion of the drive."""
+        if self.drive == "torque":
+            plain = along_crank(self.linkage, self.unloaded, motion)
+        else:
+            plain = along_slider(self.linkage, self.unloaded, self.side, motion)
+        return self._anchored(plain, motion) if self.anchor else plain
+
+    def _anchored(self, plain: UnitCurves, motion: FloatArray) -> UnitCurves:
+        """Return unit curves whose spring at the slider is tight by the anchor's way."""
+        turn, effort, stiffness = plain.turn.copy(), plain.effort.copy(), plain.stiffness.copy()
+        tight = -self.linkage.branch * self.anchor
+        turn[3] += tight
+        first, second = self._slider_rates(motion)
+        effort[3] += tight * first
+        stiffness[3] += tight * second
+        return replace(plain, turn=turn, effort=effort, stiffness=stiffness)
+
+    def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return dx/d(motion) and its derivative, of the slider's place x."""
+        link = self.linkage
+        if self.drive == "force":
+            return np.full(np.shape(motion), -float(link.branch)), np.zeros(np.shape(motion))
+        sine, cosine = np.sin(motion), np.cos(motion)
+        beta = link.coupler_angle(motion)
+        rise, level = np.sin(beta), np.cos(beta)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            swing = -link.crank * cosine / (link.coupler * level)
+            sway = (link.crank * sine / link.coupler + rise * swing**2) / level
+        first = -link.crank * sine - link.coupler * rise * swing
+        return first, -link.crank * cosine - link.coupler * (level * swing**2 + rise * sway)
+
+    def forces(self, motion: FloatArray) -> FloatArray:
+        """Return the efforts of `units` alone, (4, n)."""
+        if self.drive == "torque":
+            found = crank_efforts(self.linkage, self.unloaded, motion)
+        else:
+            found = slider_forces(self.linkage, self.unloaded, self.side, motion)
+        if self.anchor:
+            found[3] -= self.linkage.branch * self.anchor * self._slider_rates(motion)[0]
+        return found
+
+    @property
+    def motion_name(self) -> Literal["angle", "travel"]:
+        """What the motion is called in a specification and among the values."""
+        return "angle" if self.drive == "torque" else "travel"
+
+    @property
+    def dimension(self) -> Literal["angle", "length"]:
+        """Dimension of the motion."""
+        return "angle" if self.drive == "torque" else "length"
+
+    @property
+    def start(self) -> float:
+        """The motion in the unloaded position."""
+        return self.unloaded if self.drive == "torque" else 0.0
+
+    @property
+    def rest(self) -> float:
+        """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        knee = self.linkage.knee(self.unloaded)
+        other_side = self.drive == "force" and self.side * knee < 0.0 and knee != math.pi
+        return math.nan if other_side or self.anchor else self.start
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
+        if self.drive == "torque":
+            return self.linkage.arc(self.unloaded)
+        inward, outward = self.linkage.room(self.unloaded)
+        first, last = self._relaxed_ends
+        return 0.0 if first else -outward, 0.0 if last else inward
+
+    @property
+    def _relaxed_ends(self) -> tuple[bool, bool]:
+        """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
+        stretched, folded = (self.linkage.knee(self.unloaded) == knee for knee in (0.0, math.pi))
+        past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
+        return (folded, stretched) if past else (stretched, folded)
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the effort grows without bound towards the first, and towards the last place of the reach.
+
+        A drive loses its hold in a dead point: nothing but springs that are relaxed there, or that it drives itself,
+        give it a finite effort.
+        """
+        if self.drive == "torque":
+            held = bool(self.rates[1:].any())
+            first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
+            return first, last
+        link, held = self.linkage, bool(self.rates[:3].any())
+        ends = link.way(self.unloaded)[::-1]
+        first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
+        return first, last
+
+    def within(self, low: float, high: float) -> tuple[float, float]:
+        """Return the part of a motion that is within reach, and ends before the efforts grow without bound.
+
+        What keeps off a pole by itself is left as it is. What touches or passes it ends `SHORT_OF_END` of the way
+        from the unloaded position before it: there the effort is some thirty times what it is elsewhere.
+        """
+        (first, last), (at_first, at_last) = self.reach, self.poles
+        to_first, to_last = self._ways
+        if at_first and low < first + CLOSEST * to_first:
+            first += SHORT_OF_END * to_first
+        if at_last and high > last - CLOSEST * to_last:
+            last -= SHORT_OF_END * to_last
+        return max(low, first), min(high, last)
+
+    @property
+    def _ways(self) -> tuple[float, float]:
+        """How far the motion is from the unloaded position to the first, and to the last place of the reach.
+
+        On the other side of the stretched position the slider gets to the folded one by way of the stretched one,
+        the springs turned all the way, however near to it the unloaded position is.
+        """
+        first, last = self.reach
+        ways = [self.start - first, last - self.start]
+        if self.drive == "force" and math.isnan(self.rest):
+            ends, far = self.linkage.way(self.unloaded)[::-1], self.linkage.stretched_position
+            ways = [way if abs(end) == far else last - first for way, end in zip(ways, ends, strict=True)]
+        return ways[0], ways[1]
+
+    @property
+    def stretched(self) -> float:
+        """The motion in the stretched position nearest to the unloaded one."""
+        if self.drive == "force":
+            first, last = self.reach
+            return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
+        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
+
+
+def assemble(spec: SliderCrankSpec) -> Assembly:
+    """Return the slider-crank put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist as described; the finding says why.
+    """
+    mechanism, analysis = spec.mechanism, spec.analysis
+    linkage = linkage_of(mechanism)
+    unloaded = unloaded_angle(mechanism, linkage)
+    springs = mechanism.springs
+    rates = np.array(springs.rates) * mechanism.sets
+    rates.setflags(write=False)
+    return Assembly(
+        linkage,
+        unloaded,
+        rates,
+        analysis.drive,
+        side_of(spec, linkage, unloaded),
+        springs.anchor or 0.0,
+        _rubbing(mechanism),
+    )
+
+
+def _rubbing(mechanism: Mechanism) -> Rubbing:
+    pins, guide = mechanism.pins, mechanism.guide
+    return Rubbing(
+        pin=0.5 * pins.diameter * pins.friction if pins else 0.0,
+        guide=guide.friction if guide else 0.0,
+        drag=guide.drag if guide else 0.0,
+        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+        mirrored=mechanism.copies == "mirrored",
+    )
+
+
+def default_motion(assembly: Assembly) -> tuple[float, float]:
+    """Return the motion that is run through where none is requested: all of it, a full turn at most."""
+    low, high = assembly.reach
+    if math.isinf(low):
+        return assembly.start, assembly.start + TURN
+    room = SHORT_OF_END * (high - low)
+    if assembly.drive == "force":
+        return (0.0, high - room) if high > room else (low + room, 0.0)  # relaxed folded, it can only be pulled
+    return low + room, high - room
+
+
+def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the force along the coupler and that of the slider on its guide.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        The mechanism; rates of all legs.
+    units : UnitCurves
+        Along the motion, n places.
+    drive : (n,) array
+        Force that drives the slider towards the pivot [N]; zero where a torque drives the crank.
+
+    Returns
+    -------
+    coupler, guide : (n,) array
+        Tension in the coupler, and force on the guide across the slider's way (positive
+        upwards) [N]; for the rates and the drive given, so of all legs together or of one.
+    """
+    link, rates, turn = assembly.linkage, assembly.rates, units.turn
+    beta = coupler_angle(link, units)
+    along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
+    moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
+    sine, cosine = np.sin(beta), np.cos(beta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # moments about the crank pin: r2 (cos b Y - sin b X) + moment = 0, X and Y the slider's pull on the coupler
+        across = (link.coupler * sine * along - moment) / (link.coupler * cosine)
+    coupler: FloatArray = along * cosine + across * sine
+    return coupler, -across
+
+
+def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
+    """Return the direction of the coupler [rad].
+
+    A slider that is driven takes the crank pin past the place where the coupler stands across its way; from there on
+    the coupler points to the other side than the branch says.
+    """
+    beta = link.coupler_angle(units.angle)
+    turned = link.branch * (units.position - link.crank * np.cos(units.angle)) < 0.0
+    angle: FloatArray = np.where(turned, np.pi - beta, beta)
+    return angle
+
+
+STEP = 1e-5
+"""Of the angle [rad]: the effort is a quadratic of q at most, so that central differences are off by rounding alone."""
+
+PLACES = 201
+"""Of the window, over which the change of the effort is averaged."""
+
+
+def turned(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
+    """Return an assembly whose unloaded angle is turned by some angle [rad], and by how much its travel is less there.
+
+    Travel is counted from the unloaded position: the same place has a travel smaller by the second value [m]; 0 where
+    a torque drives, whose motion is the crank's angle itself.
+    """
+    other = replace(assembly, unloaded=assembly.unloaded + angle)
+    if assembly.drive == "torque":
+        return other, 0.0
+    link = assembly.linkage
+    before, after = (float(link.slider_position(np.asarray(one.unloaded))) for one in (assembly, other))
+    return other, link.branch * (before - after)
+
+
+def effort_per_angle(assembly: Assembly, motion: FloatArray) -> FloatArray:
+    """Return by how much unit efforts rise per unloaded angle, (4, n), [N m or N, per rate and rad]."""
+    rows = []
+    for step in (STEP, -STEP):
+        other, less = turned(assembly, step)
+        rows.append(other.forces(motion - less))
+    with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
+        change: FloatArray = (rows[0] - rows[1]) / (2.0 * STEP)
+    return change
+
+
+def mean_effort_per_angle(assembly: Assembly, window: tuple[float, float]) -> FloatArray:
+    """Return the mean of `effort_per_angle` over a window, (4,)."""
+    found: FloatArray = effort_per_angle(assembly, np.linspace(*window, PLACES)).mean(axis=1)
+    return found

@@ -1,0 +1,145 @@
+"""From a specification to its leaves and their laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, sin
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
+from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.springs import Coils, Diamond, StraightSpring, UShape, folded
+from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
+from cfmkit.families.vcfm.leaves.v_beam import VBeam
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.families.vcfm.leaves.springs import Spring
+    from cfmkit.families.vcfm.spec import Bistable, BoughtSprings, LeafMaterial, Positive, VcfmSpec
+
+
+RIM = 0.75
+"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
+
+Leaf = VBeam | CosineLeaf | HybridLeaf | TrussLeaf
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A mechanism's leaves, their laws and how many there are.
+
+    Attributes
+    ----------
+    leaf : Leaf
+        Law of one half-beam of the snap-through structure.
+    spring : Spring or TrussDiamond
+        Law of the spring, as much of it as is loaded.
+    half_beams : int
+        Leaves that carry the shuttle.
+    """
+
+    leaf: Leaf
+    spring: Spring | TrussDiamond
+    half_beams: int
+
+    @property
+    def strip(self) -> LeafStrip:
+        """One leaf of the snap-through structure."""
+        return self.leaf.strip
+
+    @property
+    def positive_stiffness(self) -> float:
+        """K_p as made [N/m]."""
+        return float(self.spring.stiffness)
+
+    @property
+    def negative_stiffness(self) -> float:
+        """K_n, the size of the negative stiffness of all leaves [N/m]; zero where there is none."""
+        return max(float(self.half_beams * self.leaf.negative_stiffness), 0.0)
+
+    @property
+    def first_stiffness(self) -> float:
+        """K_b1, the stiffness of all leaves as made [N/m]."""
+        return float(self.half_beams * self.leaf.first_stiffness)
+
+    @cached_property
+    def linear(self) -> tuple[float, float]:
+        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        first, last = self.leaf.linear
+        return float(first), float(last)
+
+    @property
+    def balance(self) -> float:
+        """Travel at which the leaves carry nothing, and the spring alone decides the force [m]."""
+        return float(self.leaf.balance)
+
+
+def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> LeafStrip:
+    """Return a leaf of a specification; of the springs only the diamond's are inclined."""
+    angle = 0.0 if leaf.structure in ("folded", "straight", "u-shape") else leaf.angle
+    return LeafStrip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
+
+
+def share_of(positive: Positive) -> float:
+    """Return the loaded part of the spring."""
+    return 0.5 if positive.loaded == "half" else 1.0
+
+
+def spring_room(spec: VcfmSpec) -> float:
+    """Return how far the spring can be compressed until its blocks or its turns meet [m]; infinite where none do."""
+    about, bought = spec.mechanism.positive, spec.mechanism.springs
+    if about is None:
+        return inf if bought is None else _room_of_coils(bought)
+    rims = 2.0 * RIM * about.thickness
+    if about.structure == "diamond":
+        return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
+    return 2.0 * about.radius - rims if about.structure == "u-shape" and about.radius else inf
+
+
+def _room_of_coils(springs: BoughtSprings) -> float:
+    if springs.kind == "extension" or springs.free_length is None:
+        return inf
+    return max(springs.free_length - closed_length(springs), 0.0)
+
+
+def closed_length(springs: BoughtSprings) -> float:
+    """Return the length of a spring with its turns on each other [m]; 0 where its wire is not known."""
+    return 0.0 if springs.wound is None else springs.wound.wound(springs.kind).body_length
+
+
+def parts(spec: VcfmSpec) -> Parts:
+    """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
+    mechanism = spec.mechanism
+    bistable, other = mechanism.bistable, strip_of(mechanism.bistable, mechanism.material)
+    if mechanism.springs is not None:
+        return Parts(_LEAVES[bistable.structure](other, bistable), coils(mechanism.springs), bistable.half_beams)
+    positive = mechanism.flexures
+    one, share = strip_of(positive, mechanism.material), share_of(positive)
+    if spec.analysis.fidelity == "truss":
+        return Parts(TrussLeaf(other), TrussDiamond(one, share), bistable.half_beams)
+    return Parts(_LEAVES[bistable.structure](other, bistable), _springs(one, positive, share), bistable.half_beams)
+
+
+def coils(springs: BoughtSprings) -> Coils:
+    """Return the law of bought springs, all of them together."""
+    return Coils(springs.count * springs.rate, springs.count * springs.initial_tension)
+
+
+def _springs(strip: LeafStrip, positive: Positive, share: float) -> Spring:
+    kinds: dict[str, Callable[[], Spring]] = {
+        "diamond": lambda: Diamond(strip, share),
+        "folded": lambda: folded(strip, share),
+        "straight": lambda: StraightSpring(strip, share),
+        "u-shape": lambda: UShape(strip, positive.radius, share),
+    }
+    return kinds[positive.structure]()
+
+
+_LEAVES: dict[str, Callable[[LeafStrip, Any], Leaf]] = {
+    "v-beam": lambda strip, _about: VBeam(strip),
+    "cosine": lambda strip, _about: CosineLeaf(strip),
+    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),
+}

@@ -1,0 +1,327 @@
+"""From targets to leaves around bought springs: every spring and number of a catalogue is tried.
+
+The springs decide the stiffness K, so that the rise follows from it: h = (F - F_0)/K, F_0 the initial tension of all of
+them, and the preload for an adjustment is dF/K. Leaves are then sized as around a diamond (`leaf_sizing`); of the exact
+model only their width is fitted, since nothing of a bought spring can be changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.findings import mm, mpa
+from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils
+from cfmkit.families.vcfm.leaf_sizing import (
+    MIDDLE,
+    RESCALES,
+    SQUAT,
+    check_guide,
+    completed,
+    shortest_leaf,
+    sized_leaf,
+    thickness_for,
+)
+from cfmkit.families.vcfm.leaves.v_beam import STEEP, onset_and_exit
+from cfmkit.families.vcfm.sizing_for_given_sheet import NEAR, PASSES, leaf_of_sheet, next_leaf
+from cfmkit.results import Design, Status
+from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest
+from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.stress_and_life import SpringInUse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.vcfm.exact_model import ExactSampler
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+    from cfmkit.families.vcfm.spec import BoughtSprings, VcfmDesign, VcfmSpec
+    from cfmkit.stock.springs.offers_and_generic_series import Offer
+
+TRIED = 12
+"""Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""
+
+
+@dataclass(frozen=True)
+class LeavesAroundSprings:
+    """Leaves around bought springs.
+
+    Attributes
+    ----------
+    springs : BoughtSprings
+        As a specification has them.
+    target : VcfmDesign
+        With the rise and the preload that follow from their rate, and the force that is left to it.
+    leaf : LeafStrip
+        One leaf.
+    linear : (float, float)
+        Where the leaves' stiffness is constant [m].
+    half_beams : int
+        Number of leaves.
+    """
+
+    springs: BoughtSprings
+    target: VcfmDesign
+    leaf: LeafStrip
+    linear: tuple[float, float]
+    half_beams: int
+
+    @property
+    def label(self) -> str:
+        """Number and name."""
+        return f"{self.springs.count} x {self.springs.name or 'the spring'}"
+
+    def rank(self, wanted: VcfmDesign) -> tuple[float, float, int]:
+        """Return what springs that fit are sorted by: how far below the limit, length of leaves [m], number."""
+        below = 0.0
+        if wanted.rise is not None:
+            below = 1.0 - self.target.height / wanted.rise
+        elif wanted.preload is not None:
+            below = 1.0 - self.target.preload_stroke / wanted.preload
+        return round(below, 6), float(self.leaf.length), self.springs.count
+
+
+def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
+    """Return the design with leaves around springs of the catalogue, or around those of the mechanism.
+
+    Of springs that fit the one is taken whose rise, or preload, comes nearest to the largest that is allowed; where
+    neither is limited, the one with the shortest leaves.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        With springs that are bought, or a catalogue of them.
+    target : VcfmDesign
+        Its design block.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE where no spring fits: the message has the nearest three and what they miss.
+    """
+    try:
+        check_guide(spec)
+        if target.rise is not None:
+            thickness_for(target)  # what the largest rise does not allow no spring does
+        tried = [_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
+        fitting = sorted(
+            (one for one in tried if isinstance(one, LeavesAroundSprings)), key=lambda one: one.rank(target)
+        )
+        missed = [one for one in tried if isinstance(one, Miss)]
+        for number, one in enumerate(fitting[:TRIED], 1):
+            found = _fitted(spec, target, one) if target.refine else one
+            if isinstance(found, LeavesAroundSprings):
+                others = tuple(partial(_with_next, spec, target, other) for other in fitting[number:TRIED])
+                return replace(_made(spec, target, found), next_best=others)
+            missed.append(found)
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    none = "it lists no spring of the required kind ('mechanism.springs.kind')"
+    told = f"no spring fits: {nearest(missed) if missed else none}"
+    return no_design(
+        finding("no_spring_fits", f"{told} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")
+    )
+
+
+def _with_next(spec: VcfmSpec, target: VcfmDesign, one: LeavesAroundSprings) -> Design:
+    """Return the design around springs that are not the best of the catalogue."""
+    try:
+        found = _fitted(spec, target, one) if target.refine else one
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    if isinstance(found, Miss):
+        return no_design(finding("no_spring_fits", nearest([found])))
+    return _made(spec, target, found)
+
+
+def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
+    """Yield springs in their numbers, with their places in the catalogue; without one those of the mechanism."""
+    from cfmkit.families.vcfm.spec import BoughtSprings
+
+    given = spec.mechanism.springs
+    if not target.catalogue:
+        if given is not None:
+            yield given, None
+        return
+    kinds = (given.kind,) if given is not None else ("compression", "extension")
+    for offer in offers(target.catalogue, *kinds):
+        for count in offer.counts:
+            about = {
+                "kind": offer.kind,
+                "stiffness": offer.rate,
+                "count": count,
+                "initial_tension": offer.initial_tension if offer.kind == "extension" else 0.0,
+                "max_elongation": offer.largest,
+                "free_length": offer.free_length,
+                "outer_diameter": offer.outer_diameter,
+                "name": offer.name,
+                "wound": wire_of(offer),
+                "life": offer.life,
+            }
+            known = {key: value for key, value in about.items() if value is not None}
+            yield BoughtSprings.model_validate(known), offer
+
+
+def _around(
+    spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None
+) -> LeavesAroundSprings | Miss:
+    """Return the leaves around some springs by closed forms, or what the springs miss."""
+    label, law = f"{springs.count} x {springs.name or 'the spring'}", coils(springs)
+    left = target.level - law.tension
+    if left <= 0:
+        return Miss(label, law.tension / target.level, "their initial tension alone is more than the force")
+    rise, preload = left / law.stiffness, (target.adjustment or 0.0) / law.stiffness
+    reachable = 4.0 * rise / 3.0
+    ratios = [
+        (
+            target.stroke / reachable * (1 + 2e-9),
+            f"too stiff, a rise of {mm(rise)} gives less than {mm(reachable)} of stroke",
+        ),
+        *(
+            (value / limit, f"too soft, they need a {name} of {mm(value)} ('design.{name}' {mm(limit)})")
+            for name, value, limit in (("rise", rise, target.rise), ("preload", preload, target.preload))
+            if limit is not None
+        ),
+    ]
+    if springs.free_length is not None and target.spring_room is not None:
+        told = f"too long, {mm(springs.free_length)} relaxed ('design.spring_room' {mm(target.spring_room)})"
+        ratios.append((springs.free_length / target.spring_room, told))
+    worst, told = max(ratios)
+    if worst > 1 + 1e-9:
+        return Miss(label, worst - 1.0, told)
+    own = target.model_copy(update={"force": left, "rise": rise, "preload": preload or None})
+    try:
+        thickness = thickness_for(own)
+        shortest = shortest_leaf(spec, own, thickness)
+    except Infeasible as problem:
+        return Miss(label, 1.0, problem.finding.message)
+    length = max(target.leaf_length or 0.0, shortest)
+    if target.leaf_length is not None and shortest > target.leaf_length * (1 + 1e-9):
+        return Miss(
+            label, shortest / target.leaf_length - 1.0, f"leaves of at least {mm(shortest)} ('design.leaf_length')"
+        )
+    sheet, count = sheet_of(spec.mechanism.part), spec.mechanism.bistable.half_beams
+    if sheet is not None:
+        try:
+            count, leaf = leaf_of_sheet(spec, own, thickness, length, sheet)
+        except Infeasible as problem:
+            return Miss(label, 1.0, problem.finding.message)
+    else:
+        leaf = _wide_enough(spec, own, thickness, length)
+    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count)
+    return _missed(spec, target, found, offer) or found
+
+
+def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: float) -> LeafStrip:
+    """Return a leaf that does not buckle out of the plane: a longer one has to be wider. A stated length stays."""
+    leaf = sized_leaf(spec, own, thickness, length)
+    while leaf.width < SQUAT * leaf.thickness and own.leaf_length is None:
+        length *= 1.02
+        leaf = sized_leaf(spec, own, thickness, length)
+    return leaf
+
+
+def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
+    """Return what springs miss with the leaves around them; None where they fit."""
+    springs, leaf, own = found.springs, found.leaf, found.target
+    most = float(found.linear[1]) + own.preload_stroke
+    limits = (
+        ("deflected by", most, springs.max_elongation, "they allow"),
+        ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
+        ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
+        ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
+    )
+    for words, needed, limit, allowed in limits:
+        if needed is not None and limit is not None and needed > limit * (1 + 1e-9):
+            return Miss(found.label, needed / limit - 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}")
+    if leaf.angle > STEEP * (1 + 1e-9):
+        return Miss(found.label, float(leaf.angle) / STEEP - 1.0, "leaves steeper than 15 deg")
+    if offer is not None and target.spring_life is not None:
+        first = own.preload_stroke if min(spec.analysis.preloads) > 0 else 0.0
+        short = SpringInUse.of(offer, first, most).misses_life(target.spring_life)
+        return None if short is None else Miss(found.label, *short)
+    return None
+
+
+def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
+    """Return the spec with springs and leaves written into its mechanism."""
+    leaf = found.leaf
+    return spec.replace(
+        {
+            "mechanism.positive": None,
+            "mechanism.springs": found.springs.model_dump(exclude_unset=True),
+            "mechanism.bistable.half_beams": found.half_beams,
+            "mechanism.bistable.length": float(leaf.length),
+            "mechanism.bistable.angle": float(leaf.angle),
+            "mechanism.bistable.thickness": float(leaf.thickness),
+            "mechanism.bistable.width": float(leaf.width),
+        }
+    )
+
+
+def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
+    """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
+    from cfmkit.families.vcfm.exact_model import ExactSampler
+
+    allowable, own = spec.mechanism.allowable_stress or 0.0, found.target
+    first, last = found.linear
+    middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
+    places = np.linspace(middle - half, middle + half, 101)
+    worst, sheet = np.inf, sheet_of(spec.mechanism.part)
+    for _ in range(RESCALES if sheet is None else PASSES):
+        made = _written(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
+        back = own.preload_stroke
+        sampler = ExactSampler(made, last, back)
+        if sampler.problem:
+            return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
+        leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
+        wide = float(leaves @ (target.level - spring) / (leaves @ leaves))
+        fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
+        ends = np.linspace(-_rest(sampler, wide, back), last, 201)
+        worst = float(sampler.leaves(ends).stress.max()) / allowable
+        if sheet is not None:
+            if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= NEAR:
+                return _missed(spec, target, found, None) or found
+            count, leaf = next_leaf(found.half_beams, found.leaf, wide, worst, own.height)
+            found = replace(found, leaf=leaf, linear=onset_and_exit(leaf), half_beams=count)
+            continue
+        if worst <= 1.0 + 1e-4:
+            return _missed(spec, target, fitted, None) or fitted
+        if target.leaf_length is not None:
+            break
+        # stress falls with the square of a length
+        longer = sized_leaf(spec, own, found.leaf.thickness, float(found.leaf.length) * sqrt(1.0005 * worst))
+        found = replace(found, leaf=longer, linear=onset_and_exit(longer))
+    return Miss(
+        found.label, worst - 1.0, f"the exact stress of the leaves is {mpa(worst * allowable)} of {mpa(allowable)}"
+    )
+
+
+def _rest(sampler: ExactSampler, wide: float, preload: float) -> float:
+    """Return how far the whole preload pushes the shuttle back with leaves `wide` times as wide [m]."""
+    if not preload:
+        return 0.0
+    back = np.linspace(0.0, preload, 401)
+    force = wide * sampler.leaf_force(-back) + sampler.spring(preload - back)[0]
+    # beyond where they were followed leaves pull still harder
+    pushed = np.flatnonzero(np.nan_to_num(force, nan=-1.0) <= 0)
+    return float(back[pushed[0]]) if len(pushed) else preload
+
+
+def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Design:
+    """Return the design with an analysis that shows what was requested."""
+    own = found.target
+    note = f"{found.label}: the rise of the leaves follows from their rate, {mm(own.height)}"
+    if own.preload_stroke:
+        note += f", the preload for the adjustment is {mm(own.preload_stroke)}"
+    made = completed(
+        _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
+    )
+    active = ("design.catalogue",) if target.catalogue else ("mechanism.springs",)
+    return Design(made, Status.COMPLETE, note, active_bounds=active)

@@ -1,0 +1,256 @@
+"""Leaves and spring as they are drawn, as planar solids: what fillets and the true roots change against beams.
+
+One leaf, or both of a V whose shuttle can turn, and one chain of the spring are solved and counted as those of the
+exact model are: the shuttle is rigid, so that all leaves do the same. Shuttle, walls and blocks are held from their
+faces on; the corners of a diamond bend.
+
+Assumes: plane stress. No contact, no plasticity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import GeometryError, SolutionError
+from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.findings import bracket
+from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
+from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
+from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
+from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
+from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
+from cfmkit.results import Result, Status
+from cfmkit.specs.units import between
+from cfmkit.stock.spec import CutPart
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.outline import SolvedPiece
+    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.results import Finding
+    from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.two_meshes import DrivenPart
+
+GATHERED = 1.5
+"""Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
+
+
+@dataclass(frozen=True, eq=False)
+class SolidPath:
+    """A part that is followed from rest in one direction, asked like a path of beams (`traced.Traced`).
+
+    Attributes
+    ----------
+    solved : MeshSolution
+        The finer mesh, where there are two.
+    """
+
+    solved: MeshSolution
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Zero, the bifurcations and the end [m]."""
+        course = self.solved.course
+        return (0.0, *course.bifurcations, float(course.travel[-1]) if len(course.poses) else 0.0)
+
+    @property
+    def problem(self) -> str:
+        """Why the path ends early; empty if it does not."""
+        return self.solved.course.ended
+
+    @property
+    def buckled_range(self) -> tuple[float, float]:
+        """Where another form than as made is taken, from and to [m]; NaN where none is."""
+        edges = self.edges
+        return (edges[1], edges[2]) if len(edges) > 2 else (np.nan, np.nan)
+
+    @property
+    def stiffness(self) -> float:
+        """At rest [N/m]."""
+        return self.solved.course.poses[0].stiffness
+
+    @cached_property
+    def _stress(self) -> Any:
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(np.abs(self.solved.course.travel), self.solved.peaks[0])
+
+    def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
+        """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
+        x, reached = np.asarray(travel, dtype=float), self.edges[-1]
+        beyond = np.abs(x) > abs(reached) * (1 + 1e-9) + 1e-15
+        inside = np.where(beyond, 0.0, x)
+        poses = self.solved.course.poses
+        before = np.clip(np.searchsorted(np.abs(self.solved.course.travel), np.abs(x)) - 1, 0, len(poses) - 1)
+        stable = np.array([pose.unstable == 0 for pose in poses])[before]
+        first, last = self.buckled_range
+        force = np.where(beyond, np.nan, self.solved.course.effort(inside))
+        stress = np.where(beyond, np.nan, np.maximum(self._stress(np.abs(inside)), 0.0))
+        return force, stress, stable, (np.abs(x) >= abs(first)) & (np.abs(x) <= abs(last))
+
+
+class SolidSampler(ExactSampler):
+    """Samples of leaves and spring as solids, over what an analysis needs.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        What is analysed.
+    end : float
+        How far the shuttle goes [m].
+    back : float
+        How far it is pulled back at most, positive [m].
+    run : Run
+        Its progress is reported.
+    """
+
+    def __init__(self, spec: VcfmSpec, end: float, back: float, run: Run) -> None:
+        """Mesh and follow leaf and spring."""
+        about, preloads, back = spec.mechanism.bistable, spec.analysis.preloads, max(back, 0.02 * end)
+        self.each = about.half_beams * (1.0 if about.guided else 0.5)
+        self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
+        leaf, *spring = elastic_parts(spec)
+        leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
+        self.pushed, self.mesh_error = _path(leaves.fine), leaves.error
+        self.pulled = _pulled(spec, leaf, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
+        self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
+        for one in spring:
+            self.chain = spring_chain(spec)
+            back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
+            springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
+            pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
+            self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
+            self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
+
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
+        found = _poses_at(travel, (self.pushed, self.pulled))
+        if self.coils is None:
+            found &= _poses_at(self.chain.travel * (travel + preload), self.sides)
+        return found
+
+
+def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
+    """Tell at which travels (n,) [m] one of some paths has a pose."""
+    known = np.concatenate([path.solved.course.travel for path in paths])
+    near = 1e-9 * float(np.abs(known).max(initial=0.0))
+    return np.asarray((np.abs(places[:, None] - known) <= near).any(axis=1))
+
+
+def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
+    """Return a piece of the drawing as it is solved."""
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
+
+    mechanism = spec.mechanism
+    about = mechanism.bistable if piece.of_leaf else mechanism.flexures
+    turns = piece.of_leaf and not mechanism.bistable.guided
+    law = LAWS[mechanism.material.law](mechanism.material.modulus, mechanism.material.poisson)
+    across = np.array([[1.0], [0.0], [0.0]]) if piece.glides else np.zeros((3, 0))
+    turning = np.array([[0.0], [0.0], [1.0]]) if turns else np.zeros((3, 0))
+    shuttle = HeldOrDriven(
+        "shuttle", (piece.moved,), piece.moved.mean(axis=0), np.array([0.0, -1.0, 0.0]), turning, _seams(piece.moved)
+    )
+    walls = [
+        HeldOrDriven(
+            f"wall-{number}", (one,), one.mean(axis=0), np.zeros(3), across, _seams(one) if len(one) > 2 else ()
+        )
+        for number, one in enumerate(piece.held, start=1)
+    ]
+    return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
+
+
+def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
+    """Return leaf and, unless it is bought, spring as solved: pushed. Decks and studies of meshes ask for them, too."""
+    from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
+
+    spec = spec.replace({"analysis.fidelity": "solid"})
+    pieces, ends = {"leaf": solved_leaf(spec)}, {"leaf": spec.travel}
+    if spec.mechanism.springs is None:
+        pieces["spring"] = solved_spring(spec)
+        ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
+    own = [place for _, window in spec.windows() for place in between(window, (0.0, spec.travel))]
+    places = {"leaf": own}
+    if spec.mechanism.springs is None:
+        share, preload = spring_chain(spec).travel, spec.analysis.preloads[0]
+        places["spring"] = [share * (preload + place) for place in own]
+    found = []
+    for name, piece in pieces.items():
+        part = part_of(spec, piece)
+        size = spec.analysis.solid.mesh or part.thinnest / ACROSS
+        found.append(DrivenPart(f"vcfm-{name}", part, size, _stops(spec, ends[name], 1, places[name])))
+    return tuple(found)
+
+
+def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the edges of a rigid block, where elements are to meet."""
+    return tuple(np.array([a, b]) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True))
+
+
+def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ()) -> tuple[float, ...]:
+    """Return the travels to solve for, up to an end [m]: of the poses wanted one in `fewer`, and places on the way."""
+    count = max(5, spec.analysis.solid.poses // fewer)
+    shares = np.linspace(0.0, 1.0, count) ** GATHERED
+    more = [place / end for place in places if 0.0 < place / end < 1.0]
+    found = np.unique(np.concatenate([shares, more]))
+    return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
+
+
+def _pulled(spec: VcfmSpec, driven: DrivenPart, end: float, report: Callable[[float], None]) -> SolidPath:
+    """Return a part that is pulled back to a travel [m], on one mesh and with a quarter of the poses."""
+    return _path(driven.part.meshed(driven.size).densely(_stops(spec, end, 4), report))
+
+
+def _path(solved: MeshSolution) -> SolidPath:
+    """Return a path that has a curve; SolutionError where a part has no second pose."""
+    if len(solved.course.poses) < 2:
+        raise SolutionError(solved.course.ended)
+    return SolidPath(solved)
+
+
+def analyze(spec: VcfmSpec, run: Run) -> Result:
+    """Return the curves of a mechanism as drawn, with everything that is wrong with it.
+
+    As `cfmkit.families.vcfm.exact_model.analyze`; NO_EQUILIBRIUM if a part cannot be meshed.
+    """
+    made = parts(spec)
+    rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
+    back = 1.3 * max([-(rest or 0.0) for rest in rests] + [0.0])
+    try:
+        sampler = SolidSampler(spec, spec.travel, back, run)
+    except GeometryError as error:
+        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        return Result(spec, Status.NO_EQUILIBRIUM, message)
+    except SolutionError as error:
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
+    found = result_of(solution := solve(spec, made, sampler))
+    warnings = (*found.warnings, *_findings(spec, sampler))
+    if not found.curves:
+        return replace(found, warnings=warnings)
+    rows = sum(fillets(solution), ())
+    tables = dict(found.tables)
+    tables["fillets"] = partial(fillet_table, rows)
+    return replace(found, values={**found.values, **largest_concentration(rows)}, warnings=warnings, tables=tables)
+
+
+def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
+    if (spec.mechanism.part or CutPart()).fillet == 0:
+        told = "without fillets the stress in inside corners has no value"
+        yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
+    for name, told in sampler.mesh_error.too_large():
+        yield finding(name, told)
+    about = spec.mechanism
+    for part in (about.bistable, about.positive):
+        if part is not None and (told := bracket(part.width, part.thickness, about.material.poisson)):
+            yield finding("wide_beam", told)

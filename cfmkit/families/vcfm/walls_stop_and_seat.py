@@ -1,0 +1,143 @@
+"""Where walls, stop of the travel and seat of the spring stand: what of the leaves' part does not bend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import GeometryError
+from cfmkit.families.findings import mm
+from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
+from cfmkit.families.vcfm.part.spec import StandingFrame, VcfmPart
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class FrameSizes:
+    """Where walls, stop and ground are [m]; the as-made apex of the lowest leaves is the origin.
+
+    Attributes
+    ----------
+    wall, out : float
+        Faces of the right wall at the leaves and outside.
+    wall_top, wall_bottom : float
+        Heights at which the walls end; without a ground for the latter.
+    shuttle, ground : float
+        Thicknesses of the bar across the shuttle's top, and of the ground.
+    under : float
+        Lower face of that bar.
+    stopped : bool
+        Whether there is one.
+    floor : float, optional
+        Upper face of the ground; None without one.
+    ledge : tuple of points
+        Corners of raised seats on the right half of the ground, from the wall on, and its middle.
+    """
+
+    wall: float
+    out: float
+    wall_top: float
+    wall_bottom: float
+    shuttle: float
+    ground: float
+    under: float
+    stopped: bool
+    floor: float | None
+    ledge: tuple[Point, ...] = ()
+
+
+def frame_sizes(spec: VcfmSpec, spring: tuple[float, float, float, float] | None) -> FrameSizes:
+    """Return the sizes of what stands.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+    spring : four floats or None
+        Smallest x and y, largest x and y of the spring as made [m], where it has a seat.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the spring does not fit between the walls, or the shuttle comes to the seat.
+    """
+    frame, about = spec.mechanism.frame, spec.mechanism.bistable
+    given = (spec.mechanism.part or VcfmPart()).frame or StandingFrame()
+    levels, strip = -(-about.half_beams // 2), strip_of(about, spec.mechanism.material)
+    wall, rise = 0.5 * frame.shuttle_width + float(strip.reach), float(strip.rise)
+    thick, block = given.wall or frame.block, frame.block
+    top, bottom = (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
+    wall_top, wall_bottom = (levels - 1) * frame.spacing - rise + block, -rise - block
+    under = top
+    if given.stop is not None:  # the bar stays above the leaves that it moves with
+        under = max(top, wall_top + given.stop)
+        wall_top = under - given.stop
+    floor, ledge = _floor(spec, given, spring, (bottom, wall_bottom, wall))
+    return FrameSizes(
+        wall=wall,
+        out=wall + thick,
+        wall_top=wall_top,
+        wall_bottom=wall_bottom,
+        shuttle=given.shuttle or block,
+        ground=given.ground or block,
+        under=under,
+        stopped=given.stop is not None,
+        floor=floor,
+        ledge=ledge,
+    )
+
+
+def _floor(
+    spec: VcfmSpec,
+    given: StandingFrame,
+    spring: tuple[float, float, float, float] | None,
+    around: tuple[float, float, float],
+) -> tuple[float | None, tuple[Point, ...]]:
+    """Return where the ground is, and the raised seats on it; without a ground nothing."""
+    bottom, wall_bottom, wall = around
+    least = min(bottom - spec.travel - given.clearance, wall_bottom)
+    if given.seat is None or spring is None:
+        return (None, ()) if given.ground is None else (least, ((0.0, least),))
+    _, low, right, high = spring
+    seat = bottom - (high - low - given.seat)
+    about, block = spec.mechanism.flexures, spec.mechanism.frame.block
+    widest = right + (about.length - float(strip_of(about, spec.mechanism.material).reach))  # leaves that lie flat
+    if widest + given.clearance > wall:
+        raise GeometryError(
+            f"the spring does not fit between the walls onto its seat, at ({mm(wall)}, {mm(seat)}): it is "
+            f"{mm(2 * widest)} wide and the walls are {mm(2 * wall)} apart; use longer leaves, or leave out "
+            f"'mechanism.part.frame.seat'"
+        )
+    if about.structure != "straight":
+        if seat > bottom - spec.travel - given.clearance:
+            raise GeometryError(
+                f"the shuttle comes to the seat at (0 mm, {mm(seat)}) within the travel of {mm(spec.travel)}: reduce "
+                f"'mechanism.part.frame.seat' ({mm(given.seat)}) or 'analysis.travel'"
+            )
+        return seat, ((0.0, seat),)
+    # the middle block goes down between the two seats of a straight beam, farther than they are high
+    floor = min(least, seat - given.seat - spec.travel - given.clearance)
+    seats: tuple[Point, ...] = (
+        (right, floor),
+        (right, seat),
+        (right - block, seat),
+        (right - block, floor),
+        (0.0, floor),
+    )
+    return floor, seats
+
+
+def frame_notes(spec: VcfmSpec, sizes: FrameSizes) -> Iterator[str]:
+    """Yield what stop and seat are for."""
+    given = (spec.mechanism.part or VcfmPart()).frame
+    if given is not None and given.stop is not None:
+        yield f"the bar across the shuttle lands on the walls after {mm(given.stop)}"
+    if given is not None and given.seat is not None:
+        yield f"on the ground below the shuttle the spring is preloaded by {mm(given.seat)}"
+        if all(abs(given.seat - one) > 1e-9 for one in spec.analysis.preloads):
+            yield "'analysis.preloads' does not have the preload of the seat"

@@ -1,0 +1,52 @@
+"""What a yield depends on: values that the design chooses and may change for it, and values that a process errs in."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from cfmkit.designing.bounds_and_rounding import around
+from cfmkit.stock.spec import sheet_of
+
+if TYPE_CHECKING:
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+
+def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
+    """Return both widths, and length, angle and thickness of the leaves, within the limits of the design.
+
+    From a sheet the widths stay, and length and thickness of the spring may move.
+
+    Parameters
+    ----------
+    given : VcfmSpec
+        With the `design` block.
+    designed : VcfmSpec
+        What came out.
+    """
+    wanted = given.design
+    if wanted is None:
+        return {}
+    leaf, spring = designed.mechanism.bistable, designed.mechanism.positive
+    longest = None if wanted.max_span is None else wanted.max_span / (2.0 * math.cos(leaf.angle))
+    found = {
+        "mechanism.bistable.width": around(leaf.width, high=wanted.max_width),
+        "mechanism.bistable.thickness": around(leaf.thickness, low=wanted.min_thickness),
+        "mechanism.bistable.angle": around(leaf.angle),
+    }
+    if spring is not None:
+        found["mechanism.positive.width"] = around(spring.width, high=wanted.max_width)
+    if wanted.leaf_length is None:
+        found["mechanism.bistable.length"] = around(leaf.length, high=longest)
+    if sheet_of(designed.mechanism.part) is not None:  # widths are those of the sheet
+        found = {path: ends for path, ends in found.items() if not path.endswith(".width")}
+        if spring is not None:
+            found["mechanism.positive.length"] = around(spring.length)
+            found["mechanism.positive.thickness"] = around(spring.thickness, low=wanted.min_thickness)
+    return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
+
+
+def errors(spec: VcfmSpec) -> dict[str, str]:
+    """Return which values a process errs in: the thicknesses of both kinds of leaves; bought springs have none."""
+    made = ("positive", "bistable") if spec.mechanism.springs is None else ("bistable",)
+    return {f"mechanism.{one}.thickness": "thickness" for one in made}

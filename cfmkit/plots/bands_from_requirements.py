@@ -1,0 +1,172 @@
+"""Requirements that bound the force, as bands of force over a window.
+
+A requirement on the ripple says how wide the force may spread below its largest
+value, one on a deviation how far it may be from its mean or target: each is a band
+once the branch that it is judged on is known. Without a branch in its name that is
+the worst one, as in the metrics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
+from cfmkit.metrics.cycles import cycle
+from cfmkit.plots.stacked_line_diagrams import Limit
+from cfmkit.plots.text import value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.metrics import Outcome
+    from cfmkit.metrics.branch_views import Branch
+    from cfmkit.metrics.spread import Spread
+    from cfmkit.results import Result
+
+Bounds = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where a force or torque must be, in SI.
+
+    Attributes
+    ----------
+    low, high : float or None
+        Bounds of the effort [N or N m]; None where there is none.
+    start, stop : float
+        Window of the motion [m or rad].
+    text : str
+        What the requirement says and what the curve does.
+    met : bool
+        Whether the curve keeps it.
+    """
+
+    low: float | None
+    high: float | None
+    start: float
+    stop: float
+    text: str
+    met: bool
+
+
+def bands_of(result: Result) -> tuple[Band, ...]:
+    """Return the bands of every requirement on the force or torque of the nominal curve."""
+    if not result.curves:
+        return ()
+    kind = result.curves[0].kind
+    wanted = [item for item in result.spec.requirements if _plain(item.metric, kind) in _KINDS]
+    found = (_band(outcome, result) for outcome in check(wanted, result))
+    return tuple(band for band in found if band is not None)
+
+
+def limits_on(result: Result, metric: str) -> tuple[Limit, ...]:
+    """Return what the requirements allow of one of the family's values, as lines for a diagram of it."""
+    wanted = [item for item in result.spec.requirements if item.metric == metric]
+    found = []
+    for outcome in check(wanted, result):
+        for bound, sign in ((outcome.min, "≥"), (outcome.max, "≤")):
+            if bound is not None:
+                text = f"required {sign} {value_text(bound, outcome.dimension)}"
+                found.append(Limit(bound, text, trouble=not outcome.ok))
+    return tuple(found)
+
+
+def _plain(metric: str, kind: str) -> str:
+    """Return ``ripple`` for ``force_ripple[load]``."""
+    return split_name(metric)[0].removeprefix(f"{kind}_")
+
+
+def _band(outcome: Outcome, result: Result) -> Band | None:
+    metric, branch = split_name(outcome.metric)
+    metric = _plain(metric, outcome.kind)
+    window = Window(*outcome.over) if outcome.over else None
+    subjects = cycle(result.curves[0], frame_of(result), window).branches
+    chosen = [item for item in subjects if branch in (None, item.name)]
+    if not chosen:
+        return None
+    rule = _RULES.get(metric)
+    worst = None
+    if metric in ("min", "max"):
+        bounds: Bounds | None = outcome.min, outcome.max
+    elif outcome.max is None:
+        return None
+    elif rule is None:
+        bounds = _about(result.target, outcome.max)
+    else:
+        bounds, worst = _worst(chosen, rule, outcome.max)
+    if bounds is None:
+        return None
+    which = f" ({worst})" if worst and len(subjects) > 1 else ""
+    start, stop = chosen[0].ends
+    return Band(*bounds, start, stop, _sentence(outcome, _KINDS[metric].format(outcome.kind) + which), outcome.ok)
+
+
+def _ripple(spread: Spread, limit: float) -> tuple[float, float, float]:
+    return (1.0 - limit) * spread.max, spread.max, (spread.max - spread.min) / spread.max
+
+
+def _half_band(spread: Spread, limit: float) -> tuple[float, float, float]:
+    middle = 0.5 * (spread.max + spread.min)
+    return (1.0 - limit) * middle, (1.0 + limit) * middle, (spread.max - spread.min) / spread.max
+
+
+def _about_mean(spread: Spread, limit: float) -> tuple[float, float, float]:
+    away = max(spread.max - spread.mean, spread.mean - spread.min) / spread.mean
+    return (1.0 - limit) * spread.mean, (1.0 + limit) * spread.mean, away
+
+
+_KINDS = {
+    "min": "smallest {}",
+    "max": "largest {}",
+    "ripple": "ripple",
+    "half_band": "half band",
+    "deviation_from_mean": "deviation from mean",
+    "deviation_from_target": "deviation from target",
+}
+"""Metrics that are bands, and what they are called on a picture."""
+
+_RULES = {"ripple": _ripple, "half_band": _half_band, "deviation_from_mean": _about_mean}
+"""Bounds of the band, and what ranks the branches."""
+
+
+def _worst(
+    subjects: list[Branch], rule: Callable[[Spread, float], tuple[float, float, float]], limit: float
+) -> tuple[Bounds | None, str]:
+    """Return the band of the branch that needs most of it, and that branch's name."""
+    found = []
+    for branch in subjects:
+        try:
+            spread = branch.spread
+        except Undefined:
+            continue
+        if spread.max > 0:
+            low, high, need = rule(spread, limit)
+            found.append((need, sorted((spread.sign * low, spread.sign * high)), branch.name))
+    if not found:
+        return None, ""
+    _, (low, high), name = max(found, key=lambda item: item[0])
+    return (low, high), name
+
+
+def _about(target: float | None, limit: float) -> Bounds | None:
+    """Return the band about the target; it is there even where the curve does not reach."""
+    if not target:
+        return None
+    low, high = sorted((target * (1.0 - limit), target * (1.0 + limit)))
+    return low, high
+
+
+def _sentence(outcome: Outcome, name: str) -> str:
+    """Return ``ripple (load) 3.1 % ≤ 5 %``, or that it is missed."""
+    low, high = (
+        None if bound is None else value_text(bound, outcome.dimension) for bound in (outcome.min, outcome.max)
+    )
+    allowed = f"{low} … {high}" if low and high else f"≤ {high}" if high else f"≥ {low}"
+    if outcome.value is None:
+        return f"{name} {allowed}: no value"
+    value = value_text(outcome.value, outcome.dimension)
+    if low and high:
+        allowed = f"within {allowed}"
+    return f"{name} {value} {allowed}" if outcome.ok else f"{name} {value}, allowed {allowed}: missed"

@@ -1,0 +1,116 @@
+"""The picture of every constant-force mechanism: its curve, and the band it should keep, enlarged.
+
+Where the whole curve, drawn from zero, leaves the ripple too small to be seen, the
+picture has two panels: the whole above, the requirement bands below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.metrics.evaluation import window_of
+from cfmkit.plots.bands_from_requirements import bands_of
+from cfmkit.plots.curves import CurveLook, plot_curve
+from cfmkit.plots.style import GREY, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, finite_range, write_heading
+from cfmkit.specs.units import to_border
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import Curve
+    from cfmkit.results import Result
+
+Interval = tuple[float, float]
+
+ENLARGE_BELOW = 0.45
+"""The band gets a panel of its own if it takes less than this fraction of the whole picture's height: above it the
+panel would enlarge it to little more than twice."""
+
+LEAST = 0.002
+"""The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""
+
+
+@styled
+def loop_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
+    """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat.
+
+    Parameters
+    ----------
+    result : Result
+        With at least one curve.
+    look : CurveLook, optional
+        Levels and regions to draw as well.
+    subject : str
+        For the heading; default: what is drawn over what.
+    """
+    look = look or CurveLook()
+    curve = result.curve
+    figure = new_figure()
+    heading = Heading.of(result, subject or f"{curve.kind} over {curve.motion_name}")
+    write_heading(figure, heading)
+    room = 86.5 - heading.height_mm
+    detail = enlarged(result, look)
+    if detail is None:
+        plot_curve(result, axes_mm(figure, (17, 12, 138, room)), look)
+        return figure
+    upper = axes_mm(figure, (17, 63, 138, room - 51.0))
+    lower = axes_mm(figure, (17, 12, 138, 46))
+    plot_curve(result, upper, replace(look, bands=False, names=False, arrows=False))
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
+    _frame_of_detail(upper, curve, detail)
+    plot_curve(result, lower, replace(look, window=(_across(upper, curve), detail[1])))
+    return figure
+
+
+def _across(upper: Axes, curve: Curve) -> Interval:
+    """Return the motion that the upper panel shows, in SI."""
+    from cfmkit.specs.units import from_border
+
+    low, high = upper.get_xlim()
+    return float(from_border(low, curve.motion_dimension)), float(from_border(high, curve.motion_dimension))
+
+
+def enlarged(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
+    """Return motion and effort [SI] that deserve a panel of their own; None if the whole shows them well."""
+    curve = result.curve
+    bands = bands_of(result)
+    spans = [(band.start, band.stop) for band in bands] or [_window(result)]
+    efforts = [curve.effort[(curve.motion >= start) & (curve.motion <= stop)] for start, stop in spans]
+    bounds = [value for band in bands for value in (band.low, band.high) if value is not None]
+    levels = [level.value for level in look.levels]
+    if finite_range(np.concatenate(efforts)) is None:
+        return None
+    inside = finite_range(np.concatenate([*efforts, bounds, levels]))
+    whole = finite_range(np.concatenate([curve.effort, [0.0], bounds, levels]))
+    if inside is None or whole is None or inside[1] - inside[0] >= ENLARGE_BELOW * (whole[1] - whole[0]):
+        return None
+    motion = min(start for start, _ in spans), max(stop for _, stop in spans)
+    middle, half = 0.5 * (inside[0] + inside[1]), 0.65 * (inside[1] - inside[0])
+    half = max(half, LEAST * max(abs(inside[0]), abs(inside[1])))
+    return motion, (middle - half, middle + half)
+
+
+def _window(result: Result) -> Interval:
+    """Return the motion to look at where no requirement names one."""
+    window = window_of(result)
+    if window is not None:
+        return window.lo, window.hi
+    if result.valid:
+        return result.valid[0]
+    return float(result.curve.motion.min()), float(result.curve.motion.max())
+
+
+def _frame_of_detail(ax: Axes, curve: Curve, detail: tuple[Interval, Interval]) -> None:
+    """Draw the frame of what the lower panel enlarges."""
+    low, high = (float(to_border(value, curve.kind)) for value in detail[1])
+    ax.axhspan(low, high, facecolor="none", edgecolor=GREY, linewidth=0.5, zorder=1, gid="no-obstacle")
+    ax.annotate(
+        "enlarged below", (0.995, low), xycoords=("axes fraction", "data"), xytext=(0, -2),
+        textcoords="offset points", ha="right", va="top", color=GREY, size=6.5,
+    )  # fmt: skip

@@ -1,0 +1,91 @@
+"""Which names a run may write to inside its folder."""
+
+from __future__ import annotations
+
+import os
+import stat
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import OutputError
+from cfmkit.store.content_hashes_and_versions import file_hash
+from cfmkit.store.disk import shown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MANIFEST = "manifest.json"
+RESERVED = ".cfmkit"
+JOURNAL = ".cfmkit-journal.jsonl"
+"""What a long run notes as it goes; unlike its other files it is there before the run ends, and stays."""
+CURE = "move it away or give another output folder (--out)"
+
+
+def checked_name(name: str) -> str:
+    """Return `name` if it is a plain path below the folder: ``figures/loop.png``.
+
+    Raises
+    ------
+    cfmkit.errors.OutputError
+        If it is absolute, leads upwards, holds control characters or backslashes, or is
+        one of the names that the folder keeps for itself.
+    """
+    if problem := _problem(name):
+        raise OutputError(f"{name!a} is not a name for a file in the output folder: {problem}")
+    return name
+
+
+def _problem(name: str) -> str | None:
+    parts = name.split("/")
+    if name.startswith("/"):
+        return "it is absolute"
+    if any(part in ("", ".", "..") for part in parts):
+        return "it has an empty part, '.' or '..'"
+    if "\\" in name or any(ord(char) < 32 or ord(char) == 127 for char in name):
+        return "it holds a backslash or a control character"
+    if name.lower() == MANIFEST or any(part.lower().startswith(RESERVED) for part in parts):
+        return "the folder keeps it for itself"
+    return None
+
+
+def refuse_in_the_way(root: Path, name: str, *, ours: bool) -> None:
+    """Raise if something other than a file of an earlier run stands where `name` is to go.
+
+    A link on the way counts as in the way: what is behind it may lie outside the folder.
+    """
+    *above, _ = name.split("/")
+    place = root
+    for part in above:
+        place = place / part
+        mode = mode_of(place)
+        if mode is not None and not stat.S_ISDIR(mode):
+            raise OutputError(f"{shown(place)} is in the way: it is {_what(mode)}, not a folder; {CURE}")
+    mode = mode_of(root / name)
+    if mode is None or (ours and stat.S_ISREG(mode)):
+        return
+    raise OutputError(f"{shown(root / name)} is in the way: it is {_what(mode)} that no earlier run wrote; {CURE}")
+
+
+def hash_in(root: Path, name: str) -> str | None:
+    """Return the SHA-256 of an ordinary file in the folder; None if there is none, or only through a link."""
+    place = root
+    for part in name.split("/")[:-1]:
+        place = place / part
+        if place.is_symlink():
+            return None
+    return file_hash(root / name)
+
+
+def mode_of(path: Path) -> int | None:
+    """Return the mode of what is at `path` itself, None if there is nothing."""
+    try:
+        return os.lstat(path).st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _what(mode: int) -> str:
+    if stat.S_ISLNK(mode):
+        return "a link"
+    if stat.S_ISDIR(mode):
+        return "a folder"
+    return "a file" if stat.S_ISREG(mode) else "a special file"

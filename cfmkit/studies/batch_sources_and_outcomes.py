@@ -1,0 +1,438 @@
+"""Many specifications at once: which files, where each writes, what became of them as tables, what is kept.
+
+What a batch knows of specifications that it finished before. An end is kept by content: the text of the specification
+and what it is called, the options, cfmkit's own files and the versions of its libraries. It is believed as long as
+the data files that the specification names and all files of the run are as they were; who changes or deletes one gets
+the run anew.
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode, OutputError, UsageError
+from cfmkit.families import origins
+from cfmkit.results import Status
+from cfmkit.store import Manifest, file_hash, origin, stable_hash
+from cfmkit.store.allowed_file_names import MANIFEST
+from cfmkit.store.lock import LOCK
+from cfmkit.store.transaction import RUN
+from cfmkit.studies.row_blocks_for_journal import WARNINGS_JOINT
+from cfmkit.tables import Table, TableColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from cfmkit.designing.run_many_starts import Notes
+
+
+OUTPUTS = "cfm-out"
+"""Folders of this name hold results: a search for specifications does not look into them."""
+
+ENDINGS = (".yaml", ".yml")
+TAKEN = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html", "changes.csv")
+"""Names in the output folder that no specification's folder may have."""
+
+SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What became of one specification.
+
+    Attributes
+    ----------
+    spec : str
+        The file, as it was named or found.
+    folder : str
+        Where its files are, below the output folder.
+    verb : str
+        ``design`` or ``analyze``; empty if it came to neither.
+    family, name : str
+        As the specification says.
+    status : str
+        As in metrics.json; ``skipped`` if it was not run.
+    code : ExitCode
+        What a run of it alone would have returned.
+    message : str
+        What is wrong, in one line; empty if nothing is.
+    requirements, warnings : tuple of mapping
+        As in metrics.json.
+    errors : tuple of str
+        Every fault, with its place in the file.
+    seconds : float
+        How long it took.
+    bug : str
+        The traceback, if a bug ended it.
+    data : tuple of (str, str)
+        The data files that the specification names, and the hashes of their content.
+    written, reused : bool
+        Whether its folder holds its run, and whether that was done by an earlier batch.
+    """
+
+    spec: str
+    folder: str
+    verb: str = ""
+    family: str = ""
+    name: str = ""
+    status: str = SKIPPED
+    code: ExitCode = ExitCode.OK
+    message: str = ""
+    requirements: tuple[Mapping[str, Any], ...] = ()
+    warnings: tuple[Mapping[str, Any], ...] = ()
+    errors: tuple[str, ...] = ()
+    seconds: float = field(default=0.0, compare=False)
+    bug: str = field(default="", compare=False)
+    data: tuple[tuple[str, str | None], ...] = field(default=(), compare=False)
+    written: bool = field(default=False, compare=False)
+    reused: bool = field(default=False, compare=False)
+
+    @property
+    def skipped(self) -> bool:
+        """Whether it was not run."""
+        return self.status == SKIPPED
+
+    @property
+    def missed(self) -> tuple[Mapping[str, Any], ...]:
+        """The requirements that are not met."""
+        return tuple(one for one in self.requirements if not one["ok"])
+
+    @property
+    def warned(self) -> str | None:
+        """The names of the warnings, as tables say them."""
+        return WARNINGS_JOINT.join(sorted({one["name"] for one in self.warnings})) or None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its part of metrics.json: nothing that differs from run to run."""
+        return {
+            "spec": self.spec,
+            "folder": self.folder,
+            "verb": self.verb or None,
+            "family": self.family or None,
+            "name": self.name or None,
+            "status": self.status,
+            "exit_code": int(self.code),
+            "message": self.message,
+            "requirements": list(self.requirements),
+            "warnings": list(self.warnings),
+            "errors": list(self.errors),
+        }
+
+
+def sources(named: Iterable[str], out: str) -> tuple[str, ...]:
+    """Return the files that names stand for: files, folders and patterns, each file once, in order.
+
+    Parameters
+    ----------
+    named : iterable of str
+        A folder stands for all YAML files in it and below; ``*``, ``?``, ``[...]`` and
+        ``**`` are patterns unless there is a file of that very name.
+    out : str
+        The output folder, which is not searched.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If a name stands for no file.
+    """
+    found: dict[str, str] = {}
+    for name in named:
+        for path in _matches(name, out):
+            found.setdefault(os.path.realpath(path), path)
+    return tuple(found.values())
+
+
+def _matches(name: str, out: str) -> list[str]:
+    if not name or name == "-" or "\0" in name:
+        raise UsageError(
+            f"{name!r} is not a file: a batch reads files, folders and patterns such as 'configs/**/*.yaml'"
+        )
+    if os.path.isdir(name):
+        return files_below(name, out)
+    if os.path.exists(name):
+        return [name]
+    if not glob.has_magic(name):
+        raise UsageError(f"{name}: there is no such file")
+    found = _search(name, out)
+    if not found:
+        raise UsageError(f"{name}: no file matches this pattern")
+    return found
+
+
+def files_below(folder: str, out: str = OUTPUTS) -> list[str]:
+    """Return the YAML files in a folder and below, those in folders of results left out.
+
+    Parameters
+    ----------
+    folder : str
+        Where to look.
+    out : str
+        An output folder, which is not searched.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is none.
+    """
+    found = [os.path.join(folder, one) for one in _search("**/*", out, folder) if one.lower().endswith(ENDINGS)]
+    if not found:
+        raise UsageError(f"{folder}: there is no YAML file in this folder or below")
+    return found
+
+
+def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
+    """Return the files that match a pattern, but those that a run wrote."""
+    inside = os.path.realpath(out) + os.sep
+    found = []
+    for path in sorted(glob.glob(pattern, root_dir=root, recursive=True)):
+        whole = os.path.join(root, path) if root else path
+        ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
+        if os.path.isfile(whole) and not ours and not is_figure(whole):
+            found.append(path)
+    return found
+
+
+def is_figure(path: str) -> bool:
+    """Return whether a YAML file says how a figure is composed: a search for specifications passes it by."""
+    if not path.lower().endswith(ENDINGS):
+        return False
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            return any(line.startswith("panels:") for line in file.read(LONGEST_HEAD).splitlines())
+    except OSError:
+        return False
+
+
+LONGEST_HEAD = 4000
+"""Letters of a file in which the key `panels` is looked for; no comment at the top of a file is as long."""
+
+
+def folders(files: Sequence[str]) -> tuple[str, ...]:
+    """Return a name for the output folder of each file: its stem, with folders in front where stems are equal.
+
+    Examples
+    --------
+    >>> folders(["cam.yaml", "a/beam.yaml", "b/beam.yaml"])
+    ('cam', 'a-beam', 'b-beam')
+    """
+    paths = [Path(os.path.abspath(file)).with_suffix("") for file in files]
+    depths = dict.fromkeys(paths, 1)
+    while twice := _repeated(depths):
+        depths |= {path: depths[path] + 1 for path in twice}
+    return tuple(_distinct(_tail(path, depths[path]) for path in paths))
+
+
+def _tail(path: Path, depth: int) -> str:
+    return "-".join(path.parts[1:][-depth:]) or "spec"
+
+
+def _repeated(depths: Mapping[Path, int]) -> list[Path]:
+    """Return different paths whose tails are the same, capitals apart, and could be longer."""
+    counts = Counter(_tail(path, depth).lower() for path, depth in depths.items())
+    return [
+        path for path, depth in depths.items() if counts[_tail(path, depth).lower()] > 1 and depth < len(path.parts)
+    ]
+
+
+def _distinct(names: Iterable[str]) -> Iterator[str]:
+    taken = set(TAKEN)
+    for name in names:
+        plain = "".join(char if char.isprintable() and char not in '\\/:*?"<>|' else "_" for char in name)
+        plain = plain if plain.strip(". ") and not plain.lower().startswith(".cfmkit") else f"spec{plain}"
+        free, count = plain, 1
+        while free.lower() in taken:
+            count += 1
+            free = f"{plain}-{count}"
+        taken.add(free.lower())
+        yield free
+
+
+def results_table(entries: Sequence[Entry]) -> Table:
+    """Return results.csv: one row per specification."""
+    return Table(
+        (
+            TableColumn("spec", tuple(one.spec for one in entries)),
+            TableColumn("folder", tuple(one.folder for one in entries)),
+            TableColumn("verb", tuple(one.verb for one in entries)),
+            TableColumn("family", tuple(one.family for one in entries)),
+            TableColumn("name", tuple(one.name for one in entries)),
+            TableColumn("status", tuple(one.status for one in entries)),
+            TableColumn("exit_code", tuple(None if one.skipped else int(one.code) for one in entries)),
+            TableColumn("requirements", tuple(len(one.requirements) for one in entries)),
+            TableColumn("missed", tuple(len(one.missed) for one in entries)),
+            TableColumn("warnings", tuple(one.warned for one in entries)),
+            TableColumn("message", tuple(one.message for one in entries)),
+        )
+    )
+
+
+def requirements_table(entries: Sequence[Entry]) -> Table:
+    """Return requirements.csv: one row per requirement."""
+    rows = [(entry, one) for entry in entries for one in entry.requirements]
+
+    def column(key: str) -> TableColumn:
+        return TableColumn(key, tuple(one[key] for _, one in rows))
+
+    over = [one["over"] or (None, None) for _, one in rows]
+    return Table(
+        (
+            TableColumn("spec", tuple(entry.spec for entry, _ in rows)),
+            column("metric"),
+            *(column(key) for key in ("value", "min", "max", "unit")),
+            TableColumn("over_from", tuple(ends[0] for ends in over)),
+            TableColumn("over_to", tuple(ends[1] for ends in over)),
+            column("over_unit"),
+            column("ok"),
+        )
+    )
+
+
+def message(entries: Sequence[Entry]) -> str:
+    """Return how the specifications ended, in one line.
+
+    Examples
+    --------
+    >>> message([Entry("a.yaml", "a", status="complete"), Entry("b.yaml", "b")])
+    '2 specs: 1 ok, 1 skipped'
+    """
+    counts = Counter(outcome(one) for one in entries)
+    told = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), TIMED_OUT, SKIPPED) if counts[word])
+    return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {told}"
+
+
+OUTCOMES = {
+    ExitCode.OK: "ok",
+    ExitCode.REQUIREMENT_MISSED: "missed",
+    ExitCode.PARTIAL: "partial",
+    ExitCode.NO_SOLUTION: "no solution",
+    ExitCode.INVALID: "invalid",
+    ExitCode.USAGE: "unreadable",
+    ExitCode.IO: "not written",
+    ExitCode.IN_USE: "folder in use",
+    ExitCode.BUG: "bug",
+}
+"""What an exit code is called in a summary."""
+
+TIMED_OUT = "timed out"
+
+
+def outcome(one: Entry) -> str:
+    """Return in a word how a specification ended."""
+    if one.status == Status.TIMEOUT.key:
+        return TIMED_OUT
+    return SKIPPED if one.skipped else OUTCOMES.get(one.code, "failed")
+
+
+RECORDS = 1
+"""How records are written: those of another number are not found."""
+
+LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numba", "numpy", "pint", "pydantic", "scipy", "shapely")
+"""Those that can change a file of a run."""
+
+KEPT = (ExitCode.OK, ExitCode.INVALID, ExitCode.NO_SOLUTION, ExitCode.PARTIAL, ExitCode.REQUIREMENT_MISSED)
+"""Ends that would be the same tomorrow; a full disk, a folder in use, a time-out or a bug may not."""
+
+
+class KeptRuns:
+    """The runs that a batch has finished, in its journal.
+
+    Parameters
+    ----------
+    out : str
+        The batch's output folder.
+    options : list
+        Everything on the command line that decides what a run finds and writes.
+    notes : Notes
+        The journal.
+    """
+
+    def __init__(self, out: str, options: list[Any], notes: Notes) -> None:
+        """Nothing is read yet."""
+        self._out, self._notes = out, notes
+        self._about = stable_hash([RECORDS, options, origin(LIBRARIES), origins()])
+        self._asked: dict[str, str | None] = {}
+
+    def recall(self, spec: str, folder: str) -> Entry | None:
+        """Return how a specification ended, if it is known and everything is as it was.
+
+        One that was not valid comes back without a verb: whether it still is not must be asked again, since a
+        file that it names may be there now.
+        """
+        key = self._asked[folder] = self._key(spec, folder)
+        place = -1 if key is None else self._notes.find(key)
+        if key is None or place < 0:
+            return None
+        told = self._notes.read(place, key)
+        entry = _entry(told["entry"])
+        if not entry.verb:
+            return entry
+        data_there = all(_hash_beside(spec, name) == digest for name, digest in told["data"])
+        if not data_there or not self._untouched(folder, told["manifest"]):
+            return None
+        # pages link to its folder, and comparisons read it, as if it had been written now
+        return replace(entry, written=told["manifest"] is not None)
+
+    def keep(self, entry: Entry) -> None:
+        """Note how a specification ended, unless that may be different tomorrow."""
+        key = self._asked.get(entry.folder)
+        if key is None or entry.code not in KEPT or entry.status == Status.TIMEOUT.key:
+            return
+        # The file may have been saved while it was computed; what was found is then of neither text.
+        if self._key(entry.spec, entry.folder) != key:
+            return
+        manifest = file_hash(Path(self._out, entry.folder, MANIFEST)) if entry.written else None
+        self._notes.add(key, {"entry": entry.as_json(), "data": list(entry.data), "manifest": manifest})
+
+    def _key(self, spec: str, folder: str) -> str | None:
+        """Return the name of a run by content; None where the specification cannot be read."""
+        try:
+            text = Path(spec).read_bytes()
+        except (OSError, ValueError):
+            return None
+        head = f"{self._about}\0{spec}\0{folder}\0".encode("utf-8", "surrogateescape")
+        return hashlib.sha256(head + text).hexdigest()[:32]
+
+    def _untouched(self, folder: str, manifest: str | None) -> bool:
+        """Return whether a run's folder holds what that run wrote, and nobody is at work there."""
+        place = Path(self._out, folder)
+        if manifest is None:
+            return True
+        if os.path.lexists(place / RUN) or os.path.lexists(place / LOCK) or file_hash(place / MANIFEST) != manifest:
+            return False
+        try:
+            found = Manifest.read(place)
+            return found is not None and not found.mismatches(place)
+        except (OSError, OutputError):
+            return False
+
+
+def _hash_beside(spec: str, name: str) -> str | None:
+    """Return the hash of a data file that a specification names."""
+    path = Path(os.path.realpath(Path(spec).absolute().parent / name))
+    try:
+        return file_hash(path)
+    except OSError:
+        return None
+
+
+def _entry(told: dict[str, Any]) -> Entry:
+    return Entry(
+        told["spec"],
+        told["folder"],
+        told["verb"] or "",
+        told["family"] or "",
+        told["name"] or "",
+        told["status"],
+        ExitCode(told["exit_code"]),
+        told["message"],
+        tuple(told["requirements"]),
+        tuple(told["warnings"]),
+        tuple(told["errors"]),
+        reused=True,
+    )

@@ -1,0 +1,263 @@
+"""The computation of a study at each of its points, and the record of it.
+
+A `Study` holds everything that decides the result of a point but the varied values.
+Whatever goes wrong at a point becomes a row with a status and without values: an
+invalid value, a mechanism that cannot exist, a design that fails, a solver that gives
+up. An exception that cfmkit does not raise on purpose is a bug; it costs its own
+point only (status ``crashed``), and the row keeps the traceback.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import traceback
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import CfmError, SpecError
+from cfmkit.families import family
+from cfmkit.families import origin as family_origin
+from cfmkit.families.base import Run
+from cfmkit.metrics import check, evaluate, gaps, other_name, split_name, values_of_family, window_of, windows_judged
+from cfmkit.results import Result, Status
+from cfmkit.specs.data_file_paths import named_in
+from cfmkit.specs.units import to_border
+from cfmkit.store import file_hash, origin, stable_hash
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.metrics.evaluation import Surveys
+    from cfmkit.results import Quantity
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.units import Ends
+
+NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
+"""Parts of a specification that change no result of a point."""
+
+RECORDS = 4
+"""How records of the journal are written: those of another number are computed again."""
+
+_STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A column of results.
+
+    Attributes
+    ----------
+    name : str
+        With ``[branch]`` where wanted.
+    dimension : str
+        Of `cfmkit.specs.units`.
+    definition : str
+        What it is.
+    over : tuple of WindowEnd, optional
+        Where it is measured: places [m or rad], or shares of the travel; default: the window of the analysis.
+    words : tuple of str
+        Those that a metric of the dimension ``text`` is an index into.
+    label : str
+        Heads the column; default: the name, ``force_mean_load`` for ``force_mean[load]``.
+    """
+
+    name: str
+    dimension: str
+    definition: str = ""
+    over: Ends | None = None
+    label: str = ""
+    words: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Fall back to the name."""
+        if not self.label:
+            object.__setattr__(self, "label", self.name.replace("[", "_").replace("]", ""))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one point.
+
+    Attributes
+    ----------
+    status : Status
+        How its analysis ended.
+    values : tuple of float or None
+        One for each metric of the study [SI]; all None where nothing was solved.
+    met : tuple of bool
+        One for each requirement; empty where nothing was solved.
+    message : str
+        What went wrong; empty for a complete point.
+    curve : bytes
+        The point's curves as CSV, if the study keeps them.
+    bug : str
+        The traceback, if a bug ended it.
+    warnings : tuple of str
+        Names of what the user must know, sorted.
+    """
+
+    status: Status
+    values: tuple[float | None, ...] = ()
+    met: tuple[bool, ...] = ()
+    message: str = ""
+    curve: bytes = b""
+    bug: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that decides the row of a point, but the varied values.
+
+    Attributes
+    ----------
+    spec : Spec
+        What is varied.
+    paths : tuple of str
+        What varies, in order.
+    metrics : tuple of Metric
+        What is noted.
+    design : bool
+        Whether the mechanism is designed anew at each point.
+    curves : bool
+        Whether curves are kept.
+    seed : int
+        Of everything random inside an analysis.
+    lean : bool
+        Whether metrics and requirements alone are looked at: models then leave out what those do not need.
+    """
+
+    spec: Spec
+    paths: tuple[str, ...]
+    metrics: tuple[Metric, ...]
+    design: bool = False
+    curves: bool = False
+    seed: int = 0
+    lean: bool = False
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the metrics."""
+        return tuple(item.name for item in self.metrics)
+
+    @cached_property
+    def wanted(self) -> frozenset[str] | None:
+        """Plain names of all that is looked at, by the name of either kind of curve; None: everything is."""
+        if not self.lean:
+            return None
+        names = {split_name(one)[0] for one in (*self.names, *(one.metric for one in self.spec.part_requirements))}
+        return frozenset({*names, *map(other_name, names)})
+
+    def told(self, column: int, value: float) -> float | str | None:
+        """Return a metric's value as files say it: in the border unit, or a word; None where there is none."""
+        one = self.metrics[column]
+        if not isfinite(value):
+            return None
+        return one.words[int(value)] if one.words else float(to_border(value, one.dimension))
+
+    @cached_property
+    def identity(self) -> bytes:
+        """The hash of everything that decides a row, but the varied values.
+
+        Of data files the content counts, and so does that of cfmkit: its version does not change with each commit.
+        """
+        spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
+        noted = [(one.name, one.over) for one in self.metrics]
+        data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
+        computing = [origin(), family_origin(self.spec.family)]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.lean, computing, data]
+        return bytes.fromhex(stable_hash([spec, *about]))
+
+    def key(self, values: Sequence[Any]) -> str:
+        """Return the name of a point by content: the same for the same study and the same values."""
+        text = repr([(type(value).__name__, value) for value in values])
+        return hashlib.sha256(self.identity + text.encode()).hexdigest()[:32]
+
+    def variant(self, values: Sequence[Any]) -> Spec:
+        """Return the specification of one point.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If it is not valid.
+        """
+        return self.spec.replace(dict(zip(self.paths, values, strict=True)))
+
+    def evaluate(self, values: Sequence[Any]) -> Row:
+        """Return what becomes of one point; nothing is raised but what ends the process."""
+        try:
+            return self.row(self.solve(self.variant(values)))
+        except CfmError as error:
+            if _STATUS_OF.get(error.exit_code) is Status.CRASHED:
+                return _bug(error)
+            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_told(error))
+        except Exception as error:
+            return _bug(error)
+
+    def solve(self, spec: Spec) -> Result:
+        """Return the result of a variant, designed first if the study says so, with the warnings of both."""
+        record, run = family(spec.family), Run(self.seed, wanted=self.wanted)
+        if not self.design or record.design is None:
+            return windows_judged(record.analyze(spec, run))
+        design = record.design(spec, run)
+        if design.spec is None:
+            return Result(spec, design.status, design.explanation, warnings=design.warnings)
+        result = windows_judged(record.analyze(design.spec, run))
+        return replace(result, warnings=(*design.warnings, *result.warnings))
+
+    def row(self, result: Result) -> Row:
+        """Return what is noted about a result."""
+        warnings = tuple(sorted({item.name for item in result.warnings}))
+        if not result.status.usable:
+            return Row(result.status, message=result.message, warnings=warnings)
+        extra = values_of_family(family(result.spec.family).values)
+        surveys: Surveys = {}
+        values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
+        met = tuple(outcome.ok for outcome in check(result.spec.part_requirements, result, extra, surveys))
+        message = _gaps(result) if result.status is Status.COMPLETE else result.message
+        curve = _curve(result) if self.curves else b""
+        return Row(result.status, values, met, message, curve, warnings=warnings)
+
+    def quantities(self, result: Result, surveys: Surveys | None = None) -> tuple[Quantity, ...]:
+        """Return what each metric of the study is on a result, with the reason where it has no value.
+
+        `surveys` is where what is found out of the curve is noted for later.
+        """
+        surveys = {} if surveys is None else surveys
+        extra = values_of_family(family(result.spec.family).values)
+        found: dict[tuple[str, Ends | None], Quantity] = {}
+        for over in dict.fromkeys(one.over for one in self.metrics):
+            names = [one.name for one in self.metrics if one.over == over]
+            window = None if over is None else window_of(result, over)
+            found |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
+        return tuple(found[one.name, one.over] for one in self.metrics)
+
+
+def _gaps(result: Result) -> str:
+    """Return why a point that was solved has cells without a value: the windows that its curve does not cover."""
+    return "; ".join(gap.short for gap in gaps(result))
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and isfinite(value) else None
+
+
+def _curve(result: Result) -> bytes:
+    from cfmkit.tables import curve_table, to_csv
+
+    return to_csv(curve_table(result.curves))
+
+
+def _told(error: CfmError) -> str:
+    """Return an error in one line; of a specification, paths and messages without the empty source."""
+    if isinstance(error, SpecError):
+        return "; ".join(": ".join(filter(None, (one.path, one.message))) for one in error.problems)
+    return " ".join(str(error).split())
+
+
+def _bug(error: Exception) -> Row:
+    told = " ".join(f"{type(error).__name__}: {error}".split())
+    trace = "".join(traceback.format_exception(error))
+    return Row(Status.CRASHED, message=f"a bug in cfmkit: {told}", bug=trace)

@@ -1,0 +1,135 @@
+"""What a sensitivity study found: indices as lines of a tidy table, the yield, and how many samples failed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from cfmkit.specs.units import border_unit, to_border
+from cfmkit.studies.sensitivity.sobol import varies_not
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.studies.point_evaluation import Metric
+    from cfmkit.studies.sensitivity.evaluation import Evaluator
+    from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
+    from cfmkit.studies.sensitivity.setup import Setup
+    from cfmkit.studies.sensitivity.tolerance import Yield
+
+IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
+"""Indices that are amounts of the metric; others are ratios."""
+
+
+@dataclass(frozen=True)
+class IndexLine:
+    """One index of one parameter, in border units; None where it cannot be stated.
+
+    Attributes
+    ----------
+    metric : str
+        The label of a column of results.csv; ``yield`` for the share of good parts.
+    parameter : str
+        Its path, or several with commas that are tightened together.
+    index : str
+        ``first_order``, ``mu_star``, ``swing``, ...
+    value, low, high : float or None
+        The index and its interval. A missing `high` beside a `low` is open: "at least".
+    unit : str
+        Of all three.
+    samples : int
+        Blocks that it was found from.
+    """
+
+    metric: str
+    parameter: str
+    index: str
+    value: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    samples: int
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The outcome of a study.
+
+    Attributes
+    ----------
+    setup : Setup
+        What was to be done.
+    evaluator : Evaluator
+        What was evaluated.
+    lines : tuple of IndexLine
+        The indices.
+    convergence : tuple of IndexLine
+        The same from fewer samples.
+    points, outputs : array
+        Blocks of samples, (b, s, d) and (b, s, m + r).
+    replaced : int
+        Blocks that were drawn again.
+    all_met : Yield or None
+        Of parts that meet all requirements.
+    each_met : tuple of Yield
+        Of parts that meet one.
+    interrupted : bool
+        Whether the user stopped it: there are no indices.
+    fresh : bool
+        Whether it was to reuse nothing: then the same command would begin anew.
+    """
+
+    setup: Setup
+    evaluator: Evaluator
+    lines: tuple[IndexLine, ...] = ()
+    convergence: tuple[IndexLine, ...] = ()
+    points: FloatArray | None = None
+    outputs: FloatArray | None = None
+    replaced: int = 0
+    all_met: Yield | None = None
+    each_met: tuple[Yield, ...] = ()
+    interrupted: bool = False
+    fresh: bool = False
+
+    @property
+    def unstated(self) -> int:
+        """How many indices need a value that is missing."""
+        return sum(line.value is None for line in self.lines if line.index not in OPTIONAL)
+
+    @cached_property
+    def constant(self) -> tuple[str, ...]:
+        """Metrics that have the same value in every sample: no share of a variance belongs to any parameter."""
+        if self.outputs is None:
+            return ()
+        columns = self.outputs.reshape(-1, self.outputs.shape[-1]).T
+        pairs = zip(self.setup.study.metrics, columns, strict=False)
+        return tuple(one.label for one, column in pairs if varies_not(column))
+
+    @property
+    def lacking(self) -> int:
+        """How many indices are not stated because samples have no value, not because nothing varies."""
+        gone = (line for line in self.lines if line.value is None and line.index not in OPTIONAL)
+        return sum(line.metric not in self.constant for line in gone)
+
+
+OPTIONAL = ("normalised_slope",)
+"""Indices that may be missing though all samples are there: nothing is relative to zero."""
+
+
+def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples: int) -> Iterator[IndexLine]:
+    """Yield the indices of one metric, parameter by parameter."""
+    for k, name in enumerate(names):
+        for index in analysis:
+            amount = index.name in IN_UNITS
+            ends = (index.value[k], index.low[k], index.high[k])
+            value, low, high = (stated(float(one), metric.dimension if amount else "ratio") for one in ends)
+            unit = border_unit(metric.dimension) if amount else "1"
+            yield IndexLine(metric.label, name, index.name, value, low, high, unit, samples)
+
+
+def stated(value: float, dimension: str) -> float | None:
+    """Return an SI value in border units; None if it is not finite."""
+    return float(to_border(value, dimension)) if isfinite(value) else None

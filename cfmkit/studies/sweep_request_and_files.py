@@ -1,0 +1,166 @@
+"""The study that varies a specification: its request, and the files that it writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from cfmkit.errors import UsageError
+from cfmkit.families import family
+from cfmkit.studies.engine import Work
+from cfmkit.studies.noted_metrics import metrics_of, sample_curve
+from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
+from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.summary import Summary, main_columns
+from cfmkit.studies.tables import curves_csv, results_csv
+from cfmkit.studies.variable_paths import length_to_vary
+from cfmkit.studies.varied_axes import WantedVariation, axes, wishes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.specs.spec import Spec
+    from cfmkit.store.disk import Data
+    from cfmkit.studies.engine import Records
+    from cfmkit.studies.plan import Combine, Plan
+
+MOST_CURVES = 100
+"""Curves in one picture; of studies with more points only the metrics are drawn."""
+
+NOTHING = "nothing to vary: give --vary '{example}', or add a block 'sweep: {vary: {...}}' to the spec"
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What a sweep is asked to do; what is left out follows the specification's block `sweep`.
+
+    Attributes
+    ----------
+    vary : tuple of WantedVariation
+        What varies; none: as in the specification. What is given replaces all of that.
+    combine : {"grid", "zip", "lhs", "sobol"}, optional
+        How values are combined.
+    samples : int, optional
+        Points of a Latin hypercube or a Sobol sequence.
+    design, curves : bool, optional
+        Whether to design anew at each point, and to keep every curve.
+    metrics : tuple of str
+        Columns; none: as in the specification, else all.
+    seed : int
+        Of everything random.
+    most : int
+        Points that are allowed.
+    pictures : bool
+        Whether pictures will be drawn: those of one parameter show curves.
+    """
+
+    vary: tuple[WantedVariation, ...] = ()
+    combine: Combine | None = None
+    samples: int | None = None
+    design: bool | None = None
+    curves: bool | None = None
+    metrics: tuple[str, ...] = ()
+    seed: int = 0
+    most: int = MOST_POINTS
+    pictures: bool = False
+
+
+def prepare(spec: Spec, request: SweepRequest) -> Work:
+    """Return what a sweep has to do, with everything checked that can be before a point is computed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+    """
+    block = spec.sweep
+    asked = request.vary or (wishes(block.vary) if block else ())
+    if not asked:
+        raise UsageError(NOTHING.replace("{example}", _example(spec)))
+    plan = _plan(spec, request, asked)
+    design = _given(request.design, block.design if block else False)
+    drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES
+    curves = writes_curves(spec, request) or drawn
+    if design and family(spec.family).design is None:
+        raise UsageError(f"{family(spec.family).phrase} cannot be designed, only analysed")
+    names = request.metrics or (block.metrics if block else ())
+    metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
+    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed), plan)
+
+
+def _example(spec: Spec) -> str:
+    """Return how a length of a specification's own mechanism is varied, by a tenth down and up."""
+    path, value = length_to_vary(spec)
+    return f"{path}={0.9 * value:.4g} mm:{1.1 * value:.4g} mm:5"
+
+
+def writes_curves(spec: Spec, request: SweepRequest) -> bool:
+    """Return whether curves.csv is requested."""
+    return _given(request.curves, spec.sweep.curves if spec.sweep else False)
+
+
+def _given(option: bool | None, otherwise: bool) -> bool:
+    return otherwise if option is None else option
+
+
+def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...]) -> Plan:
+    block = spec.sweep
+    combine, samples = request.combine, request.samples
+    if combine is None:
+        combine = block.combine if block and not request.vary else "grid"
+        samples = block.samples if block and not request.vary else None
+    if combine == "grid":
+        return grid(axes(spec, asked), request.most)
+    if combine == "zip":
+        return zipped(axes(spec, asked, joint=True), request.most)
+    return sampled(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
+
+
+def _draw(combine: Literal["lhs", "sobol"], samples: int | None, seed: int) -> Draw:
+    if samples is None or samples < 1:
+        raise UsageError(f"how many points are to be drawn? Write --sample {combine}:256")
+    return Draw(combine, samples, seed)
+
+
+def summary_of(records: Records) -> Summary:
+    """Return an empty summary for the rows of a study."""
+    study = records.work.study
+    return Summary(study, main_columns(study, family(study.spec.family).headline))
+
+
+def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterator[tuple[str, Data]]:
+    """Yield every file of a sweep but the pictures as (name, content); the summary is filled on the way."""
+    from cfmkit.specs.yamlio import dump
+    from cfmkit.tables.json_writing import json_bytes
+
+    study = records.work.study
+    yield "results.csv", results_csv(records, summary.add)
+    if curves:
+        yield "curves.csv", curves_csv(records)
+    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn(records, summary)})
+    resolve = family(study.spec.family).resolve
+    resolved = resolve(study.spec) if resolve else study.spec
+    yield "resolved.yaml", dump(resolved, complete=True).encode()
+
+
+def _drawn(records: Records, summary: Summary) -> dict[str, Any]:
+    """Return what the pictures of a sweep show: so they can be drawn again from its files, in a figure of several."""
+    study, plan = records.work.study, records.work.plan
+    shown = [study.metrics[column] for column in summary.shown]
+    return {
+        "varied": [
+            {
+                "path": one.path,
+                "dimension": one.dimension,
+                "words": [*map(str, one.shown)] if one.dimension == "text" else [],
+            }
+            for one in plan.variables
+        ],
+        "grid": [] if plan.joint else [len(one.values) for one in plan.variables],
+        "metrics": [
+            {"name": one.name, "column": one.label, "dimension": one.dimension, "words": list(one.words)}
+            for one in shown
+        ],
+    }

@@ -1,0 +1,194 @@
+"""What yield is to be expected of a design without tolerances, by those that its process is assumed to hold.
+
+The estimate is of first order and takes a few solutions: it says whether a design is worth drawing parts of, no more.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+from cfmkit.specs.units import format_short
+from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
+from cfmkit.studies.requirement_constraints import (
+    metrics_in,
+    metrics_of_part,
+    numbers_in,
+    numbers_of,
+    places_of,
+    rows_of,
+    sampled_of,
+    stated_places,
+)
+from cfmkit.studies.stated_or_assumed_tolerances import MODULUS, assumed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.requirement_constraints import RequirementRows
+    from cfmkit.studies.stated_or_assumed_tolerances import Assumed
+
+PARTS = 4000
+
+FEW_POINTS, ALIKE = 31, 1e-6
+"""Points on the curves of parts, where the design's metrics are the same with so few, but for this share of them."""
+
+
+def expected(result: Result, run: Run) -> str:
+    """Return in a sentence how many parts of a design would be good, or why that is not known; empty of no part.
+
+    Parameters
+    ----------
+    result : Result
+        The analysis of the design.
+    run : Run
+        Seed of the parts.
+    """
+    spec = result.spec
+    found = assumed(spec)
+    if found is None or not spec.part_requirements or not result.curves:
+        return ""
+    name = found.process.name
+    again = f"the same command with --set design.process={name}"
+    try:
+        shares = first_order_shares(result, found, run)
+    except YieldUnknown as why:
+        return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
+    chosen = family(spec.family).free
+    if chosen is None or not function_named(chosen)(spec, spec):
+        return f"{_told(found, shares)}; margins need 'design.free' to name values that may change"
+    return f"{_told(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+
+
+class YieldUnknown(Exception):
+    """Why nothing is said of a yield."""
+
+
+def _told(found: Assumed, shares: tuple[float, float]) -> str:
+    process = found.process
+    used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
+    told = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
+    if found.modulus is not None:
+        low, high = (format_short(end, "stress") for end in found.modulus)
+        told.append(f"modulus {low} to {high}")
+    reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
+    text = f"{_share(shares[0])} parts would meet the requirements if made by {process.name} "
+    text += f"({', '.join(told)}; assumed{reason}; to first order)"
+    return text if found.modulus is None else f"{text}, {_share(shares[1])} parts once the modulus is measured"
+
+
+def _share(share: float) -> str:
+    """Return a share of drawn parts, before the word 'parts': to two digits, and never as all of them or none."""
+    if 100.0 * share >= 99.5:
+        return "over 99 % of"
+    return f"about {100.0 * share:.2g} % of" if share * PARTS >= 1.0 else "hardly any"
+
+
+def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
+    """Return the share of good parts, and that of those whose modulus is as it should be.
+
+    Parameters
+    ----------
+    result : Result
+        The analysis of the design, with the requirements that its parts have to meet.
+    found : Assumed
+        The tolerances of its process.
+    run : Run
+        Seed of the parts.
+
+    Raises
+    ------
+    YieldUnknown
+        If it would take long, or a part near the design has no curve.
+    """
+    spec = result.spec
+    paths = [*found.deviations, *([MODULUS] if found.modulus else [])]
+    places = places_of(result)
+    first = sampled_of(spec, places, run)
+    rows = None if first is None else rows_of(result, first, places)
+    middle = None if rows is None else _numbers(spec, rows, run)
+    if rows is None or middle is None:
+        raise YieldUnknown("the design cannot be followed at a few poses")
+    exact = {path: numbers_in(one) for path, one in exact_slopes(spec, places, paths).items()}
+    by_looks = bool(rows.metrics) or len(exact) < len(paths)
+    if by_looks and 2 * len(paths) > most_parts(spec, by_looks=not rows.metrics):
+        quick = family(spec.family).sampled is not None and not rows.metrics
+        raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
+    if rows.metrics and (thin := _thinned(result)) is not None:
+        numbers = _numbers(thin, rows, run)
+        count = len(rows.metrics)
+        if np.allclose(numbers[-count:], metrics_in(result, rows), rtol=ALIKE, atol=0.0):
+            spec, middle = thin, numbers
+    generator = np.random.default_rng([run.seed, 17])
+    moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
+    nominal = {path: float(spec.at(path)) for path in paths}
+    steps = {path: (nominal[path], step_of(sigma)) for path, sigma in found.deviations.items()}
+    if found.modulus:
+        steps[MODULUS] = nominal[MODULUS], 1e-3 * nominal[MODULUS]
+    for path, slope in _slopes(spec, rows, steps, exact, run).items():
+        if path == MODULUS and found.modulus is not None:
+            errors = generator.uniform(*found.modulus, PARTS) - nominal[path]
+        else:
+            errors = found.deviations[path] * generator.standard_normal(PARTS)
+        change = np.outer(errors, slope)
+        moved += change
+        by_modulus = change if path == MODULUS else by_modulus
+    limits = [(middle + part) @ rows.matrix.T + rows.constant for part in (moved, moved - by_modulus)]
+    slack = 1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
+    share, measured = (float((one >= -slack).all(axis=1).mean()) for one in limits)
+    return share, measured
+
+
+def _slopes(
+    spec: Spec,
+    rows: RequirementRows,
+    steps: Mapping[str, tuple[float, float]],
+    exact: Mapping[str, FloatArray],
+    run: Run,
+) -> dict[str, FloatArray]:
+    """Return the derivatives of what rows look at; `exact`: those of effort and stress that are known."""
+    whole = exact.keys() < steps.keys()
+    if not whole and not rows.metrics:
+        return {path: exact[path] for path in steps}
+
+    def numbers(part: Spec) -> FloatArray | None:
+        return _numbers(part, rows, run, whole)
+
+    found = slopes(numbers, spec, steps)
+    assert found is not None  # a part without numbers has ended the estimate
+    if whole:
+        return dict(zip(steps, found, strict=True))
+    return {path: np.concatenate([exact[path], one]) for path, one in zip(steps, found, strict=True)}
+
+
+def _thinned(result: Result) -> Spec | None:
+    """Return a design whose curve has fewer points; None where metrics are taken from points, or are few already.
+
+    Where the model knows the curve between its points, metrics are those of the whole curve.
+    """
+    points = getattr(getattr(result.spec, "analysis", None), "points", None)
+    if result.closed is None or not isinstance(points, int) or points <= FEW_POINTS:
+        return None
+    return result.spec.replace({"analysis.points": FEW_POINTS})
+
+
+def _numbers(spec: Spec, rows: RequirementRows, run: Run, whole: bool = True) -> FloatArray:
+    """Return what rows look at of a part, all of it or metrics alone; a part without it ends the estimate."""
+    try:
+        found = numbers_of(spec, rows, run, stated_places(spec)) if whole else metrics_of_part(spec, rows, run)
+    except CfmError as error:
+        raise YieldUnknown(str(error)) from None
+    if found is None or not np.isfinite(found).all():
+        raise YieldUnknown(
+            "a part near the design has no curve, or it ends within a window of the requirements (windows in shares of "
+            "the travel, such as [1 %, 100 %], are those of each part)"
+        )
+    return found
