@@ -1,5 +1,6 @@
 """The explorer without a browser: sliders for every number, answers, what is saved, and who is answered."""
 
+import http.client
 import json
 import threading
 import time
@@ -121,6 +122,16 @@ def test_a_malformed_request_is_refused_and_the_next_one_answered(served, data):
     token = {"X-Token": served.token}
     assert asked(served, data=data, **token)[0] == 400
     assert asked(served, data={"changes": []}, **token)[0] == 200
+
+
+def test_a_page_that_is_closed_before_its_answer_leaves_no_traceback(served, monkeypatch, capsys):
+    def gone(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(served.RequestHandlerClass, "_send", gone)
+    with pytest.raises(http.client.RemoteDisconnected):
+        asked(served, "/")
+    assert capsys.readouterr().err == ""
 
 
 def test_no_name_of_a_spec_becomes_markup(tmp_path):
