@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+    FloatArray = NDArray[np.float64]
 
 LONGEST = 1500
 """Letters of a `repr`."""
@@ -26,8 +28,20 @@ PLAIN = (str, int, float, type(None))
 T = TypeVar("T")
 
 
-def read_only(values: Any, dtype: Any = np.float64) -> NDArray[Any]:
+def __getattr__(name: str) -> Any:
+    """Return the type of arrays: who asks for it has numpy, which short texts of results must not bring."""
+    if name == "FloatArray":
+        import numpy as np
+        from numpy.typing import NDArray
+
+        return NDArray[np.float64]
+    raise AttributeError(f"module {__name__} has no attribute {name}")
+
+
+def read_only(values: Any, dtype: Any = "float64") -> NDArray[Any]:
     """Return `values` as an array that cannot be written to (copied if it could be)."""
+    import numpy as np
+
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
@@ -40,9 +54,11 @@ def distinct(values: Any) -> NDArray[Any]:
 
     Examples
     --------
-    >>> distinct(np.array([2.0, 1.0, 2.0])).tolist()
+    >>> distinct([2.0, 1.0, 2.0]).tolist()
     [1.0, 2.0]
     """
+    import numpy as np
+
     ordered = np.sort(values, axis=None)
     keep = np.ones(len(ordered), dtype=np.bool_)
     np.not_equal(ordered[1:], ordered[:-1], out=keep[1:])
@@ -86,10 +102,10 @@ def brief(value: Any) -> str:
 
     Examples
     --------
-    >>> brief(np.array([[3.0, np.nan], [1.0, 2.0]])), brief([1] * 30), brief(0.25)
+    >>> brief(read_only([[3.0, float("nan")], [1.0, 2.0]])), brief([1] * 30), brief(0.25)
     ('array of 2 x 2: 1 ... 3', 'list of 30', '0.25')
     """
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "dtype") and getattr(value, "shape", None):
         text = _array(value)
     elif isinstance(value, (Mapping, tuple, list)):
         is_short = not isinstance(value, Mapping) and len(value) <= 4 and all(isinstance(one, PLAIN) for one in value)
@@ -103,6 +119,8 @@ def brief(value: Any) -> str:
 
 
 def _array(values: Any) -> str:
+    import numpy as np
+
     shape = " x ".join(map(str, values.shape))
     known = values[np.isfinite(values)] if values.dtype.kind == "f" else np.empty(0)
     return f"array of {shape}" + (f": {known.min():.4g} ... {known.max():.4g}" if len(known) else "")
@@ -110,7 +128,6 @@ def _array(values: Any) -> str:
 
 def _joined(texts: list[str]) -> str:
     """Return texts in a row, as many as there is room for."""
-    ends = np.cumsum([len(text) + 2 for text in texts])
-    count = int(np.searchsorted(ends, LONGEST, side="right"))
+    count = sum(end <= LONGEST for end in accumulate(len(text) + 2 for text in texts))
     more = len(texts) - count
     return ", ".join(texts[:count]) + (f", ... and {more} more" if more else "")
