@@ -167,7 +167,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
 
         found = with_design_margins(spec, found, run)
     if getattr(asked, "verify", None) is not None:
-        from cfmkit.studies.verified_design import verified
+        from cfmkit.studies.correction_by_solid_model import verified
 
         found = verified(spec, found, run)
     return found

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
-from cfmkit.store import Manifest, RunFolder, disk
+from cfmkit.store import Manifest, RunFolder, safe_disk_changes
 from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, hash_in, mode_of
-from cfmkit.store.disk import reporting
 from cfmkit.store.lock import LOCK, has_signed_lock
+from cfmkit.store.safe_disk_changes import reporting
 from cfmkit.studies.journal import has_foreign_lines, is_journal
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def remains_below(root: str | os.PathLike[str]) -> Iterator[Remains]:
     """
 
     def unreadable(error: OSError) -> None:
-        raise OutputError(f"cannot read {disk.shown(error.filename)}: {disk.reason(error)}")
+        raise OutputError(f"cannot read {safe_disk_changes.shown(error.filename)}: {safe_disk_changes.reason(error)}")
 
     for place, folders, _ in os.walk(os.path.realpath(root), onerror=unreadable):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
@@ -121,8 +121,8 @@ def remove(remains: Remains, top: str | os.PathLike[str]) -> Remains:
         for name in found.files:
             if name != LOCK:  # which this process holds by now, and takes away at the end of the block
                 with reporting(root / name, "remove"):
-                    disk.system.unlink(root / name)
+                    safe_disk_changes.system.unlink(root / name)
     inner = {root / above for name in found.files for above in Path(name).parents}
     outer = {above for above in root.parents if Path(os.path.realpath(top)) in above.parents}
-    disk.remove_empty((inner | outer) - {Path.cwd()})
+    safe_disk_changes.remove_empty((inner | outer) - {Path.cwd()})
     return found

@@ -123,7 +123,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import write_schema
     from cfmkit.specs.data_file_paths import named_in
-    from cfmkit.store.disk import discard, make_folders, remove_empty, reporting, write_new
+    from cfmkit.store.safe_disk_changes import discard, make_folders, remove_empty, reporting, write_new
     from cfmkit.studies.batch_sources_and_outcomes import is_figure
 
     chosen = example(name)

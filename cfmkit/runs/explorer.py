@@ -189,7 +189,7 @@ class Explorer:
         cfmkit.errors.OutputError
             If there is such a file, or it cannot be written.
         """
-        from cfmkit.store.disk import reporting, write_new
+        from cfmkit.store.safe_disk_changes import reporting, write_new
 
         if not OWN_NAME.fullmatch(name):
             raise UsageError(f"{visible(name)!r}: name a file such as mine.yaml, without a folder")

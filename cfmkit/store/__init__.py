@@ -22,15 +22,15 @@ What a user can rely on
 While a run lives, ``.cfmkit.lock`` and ``.cfmkit-run/`` stand in the folder; both
 are gone after it, and after a kill both are cleared by the next run.
 
-`disk` makes changes and turns their errors into sentences, `allowed_file_names` says what may
+`safe_disk_changes` makes changes and turns their errors into sentences, `allowed_file_names` says what may
 be written, `lock` keeps other runs out, `transaction` changes many files as one,
 `manifest` is the list of what a run wrote, `run_folder` is what a run works with, and
 `content_hashes_and_versions` gives content its name.
 """
 
 from cfmkit.store.content_hashes_and_versions import code_stamp, file_hash, origin, stable_hash
-from cfmkit.store.disk import FileRecord, atomic_write
 from cfmkit.store.manifest import Manifest
 from cfmkit.store.run_folder import RunFolder
+from cfmkit.store.safe_disk_changes import FileRecord, atomic_write
 
 __all__ = ["FileRecord", "Manifest", "RunFolder", "atomic_write", "code_stamp", "file_hash", "origin", "stable_hash"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store.content_hashes_and_versions import file_hash
-from cfmkit.store.disk import shown
+from cfmkit.store.safe_disk_changes import shown
 
 if TYPE_CHECKING:
     from pathlib import Path

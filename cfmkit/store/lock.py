@@ -23,8 +23,8 @@ import time
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import FolderInUse, OutputError
-from cfmkit.store import disk
-from cfmkit.store.disk import shown
+from cfmkit.store import safe_disk_changes
+from cfmkit.store.safe_disk_changes import shown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +87,7 @@ class FolderLock:
         if not self.mine:
             return
         if _same(self._descriptor, self._file):
-            disk.discard(self._file)
+            safe_disk_changes.discard(self._file)
         os.close(self._descriptor)
         self._descriptor = -1
         self._forget()
@@ -112,7 +112,7 @@ def has_signed_lock(folder: Path) -> bool:
 def _lock(file: Path, folder: Path) -> int:
     """Return a descriptor of the lock file, which this process has locked."""
     while True:
-        descriptor = disk.system.open(file, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        descriptor = safe_disk_changes.system.open(file, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             _try(descriptor, folder)
             if _same(descriptor, file):
@@ -147,10 +147,10 @@ def _same(descriptor: int, file: Path) -> bool:
 def _sign(descriptor: int, file: Path) -> None:
     """Write into the lock file who holds it."""
     try:
-        disk.system.ftruncate(descriptor, 0)
-        disk.system.write(descriptor, f"{os.getpid()} {platform.node()}\n".encode())
+        safe_disk_changes.system.ftruncate(descriptor, 0)
+        safe_disk_changes.system.write(descriptor, f"{os.getpid()} {platform.node()}\n".encode())
     except BaseException:
-        disk.discard(file)
+        safe_disk_changes.discard(file)
         raise
 
 

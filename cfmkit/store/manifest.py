@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store.allowed_file_names import CURE, MANIFEST, checked_name, hash_in, mode_of
-from cfmkit.store.disk import FileRecord, reporting, shown
+from cfmkit.store.safe_disk_changes import FileRecord, reporting, shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -7,7 +7,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-from cfmkit.store import disk
+from cfmkit.store import safe_disk_changes
 
 
 def trusted(path: Path) -> bool:
@@ -48,7 +48,7 @@ def private_folder(name: str, make: bool = True) -> Path | None:
         if not make:
             return folder if _is_ours(folder) else None
         try:
-            disk.system.mkdir(folder, 0o700)
+            safe_disk_changes.system.mkdir(folder, 0o700)
         except FileExistsError:
             if not _is_ours(folder):
                 return Path(tempfile.mkdtemp(prefix=f"cfmkit-{name}-"))

@@ -13,19 +13,19 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store import disk, transaction
+from cfmkit.store import safe_disk_changes, transaction
 from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
 from cfmkit.store.content_hashes_and_versions import file_hash
-from cfmkit.store.disk import TEMPORARY, FileRecord, reporting, shown
 from cfmkit.store.lock import FolderLock
 from cfmkit.store.manifest import Manifest
+from cfmkit.store.safe_disk_changes import TEMPORARY, FileRecord, reporting, shown
 from cfmkit.store.transaction import NEW, RUN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from types import TracebackType
 
-    from cfmkit.store.disk import Data
+    from cfmkit.store.safe_disk_changes import Data
 
 _TEMPORARY = re.compile(re.escape(TEMPORARY).replace(r"\{pid\}", "([0-9]+)").replace(r"\{count\}", "[0-9]+"))
 _MOST_TRIES = 20
@@ -169,14 +169,14 @@ class RunFolder:
         """Create and lock the folder; a run that ends just now may remove it in between."""
         for attempt in range(_MOST_TRIES):
             try:
-                self._created = disk.make_folders(self.path)
+                self._created = safe_disk_changes.make_folders(self.path)
                 self._lock.acquire()
                 return
             except FileNotFoundError:
                 if attempt == _MOST_TRIES - 1:
                     raise
             except BaseException:
-                disk.remove_empty(self._created)
+                safe_disk_changes.remove_empty(self._created)
                 raise
 
     def _take_over(self) -> None:
@@ -190,21 +190,21 @@ class RunFolder:
         for entry in os.scandir(self.path):
             match = _TEMPORARY.fullmatch(entry.name)
             if match and not _alive(int(match[1])):
-                disk.discard(Path(entry.path))
+                safe_disk_changes.discard(Path(entry.path))
 
     def _stage(self, name: str, data: Data) -> FileRecord:
         place = self.path / RUN / NEW / name
         with reporting(self.path / name):
-            disk.make_folders(place.parent)
+            safe_disk_changes.make_folders(place.parent)
             if mode_of(place) is not None:
-                disk.system.unlink(place)
-            return disk.write_new(place, data)
+                safe_disk_changes.system.unlink(place)
+            return safe_disk_changes.write_new(place, data)
 
     def _keep(self, name: str, spare: str) -> str:
         """Stage an edited file under its spare name; return its hash."""
         place = self.path / RUN / NEW / spare
-        disk.make_folders(place.parent)
-        disk.duplicate(self.path / name, place)
+        safe_disk_changes.make_folders(place.parent)
+        safe_disk_changes.duplicate(self.path / name, place)
         return file_hash(place) or ""
 
     def _outdated(self) -> tuple[list[str], dict[str, str]]:
@@ -247,7 +247,7 @@ class RunFolder:
         self._owner = 0
         transaction.clear(self.path)
         self._lock.release()
-        disk.remove_empty(self._created)
+        safe_disk_changes.remove_empty(self._created)
 
 
 @contextmanager

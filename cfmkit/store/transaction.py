@@ -24,9 +24,9 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
-from cfmkit.store import disk
+from cfmkit.store import safe_disk_changes
 from cfmkit.store.allowed_file_names import CURE, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
-from cfmkit.store.disk import reason, remove_empty, reporting, shown, sync_folder
+from cfmkit.store.safe_disk_changes import reason, remove_empty, reporting, shown, sync_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -73,7 +73,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
     """
     try:
         _keep_old(root, plan)
-        disk.atomic_write(root / RUN / PLAN, _to_json(plan))
+        safe_disk_changes.atomic_write(root / RUN / PLAN, _to_json(plan))
         _roll_forward(root, plan)
     except BaseException as error:
         with suppress(OSError, OutputError):
@@ -108,7 +108,7 @@ def recover(root: Path) -> None:
 def clear(root: Path) -> None:
     """Remove the working folder, unless it holds a plan that the next run has to finish."""
     if mode_of(root / RUN) is not None and not _pending(root):
-        disk.clear_folder(root / RUN)
+        safe_disk_changes.clear_folder(root / RUN)
 
 
 def _pending(root: Path) -> bool:
@@ -120,8 +120,8 @@ def _keep_old(root: Path, plan: CommitPlan) -> None:
     for change in plan.changes:
         if change.old is not None:
             target = root / RUN / OLD / change.name
-            disk.make_folders(target.parent)
-            disk.duplicate(root / change.name, target)
+            safe_disk_changes.make_folders(target.parent)
+            safe_disk_changes.duplicate(root / change.name, target)
     for branch in (NEW, OLD):
         for folder, _, _ in os.walk(root / RUN / branch):
             sync_folder(type(root)(folder))
@@ -139,7 +139,7 @@ def _roll_forward(root: Path, plan: CommitPlan) -> None:
     _sync(touched)
     # Only now: undoing this would need new folders, which a full disk may refuse.
     remove_empty(root / parent for change in plan.changes if change.new is None for parent in _parents(change.name))
-    disk.system.unlink(root / RUN / PLAN)
+    safe_disk_changes.system.unlink(root / RUN / PLAN)
 
 
 def _apply(root: Path, change: Change) -> None:
@@ -148,11 +148,11 @@ def _apply(root: Path, change: Change) -> None:
     if change.new is None:
         if mode_of(place) is not None:
             _refuse_changed(root, change)
-            disk.system.unlink(place)
+            safe_disk_changes.system.unlink(place)
     elif mode_of(staged) is not None:
         _refuse_changed(root, change)
-        disk.make_folders(place.parent)
-        disk.system.replace(staged, place)
+        safe_disk_changes.make_folders(place.parent)
+        safe_disk_changes.system.replace(staged, place)
 
 
 def _refuse_changed(root: Path, change: Change) -> None:
@@ -175,7 +175,7 @@ def _turn_back(root: Path, plan: CommitPlan) -> None:
     """Undo a plan, if it was ever begun."""
     run = root / RUN
     if mode_of(run / PLAN) is not None:
-        disk.system.replace(run / PLAN, run / UNDO)
+        safe_disk_changes.system.replace(run / PLAN, run / UNDO)
         _roll_back(root, plan)
 
 
@@ -185,7 +185,7 @@ def _roll_back(root: Path, plan: CommitPlan) -> None:
     remove_empty(root / name for name in plan.folders)
     with suppress(OSError):
         _sync({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
-    disk.system.unlink(root / RUN / UNDO)
+    safe_disk_changes.system.unlink(root / RUN / UNDO)
 
 
 def _restore(root: Path, change: Change) -> None:
@@ -193,10 +193,10 @@ def _restore(root: Path, change: Change) -> None:
     there = hash_in(root, change.name)
     if change.old is None:
         if there is not None and there == change.new:
-            disk.system.unlink(place)
+            safe_disk_changes.system.unlink(place)
     elif there != change.old and mode_of(kept) is not None:
-        disk.make_folders(place.parent)
-        disk.system.replace(kept, place)
+        safe_disk_changes.make_folders(place.parent)
+        safe_disk_changes.system.replace(kept, place)
 
 
 def _sync(folders: Iterable[Path]) -> None:

@@ -30,7 +30,7 @@ from zlib import crc32
 import numpy as np
 
 from cfmkit.errors import OutputError
-from cfmkit.store.disk import atomic_write, discard, reporting
+from cfmkit.store.safe_disk_changes import atomic_write, discard, reporting
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -129,7 +129,7 @@ def prepared(path: str, option: str = "--junit") -> Callable[[bytes], None]:
         If it will not be possible to write it.
     """
     from cfmkit.store import atomic_write
-    from cfmkit.store.disk import reporting
+    from cfmkit.store.safe_disk_changes import reporting
 
     if not path.strip():
         raise UsageError(f"{option} is empty; name a file")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.specs.spec import Spec
-    from cfmkit.store.disk import Data
+    from cfmkit.store.safe_disk_changes import Data
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Combine, Plan
 

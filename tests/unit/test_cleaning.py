@@ -132,7 +132,7 @@ def test_a_kill_while_cleaning_leaves_a_manifest_that_lists_what_is_left(tmp_pat
                 raise KeyboardInterrupt
         unlink(path, **more)
 
-    monkeypatch.setattr("cfmkit.store.disk.system.unlink", dying)
+    monkeypatch.setattr("cfmkit.store.safe_disk_changes.system.unlink", dying)
     with pytest.raises(KeyboardInterrupt):
         remove(remains_in(tmp_path), tmp_path)
     monkeypatch.undo()

@@ -16,7 +16,7 @@ from store_support import listing, one_line
 
 import cfmkit
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store import atomic_write, disk, file_hash, origin, stable_hash
+from cfmkit.store import atomic_write, file_hash, origin, safe_disk_changes, stable_hash
 from cfmkit.store.content_hashes_and_versions import tree_hash
 
 # ---- atomic_write
@@ -92,7 +92,7 @@ def test_a_failing_step_leaves_the_old_file_and_no_temporary_one(tmp_path, monke
                 os.close(*arguments)
             raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr(disk, "system", Failing())
+    monkeypatch.setattr(safe_disk_changes, "system", Failing())
     with pytest.raises(OutputError, match=f"cannot write {re.escape(str(path))}: ") as caught:
         atomic_write(path, b"new")
     monkeypatch.undo()
@@ -109,7 +109,7 @@ def test_a_system_that_writes_a_little_at_a_time_gets_it_all(tmp_path, monkeypat
         def write(self, descriptor, data):
             return os.write(descriptor, data[:3])
 
-    monkeypatch.setattr(disk, "system", Slow())
+    monkeypatch.setattr(safe_disk_changes, "system", Slow())
     assert atomic_write(tmp_path / "a", b"0123456789").bytes == 10
     assert (tmp_path / "a").read_bytes() == b"0123456789"
 
@@ -186,7 +186,7 @@ def test_only_one_module_changes_the_disk():
         r"(?<!disk\.system)\b(?:os\.(?:open|write|replace|rename|link|unlink|remove|mkdir|makedirs|rmdir|fsync|truncate|ftruncate)\b"
         r"|shutil|\.(?:write_bytes|write_text|touch|unlink|mkdir|rmdir|rename|symlink_to|hardlink_to)\()|\bopen\([^)]*[\"'][wax]"
     )
-    folder = Path(disk.__file__).parent
+    folder = Path(safe_disk_changes.__file__).parent
     found = [
         f"{path.name}: {line.strip()}"
         for path in folder.glob("*.py")

@@ -1,6 +1,6 @@
 """A run that is killed or refused by the disk leaves the old set of files or the new one.
 
-Every change to the disk goes through `cfmkit.store.disk.system`. Here it is
+Every change to the disk goes through `cfmkit.store.safe_disk_changes.system`. Here it is
 replaced by one that counts the changes and, at a chosen one, fails or kills the
 process. As a program (``python test_store_faults.py FOLDER [double]``) this file
 does the killing, in forked children of a process without threads.
@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store import Manifest, RunFolder, atomic_write, disk
+from cfmkit.store import Manifest, RunFolder, atomic_write, safe_disk_changes
 
 CHANGES = ("open", "write", "ftruncate", "fsync", "close", "replace", "link", "unlink", "mkdir", "rmdir")
 
@@ -158,7 +158,7 @@ def attempt(path, monkeypatch, wrong, action):
     """Run with faults; return the system and the error, if there was one."""
     system = System(wrong, action)
     with monkeypatch.context() as patch:
-        patch.setattr(disk, "system", system)
+        patch.setattr(safe_disk_changes, "system", system)
         try:
             new_run(path)
         except CfmError as error:
@@ -195,7 +195,7 @@ def test_an_error_at_any_single_change_is_an_output_error_and_the_old_files_are_
         if error is not None:
             assert isinstance(error, OutputError)
             assert "\n" not in str(error)
-            assert disk._REASONS[code] in str(error)
+            assert safe_disk_changes._REASONS[code] in str(error)
             assert str(out) in str(error)
         assert recovered_set(out, tidy=system.last != "rmdir") == label
         outcomes.add(label)
@@ -233,7 +233,7 @@ def test_a_full_disk_where_renaming_still_works_always_leaves_the_old_files(out,
 
         system.change = change
         with monkeypatch.context() as patch:
-            patch.setattr(disk, "system", system)
+            patch.setattr(safe_disk_changes, "system", system)
             try:
                 new_run(out)
             except OutputError:
@@ -283,7 +283,9 @@ def test_a_file_system_without_links_gets_copies(out, monkeypatch):
     for step in (*range(30, 120, 7), 10_000):
         prepare(out)
         with monkeypatch.context() as patch:
-            patch.setattr(disk, "system", NoLinks(lambda count, step=step: count == step, failing(errno.EIO)))
+            patch.setattr(
+                safe_disk_changes, "system", NoLinks(lambda count, step=step: count == step, failing(errno.EIO))
+            )
             try:
                 new_run(out)
             except OutputError:
@@ -329,7 +331,7 @@ def test_everything_is_on_the_disk_before_the_commit_and_before_the_plan_goes(ou
             return result
 
     with monkeypatch.context() as patch:
-        patch.setattr(disk, "system", Recording(lambda _count: False, None))
+        patch.setattr(safe_disk_changes, "system", Recording(lambda _count: False, None))
         new_run(out)
     working = out.resolve() / ".cfmkit-run"
     commit = events.index(("replace", working / "plan.json"))
@@ -375,7 +377,7 @@ def killed(path, work, step):
     """Work in a child that dies before the given change; return whether it came so far."""
     child = os.fork()
     if child == 0:
-        disk.system = System(lambda count: count == step, die)
+        safe_disk_changes.system = System(lambda count: count == step, die)
         try:
             work(path)
         except BaseException:

@@ -11,7 +11,7 @@ import pytest
 from store_support import INFO, enter_and_leave, listing, one_line, run
 
 from cfmkit.errors import FolderInUse, OutputError
-from cfmkit.store import RunFolder, disk, lock
+from cfmkit.store import RunFolder, lock, safe_disk_changes
 
 # ---- the lock
 
@@ -147,7 +147,7 @@ def test_a_lock_file_that_loses_its_name_before_it_is_locked_is_not_a_lock(tmp_p
             opened.append(path)
             return descriptor
 
-    monkeypatch.setattr(disk, "system", Racing())
+    monkeypatch.setattr(safe_disk_changes, "system", Racing())
     with RunFolder(tmp_path):
         assert [path.name for path in opened] == [lock.LOCK, lock.LOCK]
         assert (tmp_path / lock.LOCK).read_text().split()[0] == str(os.getpid())

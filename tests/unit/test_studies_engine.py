@@ -11,7 +11,7 @@ from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.families.base import BlockAnswer
 from cfmkit.results import Finding, Status
-from cfmkit.store import disk, origin
+from cfmkit.store import origin, safe_disk_changes
 from cfmkit.studies.engine import Work, compact, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.noted_metrics import metrics_of, sample_curve
@@ -248,7 +248,9 @@ def test_a_journal_that_cannot_be_made_small_stays_as_it_is(tmp_path, monkeypatc
     with Journal(path) as journal:
         records = run(work(FRICTION, design=True), journal=journal)
         before = path.read_bytes()
-        monkeypatch.setattr(disk.system, "fsync", lambda _file: (_ for _ in ()).throw(OSError(28, "no space")))
+        monkeypatch.setattr(
+            safe_disk_changes.system, "fsync", lambda _file: (_ for _ in ()).throw(OSError(28, "no space"))
+        )
         compact(journal, [records])
         monkeypatch.undo()
     assert path.read_bytes() == before

@@ -151,3 +151,10 @@ def test_a_leaf_whose_solver_stops_at_once_has_no_curve(monkeypatch):
     assert found.status is Status.NO_EQUILIBRIUM
     assert not found.curves
     assert found.message.startswith("no curve: ")
+
+
+def test_fillets_that_make_cuts_cross_are_refused_before_a_mesh_is_made():
+    """At once: with radii of 200 mm the rigid walls alone had a hundred thousand nodes."""
+    result = api.analyze(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=200 mm"))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "cross or touch at" in result.message

@@ -109,7 +109,7 @@ def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
 
 def _lines(found: Sequence[Remains], everything: bool) -> Iterator[TextLine]:
     from cfmkit.runs.cleaning import EDITED
-    from cfmkit.store.disk import shown
+    from cfmkit.store.safe_disk_changes import shown
 
     for one in found:
         yield whole_line(f"{shown(one.folder)}/  {_count([one])}")

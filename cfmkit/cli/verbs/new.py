@@ -42,7 +42,7 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import with_line, write_schema
-    from cfmkit.store.disk import discard
+    from cfmkit.store.safe_disk_changes import discard
 
     record = family(options.family)
     text = template(options.family)
@@ -88,7 +88,7 @@ def _write(path: Path, text: str) -> None:
     cfmkit.errors.OutputError
         If it is, or cannot be written.
     """
-    from cfmkit.store.disk import reporting, write_new
+    from cfmkit.store.safe_disk_changes import reporting, write_new
 
     with reporting(path):
         write_new(path, text.encode())

@@ -73,7 +73,7 @@ def _drawn(name: str | None, given: str) -> Answer:
     from pathlib import Path
 
     from cfmkit.runs.parameter_sketch_file import drawn, scheme
-    from cfmkit.store.disk import reporting, write_new
+    from cfmkit.store.safe_disk_changes import reporting, write_new
 
     found = scheme(name)
     path = Path(given or f"{found.family}.png")

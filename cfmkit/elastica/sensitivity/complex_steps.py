@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.elastica.equilibrium.mesh import assemble_model, table
 from cfmkit.elastica.kernels.network_arrays import DesignSlopes, in_order
 from cfmkit.elastica.model.network_under_drive import Layout
-from cfmkit.elastica.sensitivity.plain_beam_slopes import plain_slopes
+from cfmkit.elastica.sensitivity.plain_beam_array_derivatives import plain_slopes
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

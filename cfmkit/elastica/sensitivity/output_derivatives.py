@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import LineLoad
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.sensitivity.complex_steps import ComplexSteps
-    from cfmkit.elastica.sensitivity.plain_beam_slopes import PlainSlopes
+    from cfmkit.elastica.sensitivity.plain_beam_array_derivatives import PlainSlopes
 
 
 @dataclass(frozen=True, eq=False)

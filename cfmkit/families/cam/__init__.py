@@ -24,8 +24,8 @@ FAMILY = Family(
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.proposals_for_wish:propose",
     room="cfmkit.families.cam.bounding_box:room",
-    free="cfmkit.families.cam.yield_variables_and_errors:free",
-    errors="cfmkit.families.cam.yield_variables_and_errors:errors",
+    free="cfmkit.families.cam.movable_and_erring_values:free",
+    errors="cfmkit.families.cam.movable_and_erring_values:errors",
     headline=(
         "force_constant",
         "theoretical_force",

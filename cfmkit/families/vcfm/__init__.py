@@ -11,8 +11,8 @@ FAMILY = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
-    errors="cfmkit.families.vcfm.yield_variables_and_errors:errors",
-    free="cfmkit.families.vcfm.yield_variables_and_errors:free",
+    errors="cfmkit.families.vcfm.movable_and_erring_values:errors",
+    free="cfmkit.families.vcfm.movable_and_erring_values:free",
     models={
         "truss": "cfmkit.families.vcfm.model:analyze",
         "analytic": "cfmkit.families.vcfm.model:analyze",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError, SolutionError
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
@@ -23,7 +24,7 @@ from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
-from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
+from cfmkit.families.vcfm.outline import drawing, solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 from cfmkit.stock.spec import CutPart
@@ -228,6 +229,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
     back = 1.3 * max([-(rest or 0.0) for rest in rests] + [0.0])
     try:
+        outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"

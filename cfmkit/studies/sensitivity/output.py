@@ -18,7 +18,7 @@ from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.store.disk import Data
+    from cfmkit.store.safe_disk_changes import Data
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
