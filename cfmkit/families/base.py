@@ -341,6 +341,9 @@ class Family:
     analyze_block : callable, optional
         ``analyze_block(spec, block) -> answer``: many variants of a specification at once;
         None where the model cannot vary these paths or measure these metrics.
+    block_travel : callable, optional
+        ``block_travel(spec, paths) -> (start, end) or None``: the travel that every variant of a block over these
+        paths has, so that windows in shares of it are places; None where each has its own.
     gradient : callable, optional
         ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
         metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
@@ -404,6 +407,7 @@ class Family:
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
+    block_travel: Callable[[Any, Sequence[str]], tuple[float, float] | None] | None = None
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     sampled: str | None = None
     sampled_slopes: str | None = None

@@ -10,7 +10,7 @@ from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.requirements import ROUNDING, Bounds
-from cfmkit.specs.units import Share
+from cfmkit.specs.units import Share, between
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import BlockAnswer
     from cfmkit.metrics import Definition
-    from cfmkit.specs.spec import Requirement
     from cfmkit.studies.plan import Plan
     from cfmkit.studies.point_evaluation import Study
 
@@ -76,10 +75,14 @@ def _warned(answer: BlockAnswer, singly: list[int], rest: ResultRows) -> dict[st
 
 
 def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:
-    model = family(study.spec.family).analyze_block
-    if model is None or _follows_the_travel(study):
+    record = family(study.spec.family)
+    model, travel = record.analyze_block, None
+    if model is not None and _follows_the_travel(study):
+        travel = record.block_travel and record.block_travel(study.spec, plan.paths)
+        model = travel and model
+    if model is None:
         return None
-    values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study)
+    values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study, travel)
     renamed = tuple(Measure(other_name(one.name), one.window) for one in asked)
     with np.errstate(all="ignore"):
         found = model(study.spec, Block(values, asked, stop - start))
@@ -89,31 +92,28 @@ def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | No
 
 
 def _follows_the_travel(study: Study) -> bool:
-    """Return whether some window is a share of the travel, which each point has its own: blocks have one for all."""
+    """Return whether some window is a share of the travel: blocks have places, which are the same for all points."""
     windows = [*(ends for _, ends in study.spec.windows()), *(one.over for one in study.metrics if one.over)]
     return any(isinstance(end, Share) for ends in windows for end in ends)
 
 
-def measures(study: Study) -> tuple[Measure, ...]:
-    """Return what is asked of each point: the metrics, then the requirements."""
-    return (
-        *(Measure(split_name(one.name)[0], one.over or _window(study)) for one in study.metrics),
-        *map_requirements(study),
-    )
+def measures(study: Study, travel: tuple[float, float] | None = None) -> tuple[Measure, ...]:
+    """Return what is asked of each point: the metrics, then the requirements.
+
+    travel: by which shares of it become places; they have none without it.
+    """
+    asked = [(one.name, one.over) for one in study.metrics]
+    asked += [(one.metric, one.over) for one in study.spec.part_requirements]
+    return tuple(Measure(split_name(name)[0], _places(study, over, travel)) for name, over in asked)
 
 
-def map_requirements(study: Study) -> tuple[Measure, ...]:
-    """Return what the requirements ask for."""
-    return tuple(Measure(split_name(one.metric)[0], _over(study, one)) for one in study.spec.part_requirements)
-
-
-def _window(study: Study) -> tuple[float, float] | None:
-    ends = getattr(getattr(study.spec, "analysis", None), "window", None)
-    return None if ends is None else (float(ends[0]), float(ends[1]))
-
-
-def _over(study: Study, one: Requirement) -> tuple[float, float] | None:
-    return _window(study) if one.over is None else (float(one.over[0]), float(one.over[1]))
+def _places(
+    study: Study, over: tuple[float, float] | None, travel: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    ends = over or getattr(getattr(study.spec, "analysis", None), "window", None)
+    if ends is None:
+        return None
+    return (float(ends[0]), float(ends[1])) if travel is None else between(ends, travel)
 
 
 def _columns(study: Study, answer: BlockAnswer) -> FloatArray:

@@ -21,6 +21,7 @@ FAMILY = Family(
     draw="cfmkit.families.cam.figures",
     scheme="cfmkit.families.cam.parameter_sketch",
     analyze_block=when_called("cfmkit.families.cam.many_designs.model:analyze_block"),
+    block_travel=when_called("cfmkit.families.cam.many_designs.model:block_travel"),
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.proposals_for_wish:propose",
     room="cfmkit.families.cam.bounding_box:room",

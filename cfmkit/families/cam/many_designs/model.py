@@ -35,7 +35,7 @@ from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -84,6 +84,18 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
         designs = _designs(spec, block)
         return _answer(spec, block, designs, (*_plain(designs, settings), *_undercut(designs, settings)))
     return None
+
+
+def block_travel(spec: CamSpec, paths: Sequence[str]) -> tuple[float, float] | None:
+    """Return the travel of all variants over some paths; None where parts around one cam may end it before.
+
+    A cam that is cut for its own roller and brace runs over the whole of its path, or is left to the model of one cam.
+    """
+    profile = spec.mechanism.profile
+    own = profile.brace_length is None and profile.rest_half_width is None and profile.roller_radius is None
+    if not own or spec.analysis.travel is not None or "mechanism.profile.stroke" in paths or profile.stroke is None:
+        return None
+    return 0.0, profile.stroke
 
 
 def _answer(
