@@ -334,7 +334,10 @@ DESIGNED = ("--design", "--vary", "design.stroke=150mm:250mm:3", "--metrics", "f
 
 
 def test_a_table_says_why_cells_are_empty_where_a_window_does_not_follow_a_swept_stroke(cli, tmp_path):
-    done = cli("sweep", str(CAM), *DESIGNED, "-o", "out")
+    places = ("[2 mm, 240 mm]", "[5 mm, 240 mm]")
+    keys = ("analysis.window", "requirements.0.over", "requirements.1.over")
+    stated = [f"{key}={places[key.endswith('1.over')]}" for key in keys]
+    done = cli("sweep", str(CAM), *DESIGNED, "-o", "out", *(word for one in stated for word in ("--set", one)))
     found = rows(tmp_path / "out")
     assert [row["force_mean [N]"] == "" for row in found] == [True, True, False]
     assert [row["message"] for row in found] == [

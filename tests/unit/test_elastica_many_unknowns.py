@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigh
 
-from cfmkit.elastica.vibration import modes
+from cfmkit.elastica.vibration import natural_frequencies
 
 
 def system(n, seed=3):
@@ -22,8 +22,8 @@ def test_few_frequencies_of_many_unknowns_are_those_of_all(twice):
     stiffness, mass = system(140 if twice else 260)
     if twice:
         stiffness, mass = block_diag(stiffness, stiffness), block_diag(mass, mass)
-    assert len(stiffness) > modes._SMALL
-    found = modes._symmetric(stiffness, mass, 4)
+    assert len(stiffness) > natural_frequencies._SMALL
+    found = natural_frequencies._symmetric(stiffness, mass, 4)
     every = 1.0 / eigh(mass, stiffness, eigvals_only=True)[::-1]  # so that rounding is that of the lowest ones
     np.testing.assert_allclose(found, every[:4], rtol=1e-9)
     if twice:
@@ -38,4 +38,4 @@ def test_few_frequencies_of_many_unknowns_need_no_whole_spectrum(monkeypatch):
 
     stiffness, mass = system(260)
     monkeypatch.setattr(scipy.linalg, "eigh", whole)
-    assert np.isfinite(modes._symmetric(stiffness, mass, 2)).all()
+    assert np.isfinite(natural_frequencies._symmetric(stiffness, mass, 2)).all()

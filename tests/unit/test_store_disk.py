@@ -183,7 +183,7 @@ def test_the_store_needs_neither_numpy_nor_anything_else_to_start():
 def test_only_one_module_changes_the_disk():
     """Otherwise the fault tests would miss a step."""
     changing = re.compile(
-        r"(?<!disk\.system)\b(?:os\.(?:open|write|replace|rename|link|unlink|remove|mkdir|makedirs|rmdir|fsync|truncate|ftruncate)\b"
+        r"(?<!safe_disk_changes\.system)\b(?:os\.(?:open|write|replace|rename|link|unlink|remove|mkdir|makedirs|rmdir|fsync|truncate|ftruncate)\b"
         r"|shutil|\.(?:write_bytes|write_text|touch|unlink|mkdir|rmdir|rename|symlink_to|hardlink_to)\()|\bopen\([^)]*[\"'][wax]"
     )
     folder = Path(safe_disk_changes.__file__).parent
@@ -191,6 +191,6 @@ def test_only_one_module_changes_the_disk():
         f"{path.name}: {line.strip()}"
         for path in folder.glob("*.py")
         for line in path.read_text().splitlines()
-        if changing.search(line.replace("disk.system.", "").replace("system.", ""))
+        if changing.search(line.replace("safe_disk_changes.system.", "").replace("system.", ""))
     ]
     assert found == []

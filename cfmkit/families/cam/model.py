@@ -134,14 +134,14 @@ def with_band(solution: Solution, seed: int) -> Solution:
 def _requested(solution: Solution, short: bool) -> float:
     """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
     spec = solution.assembly.spec
-    stroke = (spec.mechanism.profile.stroke or 0.0) if short else float(solution.travel[-1])
-    return spec.analysis.travel or stroke
+    reached, stroke = float(solution.travel[-1]), spec.mechanism.profile.stroke or 0.0
+    # the whole stroke but for rounding is the stroke: shares of the travel are then the same places in every run
+    return spec.analysis.travel or (stroke if short or isclose(reached, stroke, rel_tol=CLOSE) else reached)
 
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
     """Return the spec with the defaults of the analysis made explicit."""
-    reached, stroke = float(solution.travel[-1]), spec.mechanism.profile.stroke or 0.0
-    travel = spec.analysis.travel or (stroke if isclose(reached, stroke, rel_tol=CLOSE) else reached)
+    travel = _requested(solution, short=False)
     analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
     return spec.model_copy(update={"analysis": analysis})
 
