@@ -48,7 +48,7 @@ def comparable(path):
         return None
 
 
-LONG = ("beam_williams_toggle", "beam_v_bifurcation")
+LONG = ("beam_williams_toggle", "beam_v_bifurcation", "beam_cantilever", "beam_lee_frame")
 """Configurations of slender beams, which as solids have more elements than all others together."""
 
 

@@ -100,7 +100,7 @@ last three are the flattest of some thousands of random linkages over 40 to 90 d
 WOUND_UP = -math.radians(60.0)
 """Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
 
-SHRUNK = (0.99, 0.9, 0.75)
+SHRUNK = (0.99, 0.8)
 """Sizes of linkages for a torque, over the largest that the room allows: smaller ones leave room for wider springs."""
 
 ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
