@@ -140,7 +140,7 @@ class ExactSampler:
         How far it is pulled back at most, positive [m].
     """
 
-    # paths of beams, or of solids (`solid.SolidPath`), which answer the same questions
+    # paths of beams, or of solids (`plane_fem_model.SolidPath`), which answer the same questions
     pushed: Any
     pulled: Any
     sides: list[Any]
