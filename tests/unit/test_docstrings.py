@@ -79,3 +79,21 @@ def test_what_a_folder_says_of_its_files_names_files_that_there_are(folder):
     words = set(re.findall(r"(?<!`)`([a-z][a-z_]{2,})`(?!`)", ast.get_docstring(ast.parse(text)) or ""))
     known = {path.stem for path in files} | set(re.findall(r'^    "([a-z_]+)",$', text, re.M))
     assert {word for word in words - known if not re.search(rf"\bdef {word}\(|^{word}\b.*=", code, re.M)} == set()
+
+
+def test_a_reference_in_a_docstring_names_a_module_and_something_that_it_defines():
+    """Of words in backticks, joined by dots, whose last is a class; or that begin with the package."""
+    modules: dict[str, str] = {}
+    for path in (ROOT / "cfmkit").rglob("*.py"):
+        name = path.parent.name if path.name == "__init__.py" else path.stem
+        modules[name] = modules.get(name, "") + path.read_text(encoding="utf-8")
+    known = set(modules) | {"xarray", "pandas", "configs"}
+    lost = set()
+    for text in modules.values():
+        for reference in re.findall(r"`((?:[a-z_]+\.)+[A-Z]\w+|cfmkit(?:\.\w+)+)`", text):
+            words = reference.split(".")
+            place = max((k for k, word in enumerate(words) if word in known), default=-1)
+            named = words[place + 1 : place + 2]
+            if place < 0 or not all(re.search(rf"\b{one}\b", modules.get(words[place], one)) for one in named):
+                lost.add(reference)
+    assert lost == set()

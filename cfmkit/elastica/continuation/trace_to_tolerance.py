@@ -70,7 +70,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 
 
 class Attempt(NamedTuple):
-    """A path on one mesh, with its estimated error; `first`: see `joined_marches.Followed`."""
+    """A path on one mesh, with its estimated error; `first`: see `decision_loop.Followed`."""
 
     problem: PathProblem
     trail: Trail

@@ -189,10 +189,10 @@ def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
 
 
 def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
-    """Return what the drifts and kicks of all steps take, dimensionless, as in `kernels.model.DiscreteNetwork`.
+    """Return what the drifts and kicks of all steps take, dimensionless.
 
-    `known` is the table of the layout that this one took fits over from: the rows of beams that are neither plain nor
-    changed are taken over too.
+    See `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`. `known` is the table of the layout that this one took
+    fits over from: the rows of beams that are neither plain nor changed are taken over too.
     """
     bundle, units = layout.bundle, layout.units
     plain: Any = None

@@ -183,7 +183,7 @@ class Layout:
 
     @cached_property
     def units(self) -> Any:
-        """Factors that make the columns of a table dimensionless, (6,), as in `kernels.model.DiscreteNetwork`.
+        """Factors that make the columns of a table dimensionless, (6,), as in `network_arrays.DiscreteNetwork`.
 
         Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.network_arrays.HALVES`.
         """

@@ -48,7 +48,9 @@ GATHERED = 1.5
 
 @dataclass(frozen=True, eq=False)
 class SolidPath:
-    """A part that is followed from rest in one direction, asked like a path of beams (`traced.Traced`).
+    """A part that is followed from rest in one direction.
+
+    It answers as a path of beams does (`interpolated_equilibrium_path.Traced`).
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Tracks of many rollers and braces on one cam, solved together.
 
-The formulas are those of `track.Track`, in the same order; whatever that finds by a root of one cam is found here for
-all of them at once. Which of the parts cannot run on the cam is an array, no exception.
+The formulas are those of `mounted_roller_track.Track`, in the same order; whatever that finds by a root of one cam is
+found here for all of them at once. Which of the parts cannot run on the cam is an array, no exception.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ class Track:
         Of the brace built in [m].
     offset : float
         Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
-        material is not an offset: it is the cam cut for a larger roller (`cam_cut.cut`).
+        material is not an offset: it is the cam cut for a larger roller (`cut.cut`).
 
     Attributes
     ----------

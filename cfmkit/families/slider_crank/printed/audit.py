@@ -79,7 +79,7 @@ def judge(
     limits : (float or None, float or None)
         Ripple as a share and stress [Pa] that end the stroke, where it is what is sought.
     pins : (3, 2) array
-        Where it is kinked, as `assembly.pins_of` says [m].
+        Where it is kinked, as `beam_chain_from_spec.pins_of` says [m].
     """
     task, form = found.task, found.form
     strip = form.strip(values, task.corners)
