@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
     from cfmkit.elastica.outcome.curling_stiffening import HinderedCurling, hindered_curling
     from cfmkit.elastica.outcome.path import Event, Path, PathStatus
-    from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
+    from cfmkit.elastica.sensitivity.output_derivatives import Gradient, gradient
 
 _HOMES = {
     "continuation.batch": ("NetworkOutcome", "trace_many"),
@@ -65,7 +65,7 @@ _HOMES = {
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
     "outcome.curling_stiffening": ("HinderedCurling", "hindered_curling"),
     "outcome.path": ("Event", "Path", "PathStatus"),
-    "sensitivity.gradient": ("Gradient", "gradient"),
+    "sensitivity.output_derivatives": ("Gradient", "gradient"),
 }
 _HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
 

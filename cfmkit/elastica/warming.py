@@ -13,7 +13,7 @@ from cfmkit.elastica.model.beam import Beam
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.elastica.model.network import CLAMPED, Network, Node
 from cfmkit.elastica.model.section import Section
-from cfmkit.elastica.sensitivity.gradient import gradient
+from cfmkit.elastica.sensitivity.output_derivatives import gradient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

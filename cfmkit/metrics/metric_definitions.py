@@ -22,7 +22,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics import durability, ranges, window_metrics
+from cfmkit.metrics import ranges, window_metrics
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
@@ -230,7 +230,7 @@ _LONG_TERM = (
         "count",
         "cycles to failure between the least and the largest stress in the window, of all load cases, by the "
         "material's `fatigue` with Goodman's line",
-        durability.fatigue_life,
+        window_metrics.fatigue_life,
         "smallest",
         of_material=True,
     ),
@@ -239,7 +239,7 @@ _LONG_TERM = (
         "effort",
         "mean {effort} in the window after a hold of the time in brackets, as in `force_after[1000 h]`: it follows "
         "the material's `relaxation`",
-        durability.effort_after,
+        window_metrics.effort_after,
         "smallest",
         argument="time",
         of_material=True,

@@ -1,4 +1,4 @@
-"""Metrics of what lies inside the window: statistics, deviations, hysteresis, stress.
+"""Metrics of what lies inside the window: statistics, deviations, hysteresis, stress, cycles to failure.
 
 A branch whose mean is negative is judged in its own direction (the opposite sign
 convention gives the same ripple). Each function takes a `Branch` (or the
@@ -180,3 +180,24 @@ def _stress(trace: BranchTrace) -> FloatArray:
     if unknown := int(np.isnan(trace.stress).sum()):
         raise Undefined(f"the stress is unbounded at {unknown} of {len(trace.stress)} points in the window")
     return trace.stress
+
+
+def fatigue_life(branch: Branch) -> float:
+    """Return the cycles to failure between the least and the largest stress in the window, of all load cases."""
+    known = branch.frame.durability
+    if known is None or known.fatigue is None:
+        raise Undefined("the material has no fatigue data: add 'fatigue' to it")
+    ranges = [stress_range(branch)]
+    for part in branch.inside_beside:
+        if part.stress is None or np.isnan(part.stress).any():
+            raise Undefined("the stress of another load case is not known everywhere in the window")
+        ranges.append((float(part.stress.min()), float(part.stress.max())))
+    return min(known.fatigue.life(largest, least) for least, largest in ranges)
+
+
+def effort_after(branch: Branch, time: float) -> float:
+    """Return the mean effort in the window after a hold of a time [s]."""
+    known = branch.frame.durability
+    if known is None or known.relaxation is None:
+        raise Undefined("the material has no relaxation data: add 'relaxation' to it")
+    return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.designing import limits, objective_and_constraints
+from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import at_bounds, rounded
-from cfmkit.designing.limits import LimitRows
-from cfmkit.designing.objective_and_constraints import SeenPoint
+from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint
 from cfmkit.designing.run_many_starts import NEVER, Clock, Stage, done
 from cfmkit.families.base import Run
 from cfmkit.numerics.sqp import Effort, SearchEnding, minimize
@@ -92,16 +91,16 @@ def test_missed_limits_are_told_the_worst_first_each_with_its_worst_row() -> Non
         LimitRows("c", np.array([-1e-6])),
         LimitRows("d", np.zeros(0)),
     ]
-    assert [(one.name, one.about) for one in limits.missed(rows, 1e-4)] == [("b", "b0"), ("a", "a2")]
-    assert limits.worst(rows) == 0.5
-    assert limits.worst([]) == 0.0
+    assert [(one.name, one.about) for one in objective_and_constraints.missed(rows, 1e-4)] == [("b", "b0"), ("a", "a2")]
+    assert objective_and_constraints.worst(rows) == 0.5
+    assert objective_and_constraints.worst([]) == 0.0
 
 
 def test_rows_near_zero_hold_a_design_unless_nothing_moves_them() -> None:
     rows = [
         LimitRows("a", np.array([1e-4, 1e-4, 0.5]), np.array([[1.0], [0.0], [1.0]]), lambda: ["moved", "fixed", "far"])
     ]
-    assert list(limits.held(rows, 1e-3)) == ["a: moved"]
+    assert list(objective_and_constraints.held(rows, 1e-3)) == ["a: moved"]
 
 
 def test_rounded_numbers_stay_within_their_bounds() -> None:

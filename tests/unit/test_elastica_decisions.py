@@ -12,7 +12,7 @@ from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Event, Network
 from cfmkit.elastica.continuation import (
     branch_rejoins_path,
     decision_loop,
-    decisions_at_bifurcation,
+    decisions_after_march,
     ending_messages,
     passing_limit_points,
     points_at_bifurcation,
@@ -154,16 +154,16 @@ def test_points_at_a_bifurcation_count_as_reached_by_way_of_it():
 def test_what_changes_the_inertia_and_is_not_found_is_looked_at_with_shorter_steps_then_told(monkeypatch):
     of = problem()
     path = trail(of, (0.01, 0, 0), (0.0101, -1, 1))
-    monkeypatch.setattr(decisions_at_bifurcation, "fine_spot", lambda *_: None)
-    monkeypatch.setattr(decisions_at_bifurcation.points_at_bifurcation, "passed", lambda *_: None)
-    monkeypatch.setattr(decisions_at_bifurcation, "uncondensed", lambda *_: None)
+    monkeypatch.setattr(decisions_after_march, "fine_spot", lambda *_: None)
+    monkeypatch.setattr(decisions_after_march.points_at_bifurcation, "passed", lambda *_: None)
+    monkeypatch.setattr(decisions_after_march, "uncondensed", lambda *_: None)
     for _ in range(2):
-        move = decisions_at_bifurcation.crossed(of, path)
+        move = decisions_after_march.crossed(of, path)
         assert isinstance(move, Resume)
         assert move.step == pytest.approx(0.25 * 1e-4)
         assert len(move.trail.points) == 1
         path = move.trail.with_spot(spot(of, 0.0101, 1), -1)
-    move = decisions_at_bifurcation.crossed(of, path)
+    move = decisions_after_march.crossed(of, path)
     assert move.trail.events == (Event("unresolved", pytest.approx(1.01e-3), 0, 1),)
     assert len(move.trail.points) == 2
 

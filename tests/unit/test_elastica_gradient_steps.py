@@ -27,7 +27,7 @@ from cfmkit.elastica import (
 from cfmkit.elastica.equilibrium.mesh import Mesh, grid, table
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.model.shapes import Bent
-from cfmkit.elastica.sensitivity.complex_steps import ComplexSteps, slope
+from cfmkit.elastica.sensitivity.array_derivatives import ComplexSteps, slope
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

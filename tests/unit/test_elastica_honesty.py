@@ -20,7 +20,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation import branch_rejoins_path, decisions_at_bifurcation, trace_to_tolerance
+from cfmkit.elastica.continuation import branch_rejoins_path, decisions_after_march, trace_to_tolerance
 from cfmkit.elastica.equilibrium.mesh import Mesh
 
 DOWN = -np.pi / 2
@@ -97,7 +97,7 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
     monkeypatch: pytest.MonkeyPatch, travel: tuple[float, ...], on_branch: int
 ) -> None:
     """Without a search for the end, long steps pass from the branch to the path that it joins; it is found behind."""
-    monkeypatch.setattr(decisions_at_bifurcation, "predicted_end", lambda *given: (None, False))
+    monkeypatch.setattr(decisions_after_march, "predicted_end", lambda *given: (None, False))
     path = trace(v_beam(), Displacement("d", DOWN, np.array(travel) * 1e-3))
     names = path.branch[path.at_requested]
     assert all(name.startswith("bifurcated") for name in names[:on_branch])
@@ -108,7 +108,7 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
 
 def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """From 4.71 mm one step passes it; from 4.7 mm the steps become short there, and rounding decides what is found."""
-    monkeypatch.setattr(decisions_at_bifurcation, "predicted_end", lambda *given: (None, False))
+    monkeypatch.setattr(decisions_after_march, "predicted_end", lambda *given: (None, False))
     monkeypatch.setattr(branch_rejoins_path, "closed_behind", lambda *given: None)
     path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.71, 5.0, 6.0]) * 1e-3))
     assert path.branch[path.at_requested][2:].tolist() == ["primary", "primary"]

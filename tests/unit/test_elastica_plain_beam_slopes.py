@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Polynomial, Section, gradient, guided, trace
-from cfmkit.elastica.sensitivity import complex_steps
+from cfmkit.elastica.sensitivity import array_derivatives
 
 LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
 
@@ -35,10 +35,10 @@ def lan(x: Any) -> Network:
 def test_written_out_derivatives_are_those_of_complex_steps(monkeypatch: pytest.MonkeyPatch, every: bool) -> None:
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3])))
     solver = path.solver
-    written = complex_steps.ComplexSteps(path.layout, lan, LAN)
+    written = array_derivatives.ComplexSteps(path.layout, lan, LAN)
     assert written.plain is not None
-    monkeypatch.setattr(complex_steps, "plain_slopes", lambda *_: None)
-    stepped = complex_steps.ComplexSteps(path.layout, lan, LAN)
+    monkeypatch.setattr(array_derivatives, "plain_slopes", lambda *_: None)
+    stepped = array_derivatives.ComplexSteps(path.layout, lan, LAN)
     assert stepped.plain is None
     one, other = (tilts.arrays(solver.model, solver.cut, every) for tilts in (written, stepped))
     for name in one._fields:
@@ -53,7 +53,7 @@ def test_written_out_derivatives_are_those_of_complex_steps(monkeypatch: pytest.
 def test_outputs_that_look_at_the_shape_of_beams_are_the_same_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3, 4e-3])))
     written = gradient(path, lan, LAN)
-    monkeypatch.setattr(complex_steps, "plain_slopes", lambda *_: None)
+    monkeypatch.setattr(array_derivatives, "plain_slopes", lambda *_: None)
     stepped = gradient(path, lan, LAN)
     for beam in path.layout.network.beams:
         for a, b in (

@@ -15,7 +15,7 @@ import cfmkit
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.slider_crank.springs.best_sets import best_sets
+from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
 from cfmkit.specs.data_file_paths import DataSource

@@ -18,7 +18,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.track_states import TrackStates
+    from cfmkit.families.cam.geometry.mounted_roller_track import TrackStates
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Contact, Mechanism
     from cfmkit.stock.spec import MaterialSpec

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.mounted_roller_track import TrackStates
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.geometry.track_states import TrackStates
 from cfmkit.families.cam.mechanism_from_spec import (
     CLOSE,
     assemble_sides,
@@ -37,8 +37,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
-from cfmkit.families.findings import at_least, at_most, mm, newton, rate
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
+from cfmkit.families.findings import CannotBuild, Infeasible, at_least, at_most, mm, newton, no_design, rate
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of

@@ -15,16 +15,14 @@ import numpy as np
 
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.mounted_roller_track import Track
+from cfmkit.families.cam.geometry.mounted_roller_track import NoTrack, Track
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
-from cfmkit.families.findings import mm
-from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.findings import CannotBuild, mm
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

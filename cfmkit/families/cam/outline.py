@@ -14,8 +14,7 @@ import numpy as np
 
 from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Drawing, DrawnDimension, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
-from cfmkit.families.findings import mm, rate
-from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.findings import CannotBuild, mm, rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +36,7 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.no_mechanism.CannotBuild
+    cfmkit.families.findings.CannotBuild
         If there is no cam to draw.
     """
     sides = assemble_sides(spec)

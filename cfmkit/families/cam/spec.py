@@ -12,7 +12,7 @@ from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, O
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
 
 Positive = Field(gt=0)
 PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
@@ -44,15 +44,7 @@ class Springs(Model):
 
     @model_validator(mode="after")
     def _rate_is_known(self) -> Self:
-        if self.stiffness is None:
-            if self.wound is None:
-                refuse("Springs", {("stiffness",): "missing: give it, or 'wound' from which it follows"})
-            else:
-                # past the frozen model, and not counted as set: another wire then has another rate
-                object.__setattr__(self, "stiffness", self.wound.wound("extension").rate)
-        elif self.wound is not None:
-            for one in self.stiffness if isinstance(self.stiffness, tuple) else (self.stiffness,):
-                self.wound.check_rate("extension", one)
+        settle_rate(self, "extension")
         return self
 
     @model_validator(mode="after")

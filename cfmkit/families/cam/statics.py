@@ -38,9 +38,8 @@ from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.mounted_roller_track import Track
+    from cfmkit.families.cam.geometry.mounted_roller_track import Track, TrackStates, TrackStretch
     from cfmkit.families.cam.geometry.slope_law import Real
-    from cfmkit.families.cam.geometry.track_states import TrackStates, TrackStretch
 
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""

@@ -58,7 +58,7 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.no_mechanism.CannotBuild
+    cfmkit.families.findings.CannotBuild
         If it cannot be assembled.
     """
     made: Drawing = _in_room(ROOMS[spec.fidelity], "outline:drawing")(resolve(spec))

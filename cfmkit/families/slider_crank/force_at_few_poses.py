@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.families.base import Sampled
-from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.families.findings import CannotBuild
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS

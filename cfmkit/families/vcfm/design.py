@@ -4,7 +4,7 @@ With F_c = K h and dF = K dr the rise is h = F_c dr/dF. The stroke gives the thi
 (4 h/3) sqrt(1 - (pi/Q)^2) long; the stress gives the shortest leaf; K_n = K its width. The spring is as long as its
 stress at full travel and preload allows. Forces are exactly linear in the widths, so that the two factors that make the
 exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do. Where a sheet fixes
-the widths, lengths and numbers are found in a few passes (`sizing_for_given_sheet`).
+the widths, lengths and numbers are found in a few passes (`leaf_sizing`).
 """
 
 from __future__ import annotations
@@ -16,19 +16,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, mm, mpa, newton
-from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.findings import Infeasible, at_least, mm, mpa, newton, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
+    NEAR,
+    PASSES,
     RESCALES,
     SQUAT,
     check_guide,
     completed,
     followable_stroke,
+    leaf_of_sheet,
+    next_leaf,
+    next_side,
     shortest_leaf,
+    side_of_sheet,
     sized_leaf,
+    stress_unreachable,
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -36,15 +42,6 @@ from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
 from cfmkit.families.vcfm.leaves_around_bought_springs import with_bought_springs
 from cfmkit.families.vcfm.model import LawSampler, rest_of
-from cfmkit.families.vcfm.sizing_for_given_sheet import (
-    NEAR,
-    PASSES,
-    leaf_of_sheet,
-    next_leaf,
-    next_side,
-    side_of_sheet,
-    stress_unreachable,
-)
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit.stock.spec import sheet_of

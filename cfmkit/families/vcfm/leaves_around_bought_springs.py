@@ -14,22 +14,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import mm, mpa
-from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.findings import Infeasible, mm, mpa, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
+    NEAR,
+    PASSES,
     RESCALES,
     SQUAT,
     check_guide,
     completed,
+    leaf_of_sheet,
+    next_leaf,
     shortest_leaf,
     sized_leaf,
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, onset_and_exit
-from cfmkit.families.vcfm.sizing_for_given_sheet import NEAR, PASSES, leaf_of_sheet, next_leaf
 from cfmkit.results import Design, Status
 from cfmkit.stock.spec import sheet_of
 from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest

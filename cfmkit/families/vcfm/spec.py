@@ -23,7 +23,7 @@ from cfmkit.specs.spec import (
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -111,14 +111,7 @@ class BoughtSprings(Model):
 
     @model_validator(mode="after")
     def _rate_is_known(self) -> Self:
-        if self.stiffness is None:
-            if self.wound is None:
-                refuse("BoughtSprings", {("stiffness",): "missing: give it, or 'wound' from which it follows"})
-            else:
-                # past the frozen model, and not counted as set: another wire then has another rate
-                object.__setattr__(self, "stiffness", self.wound.wound(self.kind).rate)
-        elif self.wound is not None:
-            self.wound.check_rate(self.kind, self.stiffness)
+        settle_rate(self, self.kind)
         if self.initial_tension and self.kind == "compression":
             raise ValueError("'initial_tension' is of extension springs: compression springs have none")
         return self

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, mode
 
 from cfmkit.errors import DataError
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import Model
+from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
 from cfmkit.stock.spec import Fatigue
 from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
@@ -80,6 +80,18 @@ def _disagree(times: float) -> str:
         f"wire, coil and turns give {times:.3g} times the rate that is stated: leave one of them out, or give the "
         "wire's modulus"
     )
+
+
+def settle_rate(springs: Any, kind: Kind) -> None:
+    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated."""
+    if springs.stiffness is None:
+        if springs.wound is None:
+            refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
+        # past the frozen model, and not counted as set: another wire then has another rate
+        object.__setattr__(springs, "stiffness", springs.wound.wound(kind).rate)
+    elif springs.wound is not None:
+        for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
+            springs.wound.check_rate(kind, one)
 
 
 class CatalogueSpring(WireLimits):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing import limits as design_limits
+from cfmkit.designing import objective_and_constraints as design_limits
 from cfmkit.designing.bounds_and_rounding import at_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.findings import finding, percent

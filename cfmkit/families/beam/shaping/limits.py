@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.designing.limits import LimitRows
+    from cfmkit.designing.objective_and_constraints import LimitRows
     from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.response import View
 

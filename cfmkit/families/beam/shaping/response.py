@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.designing.limits import LimitRows
+from cfmkit.designing.objective_and_constraints import LimitRows
 from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.variables import Length, lengths

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import rounded as rounded_within
-from cfmkit.designing.limits import worst
+from cfmkit.designing.objective_and_constraints import worst
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.errors import CfmError

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.limits import LimitRows, worst
-from cfmkit.designing.objective_and_constraints import SeenPoint
+from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint, worst
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 

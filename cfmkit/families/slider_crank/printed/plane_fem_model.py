@@ -18,8 +18,7 @@ from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket
-from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.findings import CannotBuild, bracket, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction

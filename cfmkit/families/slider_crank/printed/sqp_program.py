@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.limits import LimitRows
-from cfmkit.designing.objective_and_constraints import SeenPoint
+from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
