@@ -258,7 +258,14 @@ def _number(report: Report, name: str) -> NumberRow:
     window = left_of(window_of(report.result), report.result)
     rule = _allowed(report) if name == "safety_factor" else ""
     rule += _overrated(report, name) if name.endswith("safety_factor") else ""
+    rule += _flat_part(report) if name == "window_force" else ""
     return NumberRow(words(name), _branches(report, name, report.metrics) + _over(report, name, window) + rule)
+
+
+def _flat_part(report: Report) -> str:
+    """Return where the flat part of a curve is: not the window that is judged."""
+    start, end = (report.metrics[name] for name in ("window_start", "window_end"))
+    return "" if start.value is None or end.value is None else f" over {span(start.value, end.value, start.dimension)}"
 
 
 def _allowed(report: Report) -> str:

@@ -200,6 +200,41 @@ def test_no_constant_force_is_stated_where_no_number_stands_for_the_curve():
     assert analyzed().values["constant_force"].value == pytest.approx(13.66, abs=5e-3)
 
 
+@pytest.mark.parametrize("changes", [
+    ["mechanism.bistable.structure=cosine", "mechanism.bistable.thickness=1.8 mm"],
+    ["mechanism.bistable.structure=cosine", "mechanism.bistable.thickness=1.8 mm", "analysis.fidelity=exact"],
+    ["analysis.fidelity=truss"], ["mechanism.positive.width=3 mm"], ["mechanism.positive.width=20 mm"],
+])  # fmt: skip
+def test_no_constant_force_is_stated_where_the_curve_is_not_flat_at_it(changes):
+    """It only passes through the force of the spring alone: what is flat is the peak, and has another force."""
+    found = analyzed(*changes, "analysis.window=[2 mm, 4 mm]")
+    assert "not_flat" in names(found)
+    flat, none = found.values["window_force"], found.values["constant_force"]
+    assert none.value is None
+    assert "without being flat" in none.reason
+    inside = (found.curve.motion >= found.values["window_start"].value) & (
+        found.curve.motion <= found.values["window_end"].value
+    )
+    assert flat.value == pytest.approx(found.curve.force[inside].mean(), rel=0.02)
+
+
+def test_a_constant_force_stays_where_only_the_window_is_wrong():
+    """The window begins before the leaves buckle, behind which the force is that of the spring."""
+    found = analyzed(FLAT, "analysis.window=[0.3 mm, 4 mm]")
+    assert "not_flat" in names(found)
+    assert found.values["constant_force"].value == pytest.approx(found.values["window_force"].value, rel=0.05)
+
+
+def test_a_sweep_states_a_constant_force_where_a_single_run_does():
+    spec = table_i()
+    widths = np.linspace(3e-3, 20e-3, 40)
+    study = cfmkit.sweep(spec, vary={"mechanism.positive.width": widths}, metrics=["constant_force"])
+    swept = next(np.array(one.values, dtype=float) for one in study.table.columns if one.name == "constant_force")
+    single = [analyzed(f"mechanism.positive.width={width} m").values["constant_force"].value for width in widths]
+    assert swept == pytest.approx([np.nan if one is None else one for one in single], rel=1e-12, nan_ok=True)
+    assert 0 < np.isnan(swept).sum() < len(widths)
+
+
 def test_a_spring_that_closes_ends_the_curve_there():
     """Its blocks meet after 2 L1 sin(theta1) + the corner less the rims, whatever presses it: preload or travel."""
     room = 2 * 25 * np.sin(np.radians(7)) + 12 - 1.5 * 1.5

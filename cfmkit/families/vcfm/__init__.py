@@ -32,6 +32,7 @@ FAMILY = Family(
     analyze_block=when_called("cfmkit.families.vcfm.many_designs:analyze_block"),
     headline=(
         "constant_force",
+        "window_force",
         "positive_stiffness",
         "negative_stiffness",
         "window_length",

@@ -72,7 +72,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 def force(result: Result) -> Figure:
     """Return the nominal curve with the requirement bands."""
     solution: Solution = result.state
-    flat, alone = value_text(solution.parts.balance, "length"), solution.constant_force
+    flat, alone = value_text(solution.parts.balance, "length"), solution.spring_alone
     levels = () if alone is None else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
     look = CurveLook(levels=levels, regions=_beyond(solution))
@@ -168,7 +168,7 @@ def _mark(ax: Axes, push: Push, window: tuple[float, float], back: float, color:
 
 
 def adjustability(result: Result) -> Figure:
-    """Return the constant force, the rest position and where the window starts, with the paper's straight rules."""
+    """Return force in the window, rest position and start of the window, with the paper's straight rules."""
     solution: Solution = result.state
     given = np.array([push.preload for push in solution.pushes])
     over = np.linspace(given.min(), given.max(), PRELOADS)
@@ -181,7 +181,8 @@ def adjustability(result: Result) -> Figure:
     nominal = float(np.interp(solution.nominal.preload, over, mean))
     straight = nominal + force_change(one.positive_stiffness, over - solution.nominal.preload)
     by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
-    x, first = Scale("preload", "length"), Scale("constant force", "force")
+    constant = solution.constant_force is not None
+    x, first = Scale("preload", "length"), Scale("constant force" if constant else "mean force", "force")
     forces = [Series(mean, "mean in the window", BLUE, prefer=0.4)]
     if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():
         forces.append(Series(straight, "F + K_p dr", GREY, dashed=True, prefer=0.7))

@@ -31,8 +31,10 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     overrated,
 )
 from cfmkit.families.vcfm.longest_window import extremes, flat_window
+from cfmkit.families.vcfm.solution import FLAT_PLACES, is_constant
 from cfmkit.metrics.continuous_means_and_extremes import extremes as extremes_next_to
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -127,7 +129,10 @@ def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
 
 @dataclass(frozen=True)
 class Slab:
-    """Some designs over one grid of travels; every quantity is a column (k, 1) or an array (k, points)."""
+    """Some designs over one grid of travels; every quantity is a column (k, 1) or an array (k, points).
+
+    `stated` is the window of the analysis [m], if there is one.
+    """
 
     leaf: VBeam | TrussLeaf
     spring: Diamond | TrussDiamond
@@ -135,6 +140,7 @@ class Slab:
     grid: FloatArray
     flatness: float
     target: float | None = None
+    stated: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, spec: VcfmSpec, values: Mapping[str, Any], size: int) -> Slab:
@@ -158,7 +164,9 @@ class Slab:
         spring: Any = TrussDiamond(side, share) if paper else Diamond(side, share)
         target = spec.design.force if spec.design else None
         leaves = column("half_beams", mechanism.bistable.half_beams)
-        return cls(leaf, spring, leaves, grid, spec.analysis.flatness, target)
+        window = spec.analysis.window
+        stated = None if window is None else between(window, (0.0, spec.travel))
+        return cls(leaf, spring, leaves, grid, spec.analysis.flatness, target, stated)
 
     def force_at(self, travel: FloatArray) -> FloatArray:
         """Return the forces at some travels, (k, n) [N]."""
@@ -233,6 +241,17 @@ def _window_length(slab: Slab) -> FloatArray:
     return np.asarray(np.nan_to_num(end - start))[:, None]
 
 
+@np.errstate(all="ignore")
+def _constant_force(slab: Slab) -> FloatArray:
+    """Return the force of the spring where the leaves are flat, (k, 1) [N]; NaN where the curve is not flat at it."""
+    low, high = (end[:, None] for end in slab.window)
+    places = low + (high - low) * np.linspace(0.0, 1.0, FLAT_PLACES)
+    flat = np.trapezoid(slab.exact(places), places, axis=1).reshape(-1, 1) / (high - low)
+    alone = np.broadcast_to(slab.spring.force(slab.leaf.strip.rise), flat.shape)
+    constant = is_constant(alone, flat, slab.flatness, ((low, high), _window(slab)))
+    return np.asarray(np.where(constant, alone, np.nan))
+
+
 def _stroke(slab: Slab) -> Any:
     first, last = slab.leaf.linear
     return np.nan_to_num(last - first)
@@ -247,7 +266,7 @@ SCALARS: dict[str, Callable[[Slab], Any]] = {
     "linear_start": lambda slab: slab.leaf.linear[0],
     "linear_end": lambda slab: slab.leaf.linear[1],
     "linear_stroke": _stroke,
-    "constant_force": lambda slab: slab.spring.force(slab.leaf.strip.rise),
+    "constant_force": _constant_force,
     "window_start": lambda slab: slab.window[0][:, None],
     "window_end": lambda slab: slab.window[1][:, None],
     "window_length": _window_length,
@@ -260,14 +279,14 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
     leaf, spring, about = slab.leaf.strip, slab.spring.strip, spec.mechanism.bistable
     size, paper, travel = len(slab.force), spec.analysis.fidelity == "truss", float(slab.grid[-1])
     q, rise = leaf.slenderness, leaf.rise
-    top, bottom = _extremes(slab, *_window(spec, slab))
+    top, bottom = _extremes(slab, *_window(slab))
     end = np.asarray(slab.leaf.linear[1])
     rises = slab.force[:, -1:] - _at(slab, np.broadcast_to(end, (size, 1)))
     found = {
         "truss_law": np.array(paper),
         "no_negative_stiffness": (q < NEGATIVE_ABOVE) & (not paper),
         "no_linear_region": (q >= NEGATIVE_ABOVE) & (q <= LINEAR_ABOVE) & (not paper),
-        "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness) & ~_window_is_flat(spec, slab),
+        "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness) & ~_window_is_flat(slab),
         "force_reversal": bottom <= 0,
         "bistable": _stays(slab),
         "overload": (travel > end * (1 + ROUNDING)) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
@@ -333,11 +352,11 @@ def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
     return np.asarray((leaves > allowed * (1 + slack)) | (spring > allowed * (1 + EXACT_FORM)))
 
 
-def _window(spec: VcfmSpec, slab: Slab) -> tuple[FloatArray, FloatArray]:
+def _window(slab: Slab) -> tuple[FloatArray, FloatArray]:
     """Return the ends of the windows in which forces are compared, (k, 1) [m]: as `Solution.window` has them."""
     size, travel = len(slab.force), float(slab.grid[-1])
-    if spec.analysis.window is not None:
-        low, high = (np.full((size, 1), float(end)) for end in spec.analysis.window)
+    if slab.stated is not None:
+        low, high = (np.full((size, 1), end) for end in slab.stated)
         return low, high
     first, last = (np.broadcast_to(end, (size, 1)) for end in slab.leaf.linear)
     start, stop = (end[:, None] for end in slab.window)
@@ -352,9 +371,9 @@ def _straight(slab: Slab) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(first) & (first < float(slab.grid[-1])))
 
 
-def _window_is_flat(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
+def _window_is_flat(slab: Slab) -> NDArray[np.bool_]:
     """Return of which designs the window is the longest flat stretch itself, (k, 1)."""
-    return ~_straight(slab) & np.isfinite(slab.window[0][:, None]) & (spec.analysis.window is None)
+    return ~_straight(slab) & np.isfinite(slab.window[0][:, None]) & (slab.stated is None)
 
 
 def _extremes(slab: Slab, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.fem_scalar_results import unknown_to_beams
+from cfmkit.families.findings import newton
 from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
@@ -38,7 +39,8 @@ DEFINITIONS = {
     "linear_stroke": ("length", "length of the linear negative stiffness"),
     "constant_force": (
         "force",
-        "force of the spring where the leaves carry no force, K_p (h + dr) for straight leaves",
+        "force of the spring where the leaves carry no force, K_p (h + dr) for straight leaves; none unless at least "
+        "half of the window is flat at that force",
     ),
     "window_start": ("length", "start of the longest window within analysis.flatness"),
     "window_end": ("length", "end of it"),
@@ -49,7 +51,10 @@ DEFINITIONS = {
     "force_change_max": ("force", "largest change of the mean force due to a preload, relative to the nominal one"),
     "force_per_preload": ("stiffness", "that change over the change of the preload"),
     "least_force": ("force", "smallest force beyond the peak of the leaves; positive: the shuttle returns by itself"),
-    "stiffness_mismatch": ("ratio", "|K_p - K_n| times the length of the window over the constant force"),
+    "stiffness_mismatch": (
+        "ratio",
+        "|K_p - K_n| times the length of the window over the force of the spring where the leaves carry none",
+    ),
     "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`"),
     "spring_stress_max": ("stress", "largest stress of the spring up to the end of the window, over all preloads"),
     "bistable_stress_max": ("stress", "largest stress of the leaves up to the end of the window, over all preloads"),
@@ -69,7 +74,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     one, strip = solution.character, solution.parts.strip
     low, high = one.linear
     nominal, window = solution.nominal, solution.windows[0]
-    force = solution.constant_force
+    alone = solution.spring_alone
     span = solution.window[1] - solution.window[0]
     end = solution.window[1]
     stresses = solution.largest_stresses(solution.pushes, (end, np.inf))
@@ -84,7 +89,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "linear_start": low,
         "linear_end": high,
         "linear_stroke": high - low if np.isfinite(high - low) else 0.0,
-        "constant_force": force,
+        "constant_force": solution.constant_force,
         "window_start": window[0] if window else None,
         "window_end": window[1] if window else None,
         "window_length": window[1] - window[0] if window else 0.0,
@@ -92,7 +97,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "rest_position": nominal.rest,
         "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
         "least_force": solution.least[1] if solution.least else None,
-        "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
+        "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / alone if alone else None,
         "allowable_stress": allowed,
         "spring_stress_max": spring if solution.spec.mechanism.springs is None else None,
         "bistable_stress_max": leaves,
@@ -101,7 +106,18 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     } | _adjustment(solution)
     error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
     found = {name: _quantity(name, value) for name, value in numbers.items()} | unknown_to_beams() | _bought(solution)
+    if solution.constant_force is None:
+        found["constant_force"] = replace(found["constant_force"], reason=_why_not_constant(solution))
     return found if error is None else found | {name: _quantity(name, value) for name, value in error.values().items()}
+
+
+def _why_not_constant(solution: Solution) -> str:
+    """Return why no single force stands for the curve."""
+    if solution.spring_alone is None:
+        return "leaves or spring are such that the spring alone decides nowhere"
+    flat = solution.window_force
+    found = "" if flat is None else f", and what is flat of it has {newton(flat)}"
+    return f"where the leaves carry nothing the curve passes {newton(solution.spring_alone)} without being flat{found}"
 
 
 def _bought(solution: Solution) -> dict[str, Quantity]:

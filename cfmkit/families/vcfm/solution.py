@@ -127,6 +127,23 @@ class Solution(ShortRepr):
 
     @cached_property
     def constant_force(self) -> float | None:
+        """That of `spring_alone` [N], where the curve is flat at it; None where it only passes through it.
+
+        Leaves that are too stiff for the spring have their flat part at their peak, which is another force; a spring
+        that is too stiff for them leaves next to nothing flat.
+        """
+        alone, flat, part = self.spring_alone, self.window_force, self.windows[0]
+        if alone is None or flat is None or part is None:
+            return None
+        return alone if is_constant(alone, flat, self._flatness, (part, self.window)) else None
+
+    @property
+    def _flatness(self) -> float:
+        """What (max - min)/max a constant force may have."""
+        return self.spec.analysis.flatness
+
+    @cached_property
+    def spring_alone(self) -> float | None:
         """Force of the spring at the nominal preload where the leaves carry nothing [N]; None if they do carry there.
 
         Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
@@ -136,7 +153,7 @@ class Solution(ShortRepr):
         place = np.array([self.parts.balance])
         force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
         # leaves with a stated waviness carry a little there, which no flatness tells
-        bears = abs(float(self.sampler.leaf_force(place)[0])) > self.spec.analysis.flatness * abs(force) and not (
+        bears = abs(float(self.sampler.leaf_force(place)[0])) > self._flatness * abs(force) and not (
             np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
         )
         return None if bears or kinds[0] == "straight" else force
@@ -167,7 +184,7 @@ class Solution(ShortRepr):
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:
         """Constant-force window of each curve [m]; None where the force is nowhere positive."""
-        return self._flat(self.pushes, self.spec.analysis.flatness)
+        return self._flat(self.pushes, self._flatness)
 
     def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
         """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
@@ -241,12 +258,12 @@ class Solution(ShortRepr):
         found = [np.maximum(some * extremes(law, motion, law(motion), uneven=True)[0], 0.0) for law in laws]
         return np.stack(found, axis=-1).reshape(len(pushes), len(ends), 2)
 
-    @property
+    @cached_property
     def window_force(self) -> float | None:
         """Mean of the nominal force over its constant-force window [N]; None where there is none."""
         if self.windows[0] is None or not self.windows[0][1] > self.windows[0][0]:
             return None
-        places = np.linspace(*self.windows[0], 401)
+        places = np.linspace(*self.windows[0], FLAT_PLACES)
         force = force_of(self.sampler, places, self.nominal.preload)
         return float(np.trapezoid(force, places) / (places[-1] - places[0]))
 
@@ -275,6 +292,27 @@ class Solution(ShortRepr):
     def window_is_flat(self) -> bool:
         """Whether `window` is the longest flat stretch itself: flat by what it is, whatever the last digit says."""
         return self.spec.analysis.window is None and not self.is_linear and self.windows[0] is not None
+
+
+FLAT_PLACES = 401
+"""Even places of a constant-force window over which its mean is taken."""
+
+
+def is_constant(alone: Any, flat: Any, flatness: float, ranges: tuple[tuple[Any, Any], tuple[Any, Any]]) -> Any:
+    """Return whether the force of the spring alone is the force of a curve.
+
+    Parameters
+    ----------
+    alone, flat : float or array
+        Force of the spring where the leaves carry nothing, mean of the flat part of the curve [N].
+    flatness : float
+        By how much forces that count as one differ, as a share of the larger.
+    ranges : tuple
+        From where to where the curve is flat, and where it is judged [m]: at least half of that is to be flat.
+    """
+    (start, end), (low, high) = ranges
+    common = np.minimum(end, high) - np.maximum(start, low)
+    return (np.abs(alone - flat) <= flatness * np.maximum(alone, flat)) & (common >= 0.5 * (high - low))
 
 
 def force_of(sampler: PartSampler, travel: FloatArray, preload: float) -> FloatArray:
