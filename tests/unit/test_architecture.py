@@ -1,4 +1,4 @@
-"""The direction of imports, and who may import what: read off the source, nothing is run."""
+"""The direction of imports, who may import what, and the rooms of the families: read off the source."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+
+from cfmkit.families import family
 
 ROOT = Path(__file__).parents[2] / "cfmkit"
 
@@ -168,6 +170,34 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
     )
     for path in light:
         assert not [name for name in top_level_imports(path) if name.startswith(heavy)], path
+
+
+ROOMS = {
+    "design": "design",
+    "draw": "figures",
+    "scheme": "parameter_sketch",
+    "outline": "outline",
+    "propose": "proposals_for_wish",
+    "room": "bounding_box",
+    "free": "movable_and_erring_values",
+    "errors": "movable_and_erring_values",
+    "sampled": "force_at_few_poses",
+    "elastic_parts": "plane_fem_model",
+}
+"""Field of a family's record -> the file that every family has it in."""
+
+
+@pytest.mark.parametrize("name", ["beam", "cam", "slider-crank", "vcfm"])
+def test_every_family_has_the_same_rooms(name):
+    record, folder = family(name), f"cfmkit.families.{name.replace('-', '_')}"
+    given = {field: getattr(record, field) for field in ROOMS}
+    given["design"] = given["design"].args[0]  # `when_called` of a name
+    homes = {field: home.partition(":")[0] for field, home in given.items() if home is not None}
+    assert len(homes) > 6
+    inner = {field: home.removeprefix(f"{folder}.").removeprefix("printed.") for field, home in homes.items()}
+    assert inner == {field: ROOMS[field] for field in homes}
+    for room in ("spec", "findings"):
+        assert (ROOT / "families" / folder.rpartition(".")[2] / f"{room}.py").exists()
 
 
 def test_no_one_asks_which_family_it_is():

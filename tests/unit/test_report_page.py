@@ -16,7 +16,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
-from cfmkit.families.slider_crank.dispatch import moving
+from cfmkit.families.slider_crank.figures import moving
 from cfmkit.plots.figures import moving_of
 from cfmkit.plots.poses_in_one_svg import poses
 from cfmkit.plots.style import axes_mm, new_figure

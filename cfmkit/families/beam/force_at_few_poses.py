@@ -135,18 +135,3 @@ def _with(block: Any, values: Mapping[str, Any]) -> Any:
     if isinstance(block, dict):
         return {name: item(one, below[name]) if name in below else one for name, one in block.items()}
     return block.model_copy(update={name: item(getattr(block, name), inside) for name, inside in below.items()})
-
-
-def errors(spec: BeamSpec) -> dict[str, str]:
-    """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
-    mechanism = spec.mechanism
-    found = {}
-    if isinstance(mechanism.thickness, float) and any(one.thickness is None for one in mechanism.beams.values()):
-        found["mechanism.thickness"] = "thickness"
-    for name, beam in mechanism.beams.items():
-        if isinstance(beam.thickness, float):
-            found[f"mechanism.beams.{name}.thickness"] = "thickness"
-    for name, node in mechanism.nodes.items():
-        if node.support == "free":
-            found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
-    return found

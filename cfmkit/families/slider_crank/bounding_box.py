@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Room
-from cfmkit.families.slider_crank.dispatch import drawing
+from cfmkit.families.slider_crank.outline import drawing
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 

@@ -140,6 +140,11 @@ class SliderCrankSpec(Spec):
         return self.analysis.fidelity or self.mechanism.finest
 
     @property
+    def built_as(self) -> Literal["springs", "printed"]:
+        """Which folder of the family models it: rigid links with springs, or a part that bends."""
+        return "springs" if self.fidelity == "prb" else "printed"
+
+    @property
     def piece(self) -> Literal["prb", "lumped", "beam"]:
         """What is made: links and springs, flexures or a strip; of a solid the finest that there is data for."""
         return self.mechanism.finest if self.fidelity == "solid" else self.fidelity

@@ -1,4 +1,4 @@
-"""Which values of a designed mechanism may move for a yield: those that its own design chooses."""
+"""What a yield depends on: values that the design chooses and may change for it, and values that a process errs in."""
 
 from __future__ import annotations
 
@@ -55,3 +55,18 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
             if k:  # the first turns with the chord
                 path = f"mechanism.beams.{name}.shape.coefficients.{k}"
                 yield path, (max(-limit, float(value) - _TURN), min(limit, float(value) + _TURN))
+
+
+def errors(spec: BeamSpec) -> dict[str, str]:
+    """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
+    mechanism = spec.mechanism
+    found = {}
+    if isinstance(mechanism.thickness, float) and any(one.thickness is None for one in mechanism.beams.values()):
+        found["mechanism.thickness"] = "thickness"
+    for name, beam in mechanism.beams.items():
+        if isinstance(beam.thickness, float):
+            found[f"mechanism.beams.{name}.thickness"] = "thickness"
+    for name, node in mechanism.nodes.items():
+        if node.support == "free":
+            found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
+    return found

@@ -1,0 +1,22 @@
+"""From targets to a slider-crank: springs, and lengths where these may be chosen, or a part that is printed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.families.base import function_named
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Design
+
+
+def design(spec: SliderCrankSpec, run: Run) -> Design:
+    """Return the design of springs, or of the part that the block `design` asks for."""
+    wanted = spec.design
+    part = wanted is not None and (wanted.beam is not None or wanted.flexures is not None)
+    found: Design = function_named(f"cfmkit.families.slider_crank.{'printed' if part else 'springs'}.design:design")(
+        spec, run
+    )
+    return found
