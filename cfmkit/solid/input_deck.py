@@ -7,17 +7,22 @@ forces are that share of the part's; a comment at its head says which.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.meshed_part import Meshed, Part
+    from cfmkit.solid.plane_stress_law import Law
     from cfmkit.solid.rigid_groups import Group
     from cfmkit.solid.two_meshes import DrivenPart
 
@@ -25,6 +30,14 @@ THIN = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""
 ROW = 12
 """Numbers on a line of a set."""
+GUIDES = 2
+"""Nodes that carry what is prescribed along a direction, at most."""
+ARC = 4
+"""Points on the arc of what is turned, to each increment: between them it is led along a chord."""
+STIFF = 1e3
+"""Modulus of a hub, in that of the part."""
+FLAT = 1e-6
+"""Height of what counts as a line, in its length: outlines are drawn a little beside the line across a beam."""
 
 
 def deck(name: str, driven: DrivenPart) -> bytes:
@@ -53,7 +66,6 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
     yield "*HEADING"
     yield f"{name}, from cfmkit; mm, N, MPa"
     yield f"** widths are {share:.9g} times those of the part, and so are forces: divide by it"
-    yield "** nlgeom with a linear elastic material: the law that cfmkit calls st-venant-kirchhoff"
     yield "*NODE, NSET=ALL"
     for k, (x, y) in zip(number[used], to_border(grid.nodes[used], "length").tolist(), strict=True):
         yield f"{k}, {x:.10g}, {y:.10g}, 0"
@@ -63,39 +75,56 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
         yield f"*ELEMENT, TYPE=CPS6, ELSET=WIDTH-{index}"
         yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(own.tolist()))
         start += len(own)
-    law = part.law
     yield "*MATERIAL, NAME=MATERIAL"
-    yield "*ELASTIC"
-    yield f"{to_border(law.youngs_modulus, 'stress'):.10g}, {law.poisson_ratio:.10g}"
+    yield from _elastic(part.law)
     for index, width in enumerate(widths, start=1):
         yield f"*SOLID SECTION, ELSET=WIDTH-{index}, MATERIAL=MATERIAL"
         yield f"{share * to_border(float(width), 'length'):.10g}"
     held = [
-        (f"{_word(group.name)}-{k}", group, number[group.nodes[used[group.nodes]]])
+        (f"{_word(group.name)}-{k}", group, used[group.nodes])
         for k, group in enumerate(groups, start=1)
         if used[group.nodes].any()
     ]
-    for word, _, nodes in held:
-        yield f"*NSET, NSET={word}"
-        rows = nodes.tolist()
-        yield from (", ".join(map(str, rows[k : k + ROW])) + "," for k in range(0, len(rows), ROW))
-    spare, moves = int(number[-1]) + 1, []
-    for word, group, _ in held:
-        made = list(_rigid(word, group, travel, spare)) if _moves_freely(group) else None
-        if made is None:
-            ends = to_border(travel * group.driven[:2], "length").tolist()
-            moves += [f"{word}, {k}, {k}, {end:.10g}" for k, end in enumerate(ends, start=1)]
+    spare, moves, turns = int(number[-1]) + 1, list[str](), list[str]()
+    for word, group, seen in held:
+        nodes = number[group.nodes[seen]].tolist()
+        if _turns(group):
+            places = dict(zip(nodes, grid.nodes[group.nodes[seen]], strict=True))
+            hub = Hub.on(places, group.center, spare)
+            yield from _stiff(word, hub, start, share * to_border(part.width, "length"), part.law.youngs_modulus)
+            nodes, start, spare = list(dict.fromkeys([*nodes, hub.center])), start + len(hub.triangles), hub.spare
+            made = _guided(group, travel, hub.center, spare)
+            turned = _turned(word, hub, travel * float(group.driven[2]), spare + GUIDES, poses)
+            spare += GUIDES + 2
+        elif group.free.shape[1]:
+            made, turned = _rigid(word, group, travel, spare), Lines()
+            spare += 2 + GUIDES
         else:
-            yield from (line for line in made if not line.startswith("="))
-            moves += [line[1:] for line in made if line.startswith("=")]
-            spare += 5
+            ends = to_border(travel * group.driven[:2], "length").tolist()
+            made, turned = (
+                Lines(moves=[f"{word}, {k}, {k}, {end:.10g}" for k, end in enumerate(ends, start=1)]),
+                Lines(),
+            )
+        yield f"*NSET, NSET={word}"
+        yield from (", ".join(map(str, nodes[k : k + ROW])) + "," for k in range(0, len(nodes), ROW))
+        yield from (*made.model, *turned.model)
+        moves, turns = moves + made.moves, turns + turned.moves
+    turned_arms = [f"{word}-ARM" for word, group, _ in held if travel * group.driven[2] != 0]
+    yield from _step([word for word, _, _ in held], turned_arms, [*moves, *turns], poses)
+
+
+def _step(sets: list[str], nodes: list[str], moves: list[str], poses: int) -> Iterator[str]:
+    """Yield the step: prescribed motions, even increments, total forces on sets, and those on single nodes."""
     yield f"*STEP, NLGEOM, INC={100 * poses}"
     yield "*STATIC"
     yield f"{1 / poses:.10g}, 1., 1e-6, {1 / poses:.10g}"
     yield "*BOUNDARY"
     yield from moves
-    for word, _, _ in held:
+    for word in sets:
         yield f"*NODE PRINT, NSET={word}, TOTALS=ONLY"
+        yield "RF"
+    for word in nodes:
+        yield f"*NODE PRINT, NSET={word}"
         yield "RF"
     yield "*NODE FILE"
     yield "U, RF"
@@ -104,52 +133,163 @@ def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> 
     yield "*END STEP"
 
 
+def _elastic(law: Law) -> Iterator[str]:
+    """Yield a material's law."""
+    from cfmkit.solid.plane_stress_law import NeoHookean
+
+    young, poisson = to_border(law.youngs_modulus, "stress"), law.poisson_ratio
+    if isinstance(law, NeoHookean):
+        yield "** neo-hookean; its energy of volume is 1/D1 (J - 1)^2, which at small strain is cfmkit's"
+        yield "*HYPERELASTIC, NEO HOOKE"
+        yield f"{0.25 * young / (1 + poisson):.10g}, {6 * (1 - 2 * poisson) / young:.10g}"
+        return
+    yield "** nlgeom with a linear elastic material: the law that cfmkit calls st-venant-kirchhoff"
+    yield "*ELASTIC"
+    yield f"{young:.10g}, {poisson:.10g}"
+
+
 def _word(name: str) -> str:
     """Return a name that every solver takes as that of a set."""
     return "".join(char if char.isalnum() or char == "-" else "-" for char in name.upper())[:60].strip("-") or "SET"
 
 
-def _moves_freely(group: Group) -> bool:
-    """Tell whether a group moves in a way that is not prescribed, or turns: then it is a rigid body."""
-    return bool(group.free.shape[1] > 0 or group.driven[2] != 0)
+@dataclass(frozen=True)
+class Lines:
+    """Lines of a deck for a support: those of its model, and those of what the step prescribes."""
+
+    model: list[str] = field(default_factory=list)
+    moves: list[str] = field(default_factory=list)
 
 
-def _rigid(word: str, group: Group, travel: float, spare: int) -> Iterator[str]:
-    """Yield a rigid body with its guides; lines of prescribed motions begin with ``=``.
+def _turns(group: Group) -> bool:
+    """Tell whether a group turns, freely or by the drive: then it is joined by a hub."""
+    return bool(np.any(np.abs(group.free[2]) > 0.5) or group.driven[2] != 0)
 
-    Node `spare` is its centre, the next one turns with it, the others carry what is prescribed along a direction.
+
+@dataclass(frozen=True)
+class Hub:
+    """Stiff triangles that join nodes to a centre, about which they turn.
+
+    CalculiX does not converge where a rigid body turns freely; with a stiff one it does, in four rounds.
+
+    Attributes
+    ----------
+    center : int
+        Number of the node in the centre.
+    arm : (int, (2,) array)
+        Number of the node farthest from it, and from where to there [m].
+    added : dict of (2,) arrays
+        Nodes that are not of the part [m].
+    spare : int
+        The next number that is free.
+    triangles : (m, 3) array of int
+        Numbers of nodes, counter-clockwise.
     """
-    x, y = to_border(group.center, "length").tolist()
-    yield "*NODE"
-    yield from (f"{spare + k}, {x:.10g}, {y:.10g}, 0" for k in range(5))
-    yield f"*RIGID BODY, NSET={word}, REF NODE={spare}, ROT NODE={spare + 1}"
-    ways = _fixed(group.free)
-    carriers = iter((spare + 2, spare + 3, spare + 4))
-    yield f"={spare}, 3, 3, 0"
-    yield f"={spare + 1}, 1, 2, 0"
-    for way in ways:
-        if abs(way[2]) > 0.5:
-            yield f"={spare + 1}, 3, 3, {travel * float(way @ group.driven):.10g}"
-            continue
-        carrier = next(carriers)
-        terms = [(spare, 1 + k, float(way[k])) for k in (0, 1) if abs(way[k]) > 1e-12]
+
+    center: int
+    arm: tuple[int, FloatArray]
+    added: dict[int, FloatArray]
+    spare: int
+    triangles: NDArray[np.int64]
+
+    @classmethod
+    def on(cls, places: dict[int, FloatArray], center: FloatArray, spare: int) -> Hub:
+        """Return the hub of nodes at some places [m], with own nodes from a number on.
+
+        Nodes on a line across a beam have one more on each side of it.
+        """
+        own = np.array(list(places.values()))
+        along, across = np.linalg.svd(own - own.mean(axis=0), full_matrices=False)[2]
+        size = float(np.ptp(own @ along))
+        middle = min(places, key=lambda node: float(np.hypot(*(places[node] - center))))
+        added = {}
+        if np.hypot(*(places[middle] - center)) > FLAT * size:
+            middle, added = spare, {spare: center}
+        if np.ptp(own @ across) < FLAT * size:
+            added |= {spare + 1: center + 0.5 * size * across, spare + 2: center - 0.5 * size * across}
+        every = np.array([*places, *added])
+        at = np.array([*own, *added.values()])
+        found = Delaunay(at).simplices
+        a, b, c = at[found].swapaxes(0, 1)
+        twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+        found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
+        far = int(np.hypot(*(at - center).T).argmax())
+        arm = int(every[far]), at[far] - center
+        return cls(middle, arm, added, max([spare, *added]) + 1, every[found[np.abs(twice) > FLAT * size**2 / len(at)]])
+
+
+def _stiff(word: str, hub: Hub, start: int, width: float, modulus: float) -> Iterator[str]:
+    """Yield a hub's nodes, elements and material; `width` in mm, `modulus` that of the part [Pa]."""
+    yield from _nodes(hub.added)
+    yield f"*ELEMENT, TYPE=CPS3, ELSET=HUB-{word}"
+    yield from (f"{start + k}, {', '.join(map(str, row))}" for k, row in enumerate(hub.triangles.tolist()))
+    yield f"*MATERIAL, NAME=STIFF-{word}"
+    yield "*ELASTIC"
+    yield f"{STIFF * to_border(modulus, 'stress'):.10g}, 0"
+    yield f"*SOLID SECTION, ELSET=HUB-{word}, MATERIAL=STIFF-{word}"
+    yield f"{width:.10g}"
+
+
+def _nodes(places: dict[int, FloatArray]) -> list[str]:
+    """Return the lines of nodes at places [m]."""
+    found = [(node, to_border(at, "length").tolist()) for node, at in places.items()]
+    return ["*NODE", *(f"{node}, {x:.10g}, {y:.10g}, 0" for node, (x, y) in found)] if found else []
+
+
+def _rigid(word: str, group: Group, travel: float, spare: int) -> Lines:
+    """Return a rigid body that does not turn, with its guides: a centre, a node that turns with it, and carriers."""
+    guided = _guided(group, travel, spare, spare + 2)
+    body = f"*RIGID BODY, NSET={word}, REF NODE={spare}, ROT NODE={spare + 1}"
+    model = [*_nodes(dict.fromkeys((spare, spare + 1), group.center)), body, *guided.model]
+    return Lines(model, [f"{spare}, 3, 3, 0", f"{spare + 1}, 1, 3, 0", *guided.moves])
+
+
+def _guided(group: Group, travel: float, center: int, carrier: int) -> Lines:
+    """Return what moves a centre along every direction that is not free, by nodes from `carrier` on."""
+    model, moves = _nodes(dict.fromkeys(range(carrier, carrier + GUIDES), group.center)), []
+    for way in _prescribed(group.free):
+        terms = [(center, 1 + k, float(way[k])) for k in (0, 1) if abs(way[k]) > 1e-12]
         terms.sort(key=lambda term: -abs(term[2]))  # the first is eliminated: it must not vanish
-        yield "*EQUATION"
-        yield str(len(terms) + 1)
-        yield ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in [*terms, (carrier, 1, -1.0)])
-        yield f"={carrier}, 1, 1, {to_border(travel * float(way @ group.driven), 'length'):.10g}"
-        yield f"={carrier}, 2, 3, 0"
+        model += _equation(*terms, (carrier, 1, -1.0))
+        moves += [f"{carrier}, 1, 1, {to_border(travel * float(way @ group.driven[:2]), 'length'):.10g}"]
+        moves += [f"{carrier}, 2, 3, 0"]
+        carrier += 1
+    return Lines(model, moves)
 
 
-def _fixed(free: FloatArray) -> list[FloatArray]:
-    """Return unit motions (3,) that are prescribed: those across all free ones, turns apart from displacements."""
-    found = []
-    turn = np.array([0.0, 0.0, 1.0])
-    if not np.any(np.abs(free[2]) > 0.5):
-        found.append(turn)
+def _equation(*terms: tuple[int, int, float]) -> list[str]:
+    """Return that terms (node, axis, factor) add up to nothing."""
+    told = ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in terms)
+    return ["*EQUATION", str(len(terms)), told]
+
+
+def _turned(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> Lines:
+    """Return what turns a hub by an angle [rad], nothing without one: two nodes lead its arm round the centre.
+
+    The torque is the moment of the force on the arm about the centre.
+    """
+    if angle == 0:
+        return Lines()
+    x, y = to_border(hub.arm[1], "length").tolist()
+    time = np.linspace(0.0, 1.0, ARC * poses + 1)
+    c, s = np.cos(angle * time), np.sin(angle * time)
+    model = [f"** torque on {word}: x Fy - y Fx, with the force on node {hub.arm[0]}"]
+    model += [f"** and (x, y) = ({x:.9g}, {y:.9g}) mm turned by {angle:.9g} rad times the time"]
+    model += _nodes(dict.fromkeys((carrier, carrier + 1), hub.arm[1]))
+    moves = []
+    for axis, way in ((1, x * (c - 1) - y * s), (2, x * s + y * (c - 1))):
+        node = carrier + axis - 1
+        model += _equation((hub.arm[0], axis, 1.0), (hub.center, axis, -1.0), (node, axis, -1.0))
+        model += [f"*AMPLITUDE, NAME={word}-{axis}", *(f"{t:.10g}, {u:.10g}" for t, u in zip(time, way, strict=True))]
+        moves += [f"*BOUNDARY, AMPLITUDE={word}-{axis}", f"{node}, {axis}, {axis}, 1"]
+        moves += ["*BOUNDARY", f"{node}, {3 - axis}, {3 - axis}, 0", f"{node}, 3, 3, 0"]
+    model += [f"*NSET, NSET={word}-ARM", f"{hub.arm[0]},"]
+    return Lines(model, moves)
+
+
+def _prescribed(free: FloatArray) -> list[FloatArray]:
+    """Return unit displacements (2,) that are prescribed: those across all free ones."""
     flat = free[:2, np.abs(free[2]) < 0.5]
     if flat.shape[1] == 0:
-        found += [np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])]
-    elif flat.shape[1] == 1:
-        found.append(np.array([-flat[1, 0], flat[0, 0], 0.0]))
-    return found
+        return [np.array([1.0, 0.0]), np.array([0.0, 1.0])]
+    return [np.array([-flat[1, 0], flat[0, 0]])] if flat.shape[1] == 1 else []

@@ -227,3 +227,90 @@ def test_calculix_finds_the_force_of_the_beams(made, tmp_path):
 def test_what_has_no_elastic_part_has_no_deck():
     with pytest.raises(UsageError, match="--format inp: a cam mechanism has no elastic part to be solved"):
         cfmkit.export("configs/cam.yaml", format="inp")
+
+
+# --- supports that turn --------------------------------------------------------------------------------------------
+
+FREE = """
+cfmkit: 1
+family: beam
+name: strip
+mechanism:
+  material: {{youngs_modulus: 2.4 GPa, poisson_ratio: 0.35, law: {law}}}
+  thickness: 2 mm
+  width: 6 mm
+  nodes:
+    root: {{at: [0 mm, 0 mm], support: clamped}}
+    tip: {{at: [24 mm, 0 mm]}}
+  beams: {{beam: {{start: root, end: tip}}}}
+  drive: {drive}
+analysis:
+  travel: {travel}
+  fidelity: solid
+  solid: {{poses: 5, mesh: 1.6 mm}}
+"""
+PUSHED = {"drive": "{kind: displacement, node: tip, direction: -60 deg}", "travel": "5 mm"}
+TWISTED = {"drive": "{kind: rotation, node: tip}", "travel": "-30 deg"}
+
+
+def deck_of(tmp_path, law="st-venant-kirchhoff", **given):
+    path = tmp_path / "strip.yaml"
+    path.write_text(FREE.format(law=law, **given))
+    spec = cfmkit.load(str(path))
+    return spec, cfmkit.export(spec, format="inp")["beams.inp"]
+
+
+def run_by_ccx(tmp_path, data):
+    (tmp_path / "part.inp").write_bytes(data)
+    subprocess.run(["ccx", "-i", "part"], cwd=tmp_path, check=True, capture_output=True, timeout=120)
+    return (tmp_path / "part.dat").read_text(), float(re.search(rb"widths are (\S+) times", data)[1])
+
+
+def test_an_end_that_turns_freely_is_joined_to_the_node_that_is_driven_by_stiff_triangles(tmp_path):
+    _, data = deck_of(tmp_path, **PUSHED)
+    read = blocks(data)
+    assert not any("RIGID BODY" in head for head, _ in read)
+    rows = [row for head, lines in read if head in ("*NODE", "*NODE, NSET=ALL") for row in numbers(lines)]
+    places = {int(row[0]): np.array(row[1:3]) for row in rows}
+    (hub,) = (np.array(numbers(lines), int) for head, lines in read if head.startswith("*ELEMENT, TYPE=CPS3"))
+    a, b, c = (np.array([places[node] for node in hub[:, k]]) for k in (1, 2, 3))
+    assert ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0).all()
+    (center,) = (node for node in set(hub[:, 1:].ravel().tolist()) if np.hypot(*(places[node] - [24, 0])) < 1e-5)
+    (guide,) = (lines for head, lines in read if head == "*EQUATION")
+    carrier = int(numbers(guide)[1][6])
+    assert {int(word) for word in numbers(guide)[1][0:6:3]} == {center}
+    moved = next(lines for head, lines in read if head == "*BOUNDARY")
+    assert abs(float(next(line for line in moved if line.startswith(f"{carrier}, 1")).split(",")[3])) == 5.0
+    modulus = [numbers(lines)[0][0] for head, lines in read if head == "*ELASTIC"]
+    assert modulus[1] == 1e3 * modulus[0]
+
+
+def test_a_neo_hookean_part_has_that_law_in_its_deck(tmp_path):
+    _, data = deck_of(tmp_path, law="neo-hookean", **PUSHED)
+    (law,) = (numbers(lines)[0] for head, lines in blocks(data) if head == "*HYPERELASTIC, NEO HOOKE")
+    shear, bulk = 2400 / 2.7, 2400 / (3 * 0.3)
+    assert law == pytest.approx([0.5 * shear, 2 / bulk])
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize("law", ["st-venant-kirchhoff", pytest.param("neo-hookean", marks=pytest.mark.slow)])
+def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, law):
+    spec, data = deck_of(tmp_path, law=law, **PUSHED)
+    told, share = run_by_ccx(tmp_path, data)
+    x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", told)[0])
+    (one,) = family("beam").driven_parts(spec)
+    pose = one.part.meshed(one.size).followed([0.0, 2.5e-3, 5e-3]).course.poses[-1]
+    assert -(0.5 * x - np.sqrt(0.75) * y) / share == pytest.approx(pose.effort, rel=1e-3)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_calculix_finds_the_torque_on_an_end_that_is_turned_and_moves_freely(tmp_path):
+    spec, data = deck_of(tmp_path, **TWISTED)
+    told, share = run_by_ccx(tmp_path, data)
+    x, y, angle = map(float, re.search(r"\(x, y\) = \((\S+), (\S+)\) mm turned by (\S+) rad", data.decode()).groups())
+    fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", told)[0])
+    c, s = np.cos(angle), np.sin(angle)
+    (one,) = family("beam").driven_parts(spec)
+    pose = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
+    torque = (x * c - y * s) * fy - (x * s + y * c) * fx
+    assert 1e-3 * torque / share == pytest.approx(pose.effort, rel=1e-3)
