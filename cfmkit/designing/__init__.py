@@ -1,9 +1,8 @@
 """The kit that optimised designs are made with, whatever the mechanism: it knows no family.
 
 `objective_and_constraints`
-    What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`.
-`limits`
-    Which limits a point misses, and which of them hold it.
+    What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`; which
+    limits the point misses, and which of them hold it.
 `bounds_and_rounding`
     Numbers within bounds: rounded to what is written, and those that are at a bound.
 `run_many_starts`
