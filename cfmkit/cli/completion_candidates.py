@@ -7,6 +7,8 @@ from typing import Any
 
 import typer
 
+from cfmkit.cli.completion_scripts import SCRIPTS
+
 SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")
 """Those that typer has scripts for."""
 
@@ -18,19 +20,27 @@ def shells(incomplete: str) -> list[str]:
 
 def show(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
     """Print the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
-    if value is not None and not ctx.resilient_parsing:
-        typer.completion.show_callback(ctx, param, _shell(value))
+    if value is None or ctx.resilient_parsing:
+        return
+    shell = _shell(value)
+    if shell in SCRIPTS:
+        typer.echo(SCRIPTS[shell])
+        raise typer.Exit
+    typer.completion.show_callback(ctx, param, shell)
 
 
 def install(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
     """Install the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
     if value is None or ctx.resilient_parsing:
         return
-    shell = _shell(value)
     try:
-        typer.completion.install_callback(ctx, param, shell)
+        shell, place = typer.completion.install(_shell(value), prog_name="cfmkit")  # type: ignore[attr-defined]
     except FileNotFoundError as error:  # the profile of a PowerShell is where it says
-        raise typer.BadParameter(f"there is no program {shell!r} to be asked where its profile is") from error
+        raise typer.BadParameter(f"there is no program {value or 'pwsh'!r} to be asked where its profile is") from error
+    if shell in SCRIPTS:
+        place.write_text(f"{SCRIPTS[shell]}\n", encoding="utf-8")
+    typer.echo(f"{shell} completion installed in {place}; it takes effect in a new terminal")
+    raise typer.Exit
 
 
 def _shell(named: str) -> str:

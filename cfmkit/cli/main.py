@@ -96,6 +96,9 @@ def _run(given: list[str]) -> ExitCode:
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
+    if (wanted := os.environ.get("_CFMKIT_COMPLETE", "")).startswith("source_"):  # as typer spells --show-completion
+        del os.environ["_CFMKIT_COMPLETE"]
+        given = ["--show-completion", wanted.removeprefix("source_")]
     call = parse(program(_before_the_verb, TEXT, EPILOG), given)
     if call is None:
         streams.put("")

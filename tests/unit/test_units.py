@@ -181,6 +181,8 @@ def test_68_mm_has_one_value_in_every_spelling() -> None:
         ("5 µm", "length", "'µm' is not a unit; did you mean 'um'?"),
         ("90°", "angle", "'°' is not a unit; did you mean 'deg'?"),
         ("5 mmm", "length", "'mmm' is not a unit; did you mean 'mm'?"),
+        ("100 %%", "ratio", "'%%' is not a unit; did you mean '%'?"),
+        ("5 NN", "force", "'NN' is not a unit; did you mean 'N'?"),
         ("5 milimeter", "length", "'milimeter' is not a unit; did you mean 'mm'?"),
         ("5 parsec", "length", "'parsec' is not a unit; `cfmkit show units` lists them"),
         ("5 N/m m", "stiffness", "'N/m m' has two units side by side; put * or / between them"),

@@ -273,6 +273,7 @@ def _meanings(word: str) -> Iterator[str]:
         yield word
         return
     lower = word.lower()
+    yield from (symbol for symbol in SYMBOLS if word == 2 * symbol)  # such as "%%"
     yield from (symbol for symbol in SYMBOLS if symbol.lower() == lower)
     yield from (_NAMES[name] for name in (lower, lower.removesuffix("s")) if name in _NAMES)
     yield from _products(word)
@@ -282,10 +283,10 @@ def _meanings(word: str) -> Iterator[str]:
 
 
 def _products(word: str) -> Iterator[str]:
-    """Yield the splits of ``Nmm`` into two known symbols."""
+    """Yield the splits of ``Nmm`` into two known symbols; nobody multiplies by a percentage."""
     for cut in range(1, len(word)):
         first, second = word[:cut], word[cut:]
-        if first in SYMBOLS and second in SYMBOLS:
+        if first != second and first in SYMBOLS and second in SYMBOLS and "%" not in word:
             yield f"{first}*{second}"
 
 
