@@ -9,8 +9,9 @@ where the limits can be met together, and where they cannot, the least by which 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -94,43 +95,42 @@ class SeenPoint:
     rows: Sequence[LimitRows]
 
 
-class Source(Protocol):
-    """What a family knows of its design at a point."""
+class DesignProgram(ABC):
+    """A program of `cfmkit.numerics.sqp` from what a family sees of its design at a point.
 
+    Attributes
+    ----------
+    elastic : tuple of str
+        Limits that give way, by the last variable.
+    """
+
+    elastic: tuple[str, ...] = ()
+
+    @abstractmethod
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return objective and rows at z, with derivatives or without; None where the model has no answer."""
 
+    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return the objective and the constraints (m,) at z (n,); None where the model has no answer."""
+        elastic = self.elastic
+        seen = self.seen(z[:-1] if elastic else z, False)
+        if seen is None:
+            return None
+        rows = [one.values + z[-1] if one.name in elastic else one.values for one in seen.rows]
+        return (float(z[-1]) if elastic else seen.objective), np.concatenate([np.zeros(0), *rows])
 
-def values(source: Source, z: FloatArray, elastic: tuple[str, ...] = ()) -> tuple[float, FloatArray] | None:
-    """Return the objective and the constraints (m,) at z, as `numerics.sqp.Program.values`.
-
-    Parameters
-    ----------
-    source : Source
-        What is seen.
-    z : (n,) array
-        The variables; with limits that give way the last of them is by how much.
-    elastic : tuple of str
-        Limits that give way.
-    """
-    seen = source.seen(z[:-1] if elastic else z, False)
-    if seen is None:
-        return None
-    rows = [one.values + z[-1] if one.name in elastic else one.values for one in seen.rows]
-    return (float(z[-1]) if elastic else seen.objective), np.concatenate([np.zeros(0), *rows])
-
-
-def slopes(source: Source, z: FloatArray, elastic: tuple[str, ...] = ()) -> tuple[FloatArray, FloatArray] | None:
-    """Return the derivatives (n,) and (m, n) of objective and constraints at z, as `numerics.sqp.Program.slopes`."""
-    seen = source.seen(z[:-1] if elastic else z, True)
-    if seen is None:
-        return None
-    objective = np.zeros(len(z))
-    if elastic:
-        objective[-1] = 1.0
-    elif seen.slope is not None:
-        objective[: len(seen.slope)] = seen.slope
-    return objective, np.concatenate([np.zeros((0, len(z))), *(_wide(one, len(z), elastic) for one in seen.rows)])
+    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives (n,) and (m, n) of objective and constraints at z."""
+        elastic = self.elastic
+        seen = self.seen(z[:-1] if elastic else z, True)
+        if seen is None:
+            return None
+        objective = np.zeros(len(z))
+        if elastic:
+            objective[-1] = 1.0
+        elif seen.slope is not None:
+            objective[: len(seen.slope)] = seen.slope
+        return objective, np.concatenate([np.zeros((0, len(z))), *(_wide(one, len(z), elastic) for one in seen.rows)])
 
 
 def _wide(rows: LimitRows, count: int, elastic: tuple[str, ...]) -> FloatArray:

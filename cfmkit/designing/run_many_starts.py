@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from enum import Enum
 from time import time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
 
 from cfmkit.store import origin, stable_hash
 
@@ -13,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.specs.spec import Spec
+
+Anything = TypeVar("Anything")
 
 NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
 """Blocks of a specification that no search looks at."""
@@ -68,6 +73,41 @@ NEVER = Clock()
 
 
 @dataclass(frozen=True)
+class OneStart:
+    """What a process does: from the number of a start to the record of what it led to.
+
+    Attributes
+    ----------
+    search : callable
+        From the number to a dataclass of numbers, words and arrays; None: nothing. It is sent to other processes.
+    clock : Clock
+        When the search ends whether it is done or not.
+    """
+
+    search: Callable[[int], Any]
+    clock: Clock
+
+    def __call__(self, number: int) -> dict[str, Any]:
+        """Return the record; what was found is empty where there is nothing."""
+        found = self.search(number)
+        return {"found": {} if found is None else recorded(found), "late": self.clock.late()}
+
+
+def recorded(found: Any) -> dict[str, Any]:
+    """Return a dataclass of numbers, words and arrays as it is noted: arrays as lists, enumerations by name."""
+
+    def plain(value: Any) -> Any:
+        return value.tolist() if isinstance(value, np.ndarray) else value.name if isinstance(value, Enum) else value
+
+    return {one.name: plain(getattr(found, one.name)) for one in fields(found)}
+
+
+def restored(kind: type[Anything], record: Mapping[str, Any]) -> Anything:
+    """Return the dataclass that was noted: lists are arrays again, names of members stay names."""
+    return kind(**{name: np.array(value) if isinstance(value, list) else value for name, value in record.items()})
+
+
+@dataclass(frozen=True)
 class Stage:
     """One round of jobs.
 
@@ -75,7 +115,7 @@ class Stage:
     ----------
     work : callable
         From the number of a job to its record, of plain numbers, words, lists and mappings: what it found, under
-        "found", and under "late" whether the time was up before it was done. Sent to other processes.
+        "found", and under "late" whether the time was up before it was done (`OneStart`). Sent to other processes.
     jobs : tuple of int
         Their numbers.
     identity : str

@@ -19,7 +19,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import Elasticity, joints
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink as offset
 from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     FoundStrip,
     Ranges,
@@ -30,7 +30,7 @@ from cfmkit.families.slider_crank.printed.strip_thickness_search import (
 )
 from cfmkit.numerics.sqp import SearchEnding
 
-TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
+TASK = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
 
 YARDSTICK = [
     # width, ripple, stroke of the yardstick, share of it that nine thicknesses reach with the band kept everywhere

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,16 +11,16 @@ import pytest
 
 from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import at_bounds, rounded
-from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint
-from cfmkit.designing.run_many_starts import NEVER, Clock, Stage, done
+from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
+from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
 from cfmkit.families.base import Run
-from cfmkit.numerics.sqp import Effort, SearchEnding, minimize
+from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status
 from cfmkit.studies.serial_and_cluster_executors import Lost
 
 
 @dataclass
-class Disc:
+class Disc(DesignProgram):
     """The point nearest to (2, 1) on the unit disc, left of a line."""
 
     line: float = 10.0
@@ -38,12 +39,6 @@ class Disc:
                 LimitRows("line", line, np.array([[-1.0]]) if sloped else None, lambda: ["edge"]),
             ],
         )
-
-    def values(self, z: np.ndarray) -> Any:
-        return objective_and_constraints.values(self, z, self.elastic)
-
-    def slopes(self, z: np.ndarray) -> Any:
-        return objective_and_constraints.slopes(self, z, self.elastic)
 
 
 @pytest.mark.parametrize("elastic", [(), ("disc",), ("disc", "line")])
@@ -129,6 +124,17 @@ class Recorder:
     def add(self, key: str, record: Any) -> int:
         self.keys[key] = record
         return len(self.keys) - 1
+
+
+def test_what_a_start_found_is_the_same_read_from_its_record() -> None:
+    found = Optimum(np.array([0.1, 1 / 3]), np.inf, np.zeros(0), SearchEnding.STUCK, 7, 1e-5)
+    record = json.loads(json.dumps(OneStart(lambda _: found, NEVER)(3)))
+    assert not record["late"]
+    again = restored(Optimum, record["found"])
+    assert again.z.tolist() == found.z.tolist()
+    assert (again.objective, again.ending, again.evaluations) == (np.inf, "STUCK", 7)
+    assert again.constraints.shape == (0,)
+    assert OneStart(lambda _: None, Clock(0.0))(0) == {"found": {}, "late": True}
 
 
 def squared(number: int) -> dict[str, Any]:

@@ -39,7 +39,7 @@ from cfmkit.families.slider_crank.printed.flexures_as_beam_network import (
     spread,
 )
 from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import Ranges
 from cfmkit.numerics import sqp
 from cfmkit.numerics.barycentric import differentiation, interpolation
@@ -235,7 +235,7 @@ def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool)
     shares = ((0.285, 0.803), (0.582, 0.851), (0.245, 0.842), (0.578, 0.798), (0.231, 0.765))
     form = Form(12, (2,) * 5) if moving else Form(4, width=WIDTH)
     x = np.concatenate([THICKNESS / MM, np.concatenate(shares), [5.1]]) if moving else np.array([0.95, 1.02, 0.9, 0.99])
-    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 21 * MM, 0.01, goal), form)
+    program = StripProgram(StripTask(corners(), np.pi, ABS, 1.5, MM, 21 * MM, 0.01, goal), form)
     z = np.append(x, 2.1) if program.extra else x
     answer = program.slopes(z)
     assert answer is not None
@@ -253,7 +253,7 @@ def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool)
 
 
 def test_a_strip_without_equilibrium_has_no_answer() -> None:
-    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
+    program = StripProgram(StripTask(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
     assert program.values(np.array([1.0, 1.0, 1.0, 1000.0])) is None  # [mm]; the strip is 125 mm long
 
 
@@ -506,7 +506,7 @@ def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pyt
             notes[key] = json.dumps(record)
             return len(notes) - 1
 
-    task = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
+    task = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
     wanted = task, Form(2, width=WIDTH), Ranges(np.tile([0.5, 2.0], (2, 1)), 15 * MM), 2, Run(notes=Recorder()), "x"
     first = strip_thickness_search.search(*wanted)
     assert len(notes) == 2

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flexure_support import ABS, MM, WIDTH, corners
 
-from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 
-TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
+TASK = StripTask(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
 EVEN, PLACED = Form(9, width=WIDTH), Form(12, per_piece=(2,) * 5, width=WIDTH)
 
 

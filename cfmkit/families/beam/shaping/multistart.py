@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from cfmkit.designing.run_many_starts import Stage, done
+from cfmkit.designing.run_many_starts import OneStart, Stage, done, restored
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, searched, widened
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
@@ -18,32 +16,6 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.task import Task
-
-
-@dataclass(frozen=True)
-class OneStart:
-    """What a process does: from the number of a start to a record of what it led to."""
-
-    task: Task
-    seed: int
-    plan: StartBudget
-
-    def __call__(self, index: int) -> dict[str, Any]:
-        """Return the record; empty where there is nothing."""
-        return _record(searched(self.task, self.seed, index, self.plan), self.plan)
-
-
-@dataclass(frozen=True)
-class OneWidening:
-    """The same for the widening of the window: from the number of the start whose design is widened."""
-
-    task: Task
-    designs: dict[int, Found]
-    plan: StartBudget
-
-    def __call__(self, index: int) -> dict[str, Any]:
-        """Return the record."""
-        return _record(widened(self.task, self.designs[index], self.plan), self.plan)
 
 
 @dataclass(frozen=True)
@@ -88,12 +60,14 @@ def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: s
     starts, wide = counts
     widens = task.objective == "range"
     share = 0.75 if widens else 1.0
-    first = Stage(OneStart(task, run.seed, plan), tuple(range(starts)), identity)
+    one = OneStart(partial(searched, task, run.seed, plan=plan), plan.clock)
+    first = Stage(one, tuple(range(starts)), identity)
     begun = done(first, run, plan.clock, partial(_tell, run, "starts", starts, (0.0, share)))
     found, lost = {index: _found(begun.records[index]["found"]) for index in sorted(begun.records)}, begun.lost
     if widens:
         best = dict(list(ranked(task, found))[:wide])
-        second = Stage(OneWidening(task, best, plan), tuple(best), f"{identity} widened")
+        wider = OneStart(partial(_widened, task, best, plan), plan.clock)
+        second = Stage(wider, tuple(best), f"{identity} widened")
         more = done(second, run, plan.clock, partial(_tell, run, "widenings", len(best), (share, 1.0)))
         lost += more.lost
         found |= {index: _found(record["found"]) for index, record in more.records.items()}
@@ -108,13 +82,12 @@ def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: 
     run.progress(share[0] + (share[1] - share[0]) * len(records) / max(1, count), text)
 
 
-def _record(found: Found | None, plan: StartBudget) -> dict[str, Any]:
-    record = {} if found is None else asdict(replace(found, x=found.x.tolist()))
-    return {"found": record, "late": plan.late()}
+def _widened(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+    return widened(task, designs[index], plan)
 
 
 def _found(record: dict[str, Any]) -> Found | None:
-    return Found(**{**record, "x": np.array(record["x"])}) if record else None
+    return restored(Found, record) if record else None
 
 
 def ranked(task: Task, found: dict[int, Found | None]) -> Iterator[tuple[int, Found]]:

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint, worst
+from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint, worst
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(eq=False)
-class Shaping:
+class Shaping(DesignProgram):
     """The design variables, then the goal's own ones: what `cfmkit.numerics.sqp.minimize` wants to know of them.
 
     Attributes
@@ -84,14 +83,6 @@ class Shaping:
         if not self.elastic:
             return z
         return np.append(z, worst(rows for name in self.elastic for rows in LIMITS[name](view)))
-
-    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
-        """Return objective and constraints."""
-        return objective_and_constraints.values(self, z, self.elastic)
-
-    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return their derivatives."""
-        return objective_and_constraints.slopes(self, z, self.elastic)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""

@@ -27,7 +27,7 @@ from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, e
 from cfmkit.families.slider_crank.printed.flexure_sizing import design_flexures
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.spec import StripSpec
-from cfmkit.families.slider_crank.printed.sqp_program import Form, Task
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import (
     LOOSE,
     SHORTEST,
@@ -206,7 +206,7 @@ def _one_thickness(found: FoundStrip) -> float:
     return 0.0 if found.uniform is None else 0.01 * float(found.uniform.z[-1])
 
 
-def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
+def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTask:
     """Return what the strip of a `design` block is to do, with its reserve.
 
     Raises
@@ -238,7 +238,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
     limit = made_of.allowable_stress if beam.stressed else None
     limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
     line = corners(spec.mechanism, spec.mechanism.beam, linkage, unloaded)
-    return Task(
+    return StripTask(
         line,
         travel_direction(linkage),
         type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
@@ -253,7 +253,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
 
 
 def form_of(
-    spec: SliderCrankSpec, wanted: StripDesign, task: Task, linkage: Linkage, unloaded: float
+    spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, linkage: Linkage, unloaded: float
 ) -> tuple[Form, Ranges]:
     """Return how the strip is described, and the ranges of its numbers."""
     beam = spec.mechanism.beam
@@ -292,7 +292,7 @@ def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
     return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
 
 
-def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Ranges) -> Design:
+def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges) -> Design:
     """Return the uniform strip for a stroke: thickness from the stress, width from the force.
 
     Where the width is stated, the thickness follows from the force.
@@ -327,7 +327,7 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
 
 
-def _of_width(spec: SliderCrankSpec, task: Task, ranges: Ranges, width: float) -> Design:
+def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float) -> Design:
     """Return the uniform strip of a stated width, its thickness from the force."""
     found = uniform_for_width(task, width)
     if found is None:

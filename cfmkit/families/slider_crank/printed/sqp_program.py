@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.designing import objective_and_constraints
-from cfmkit.designing.objective_and_constraints import LimitRows, SeenPoint
+from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
@@ -48,7 +47,7 @@ Goal = Literal["stroke", "ripple", "rms"]
 
 
 @dataclass(frozen=True)
-class Task:
+class StripTask:
     """What the strip is to do.
 
     Attributes
@@ -177,13 +176,13 @@ class State:
 
 
 @dataclass
-class StripProgram:
-    """Objective and constraints of a task over a form, as `cfmkit.designing.objective_and_constraints` wants them.
+class StripProgram(DesignProgram):
+    """Objective and constraints of a task over a form.
 
     The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
     """
 
-    task: Task
+    task: StripTask
     form: Form
     known: Path | None = None
     _last: tuple[FloatArray, State] | None = field(default=None, repr=False)
@@ -247,14 +246,6 @@ class StripProgram:
         path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
         good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
         return path if good else None
-
-    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
-        """Return the objective and the constraints, at least zero where they hold."""
-        return objective_and_constraints.values(self, z)
-
-    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return the derivatives of objective and constraints."""
-        return objective_and_constraints.slopes(self, z)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.run_many_starts import NEVER, Clock, Stage, done
+from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
 from cfmkit.families.base import Run
 from cfmkit.families.findings import mm, mpa, newton, no_design, percent
 from cfmkit.families.slider_crank.findings import finding
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.sqp_program import Task
+    from cfmkit.families.slider_crank.printed.sqp_program import StripTask
 
 
 VIOLATION = 5e-3
@@ -92,7 +92,7 @@ class FoundStrip:
 
     Attributes
     ----------
-    task, form, ranges : Task, Form, Ranges
+    task, form, ranges : StripTask, Form, Ranges
         What was asked.
     program : StripProgram
         Of the last search.
@@ -104,7 +104,7 @@ class FoundStrip:
         Why processes died that searched from other starts.
     """
 
-    task: Task
+    task: StripTask
     form: Form
     ranges: Ranges
     program: StripProgram
@@ -118,7 +118,7 @@ class FoundStrip:
         return self.descent.z[: self.form.size]
 
 
-def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
+def uniform_thickness(task: StripTask, width: float, guess: float = 1e-3) -> float:
     """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
 
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
@@ -138,7 +138,7 @@ def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
     return thickness
 
 
-def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] | None:
+def uniform_for_stroke(task: StripTask, guess: float = 1e-3) -> tuple[float, float] | None:
     """Return thickness and width [m] of the strip that has the allowable stress at the stroke, and the force.
 
     The stress does not depend on the width and the force is proportional to it: first the thickness from
@@ -164,7 +164,7 @@ def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] |
     return thickness, width
 
 
-def uniform_for_width(task: Task, width: float, guess: float = 1e-3) -> tuple[float, float] | None:
+def uniform_for_width(task: StripTask, width: float, guess: float = 1e-3) -> tuple[float, float] | None:
     """Return thickness [m] and largest stress at the stroke [Pa] of the strip of a width [m] that has the force.
 
     The force goes nearly with the cube of the thickness. None where there is no equilibrium.
@@ -184,47 +184,42 @@ def uniform_for_width(task: Task, width: float, guess: float = 1e-3) -> tuple[fl
 
 
 @dataclass(frozen=True)
-class OneStart:
-    """What a process does: from the number of a start to a record of the strip that it led to.
+class StripStarts:
+    """From the number of a start to the strip that it led to, from the uniform one on.
 
     The first one climbs from the uniform strip, from few thicknesses to all; the others begin with all of them, random.
     """
 
-    task: Task
+    task: StripTask
     form: Form
     ranges: Ranges
     uniform: Optimum | None
     seed: int
     clock: Clock
 
-    def __call__(self, number: int) -> dict[str, Any]:
-        """Return the record."""
+    def descended(self, number: int) -> Optimum:
+        """Return where the last search of a start ended."""
         steps, factors = _ladder(self.form), None
         if number:
             steps = (self.form.count,)
             drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
             factors = np.exp(SCATTER * drawn)
-        found = _climb(self, steps, factors).descent
-        kept = {"z": found.z.tolist(), "objective": float(found.objective), "constraints": found.constraints.tolist()}
-        kept |= {"ending": found.ending.name, "evaluations": found.evaluations, "allowed": found.allowed}
-        return {"found": kept, "late": self.clock.late()}
+        return _climb(self, steps, factors).descent
 
     def read(self, record: dict[str, Any]) -> FoundStrip:
         """Return the strip of a record."""
-        kept = record["found"]
-        arrays = {name: np.array(kept[name]) for name in ("z", "constraints")}
-        descent = Optimum(**{**kept, **arrays, "ending": SearchEnding[kept["ending"]]})
+        descent = restored(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]})
         return FoundStrip(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
 
 
 def search(
-    task: Task, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
+    task: StripTask, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
 ) -> FoundStrip | Design:
     """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
     Parameters
     ----------
-    task : Task
+    task : StripTask
         What the strip is to do.
     form : Form
         How it is described.
@@ -249,9 +244,9 @@ def search(
         count = len(records)
         run.progress(count / starts, f"start {count + 1} of {starts}" if count < starts else "done")
 
-    work = OneStart(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
+    work = StripStarts(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
     means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
-    outcome = done(Stage(work, tuple(range(starts)), identity), means, clock, tell)
+    outcome = done(Stage(OneStart(work.descended, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
     found = [work.read(outcome.records[number]) for number in sorted(outcome.records)]
@@ -285,7 +280,7 @@ def _ladder(form: Form) -> tuple[int, ...]:
     return (*steps, form.count)
 
 
-def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) -> FoundStrip:
+def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | None) -> FoundStrip:
     """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
     task, form, ranges = start.task, start.form, start.ranges
     x, last = _begin(task, form, ranges, start.uniform, steps[0])
@@ -307,7 +302,7 @@ def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) 
     return FoundStrip(task, form, ranges, program, descent, start.uniform)
 
 
-def _tightened(start: OneStart) -> FoundStrip | None:
+def _tightened(start: StripStarts) -> FoundStrip | None:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
     Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
@@ -327,7 +322,7 @@ def _tightened(start: OneStart) -> FoundStrip | None:
     return FoundStrip(task, form, ranges, program, descent, uniform)
 
 
-def _precise(task: Task) -> float:
+def _precise(task: StripTask) -> float:
     return 1e-9 if task.goal == "rms" else 1e-6
 
 
@@ -337,7 +332,9 @@ def _refined(values: FloatArray, count: int) -> FloatArray:
     return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
 
 
-def _begin(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None, count: int) -> tuple[FloatArray, float]:
+def _begin(
+    task: StripTask, form: Form, ranges: Ranges, uniform: Optimum | None, count: int
+) -> tuple[FloatArray, float]:
     """Return the first numbers, and the first value of the goal."""
     low, high = ranges.form.T
     middle = 0.5 * (low + high)
@@ -348,14 +345,14 @@ def _begin(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None, coun
     return x, _first_goal(task, uniform)
 
 
-def _first_goal(task: Task, uniform: Optimum | None) -> float:
+def _first_goal(task: StripTask, uniform: Optimum | None) -> float:
     if task.goal == "stroke":
         known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
         return known if known is not None else 100.0 * task.stroke
     return 2.0
 
 
-def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
+def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArray:
     """Return the bounds of a search with another number of thicknesses, and of its goal."""
     own = ranges.form
     thickness = own[: form.count] if count == form.count else np.tile(own[0], (count, 1))
@@ -366,7 +363,7 @@ def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
     return np.concatenate([rows, [goal]])
 
 
-def _uniform(task: Task, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
+def _uniform(task: StripTask, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
     """Return the best strip of one thickness."""
     own = ranges.form
     width = form.width or float(own[-1].mean()) * SMALL

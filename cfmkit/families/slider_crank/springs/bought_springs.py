@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
-    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.families.slider_crank.springs.targets import SpringTask
 
 
 PLACES = 41
@@ -117,7 +117,7 @@ class Chosen:
     deviation: float
 
 
-def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
+def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     """Return the springs of the catalogue that hold the target best.
 
     Raises
@@ -139,14 +139,14 @@ def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {told}{allowed}"))
 
 
-def next_sets(task: Task, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
+def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
     """Return the sets of springs that hold the target best after the one that `choose` takes, within the tolerance."""
     most = np.inf if task.wanted.tolerance is None else task.wanted.tolerance * (1 + 1e-9)
     found = _sets(goal, _options(task, window)[0], 1 + count)[1:]
     return [one for one in found if one.deviation <= most]
 
 
-def least_deviation(task: Task, goal: RateGoal, window: tuple[float, float]) -> float:
+def least_deviation(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> float:
     """Return the deviation of the springs of the catalogue that hold the target best; infinite where none do."""
     found = _sets(goal, _options(task, window)[0], 1)
     return found[0].deviation if found else np.inf
@@ -178,14 +178,14 @@ def _missed(one: Chosen) -> Miss:
     return Miss(label, one.deviation, f"off by {percent(one.deviation)}")
 
 
-def _none_together(task: Task, refused: list[Miss]) -> str:
+def _none_together(task: SpringTask, refused: list[Miss]) -> str:
     """Return why no set does what is required beside the target: to let the force be trimmed."""
     told = f"; {nearest(refused)}" if refused else ""
     way = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
     return f"none is stiff enough for 'design.adjustment' within 'design.{way}'{told}"
 
 
-def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
+def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
     """Return what can be used at each joint, and what is refused because it does not fit or is moved too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])

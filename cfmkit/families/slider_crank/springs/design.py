@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
-    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.families.slider_crank.springs.targets import SpringTask
     from cfmkit.results import Finding
 
 
@@ -243,7 +243,7 @@ def _places(wanted: CrankDesign) -> int | None:
     return None if wanted.objective == "least-squares" else DENSE
 
 
-def solve(task: Task, tolerance: float | None = None) -> Solved:
+def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
     """Return the best springs for given lengths, for the design's tolerance or another one.
 
     Raises

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.bought_springs import SpringOption
-    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.families.slider_crank.springs.targets import SpringTask
     from cfmkit.results import Finding, Searched
 
 
@@ -29,7 +29,7 @@ class Solved:
 
     Attributes
     ----------
-    task : Task
+    task : SpringTask
         With the lengths chosen.
     window : tuple of (float, float)
         Where the target is kept [rad or m].
@@ -47,7 +47,7 @@ class Solved:
         Springs of a catalogue; none where any rate may be had.
     """
 
-    task: Task
+    task: SpringTask
     window: tuple[float, float]
     rates: FloatArray
     deviation: float
@@ -90,7 +90,7 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
     return replace(solved, deviation=largest, rms=rms / target, exact=True)
 
 
-def check_reach(task: Task, window: tuple[float, float]) -> None:
+def check_reach(task: SpringTask, window: tuple[float, float]) -> None:
     """Refuse a window that linkage or joint limits do not allow."""
     first, last = task.allowed
     slack = 1e-9 * (window[1] - window[0])
@@ -104,7 +104,7 @@ def check_reach(task: Task, window: tuple[float, float]) -> None:
     raise Infeasible(finding("infeasible_targets", text))
 
 
-def cannot_hold(task: Task) -> Finding:
+def cannot_hold(task: SpringTask) -> Finding:
     """Return why a slope in the stretched position, or a trim, cannot be had."""
     wanted = task.wanted
     if wanted.angle_travel is not None and not wanted.hold_stiffness:
@@ -124,7 +124,7 @@ def cannot_hold(task: Task) -> Finding:
     return finding("no_zero_stiffness", text)
 
 
-def nowhere(task: Task) -> Finding:
+def nowhere(task: SpringTask) -> Finding:
     """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
     window = task.wanted.window
     goal = task.goal(window) if window is not None else None
@@ -147,7 +147,7 @@ def nowhere(task: Task) -> Finding:
     )
 
 
-def hopeless(task: Task, deviation: float) -> Finding:
+def hopeless(task: SpringTask, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
     text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
     if task.wanted.curve is not None:
@@ -164,7 +164,7 @@ def hopeless(task: Task, deviation: float) -> Finding:
     )
 
 
-def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
+def too_far(task: SpringTask, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
     wanted = task.wanted
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}

@@ -24,7 +24,7 @@ from cfmkit.families.slider_crank.springs.targets import DENSE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.families.slider_crank.springs.targets import SpringTask
 
 
 COARSE = 48
@@ -79,7 +79,7 @@ class FittedWindow:
         return self.high - self.low
 
 
-def widest(task: Task, tolerance: float) -> FittedWindow | None:
+def widest(task: SpringTask, tolerance: float) -> FittedWindow | None:
     """Return a wide window with no deviation above a tolerance, by the local search; None if that finds none."""
     first, last = task.searched
     if not last > first:
@@ -95,7 +95,7 @@ def widest(task: Task, tolerance: float) -> FittedWindow | None:
     return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
 
 
-def widest_of_all(task: Task, tolerance: float) -> tuple[FittedWindow | None, bool]:
+def widest_of_all(task: SpringTask, tolerance: float) -> tuple[FittedWindow | None, bool]:
     """Return the widest window of the whole motion, and whether all that are wider by `GAIN` are ruled out."""
     first, last = task.searched
     if not last > first:
@@ -111,7 +111,7 @@ def widest_of_all(task: Task, tolerance: float) -> tuple[FittedWindow | None, bo
 class _Everywhere:
     """The search of all beginnings of a window for the widest one."""
 
-    def __init__(self, task: Task, tolerance: float) -> None:
+    def __init__(self, task: SpringTask, tolerance: float) -> None:
         self.task, self.tolerance = task, tolerance
         self.first, self.last = task.searched
         self.width = NARROWEST * (self.last - self.first)
@@ -160,7 +160,7 @@ class _Everywhere:
         return high
 
 
-def _flattest(task: Task, width: float) -> float | None:
+def _flattest(task: SpringTask, width: float) -> float | None:
     """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
     first, last = task.searched
     places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
@@ -169,7 +169,7 @@ def _flattest(task: Task, width: float) -> float | None:
     return None if best is None else 0.5 * (best.low + best.high)
 
 
-def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> FittedWindow | None:
+def _grown(task: SpringTask, tolerance: float, width: float, middle: float, look: float) -> FittedWindow | None:
     """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
     first, last = task.searched
     best: FittedWindow | None = None
@@ -193,7 +193,7 @@ def _grown(task: Task, tolerance: float, width: float, middle: float, look: floa
     return best
 
 
-def _first_guess(task: Task, tolerance: float) -> tuple[float, float]:
+def _first_guess(task: SpringTask, tolerance: float) -> tuple[float, float]:
     """Return width and middle from the law for small angles, or a tenth of the motion next to its start."""
     first, last = task.searched
     assembly = task.assembly
@@ -212,7 +212,7 @@ def _next_width(found: FittedWindow | None, tolerance: float, bracket: tuple[flo
     return step if low < step < high else 0.5 * (low + high)
 
 
-def _best_place(task: Task, width: float, middle: float, look: float) -> FittedWindow | None:
+def _best_place(task: SpringTask, width: float, middle: float, look: float) -> FittedWindow | None:
     """Return the window of a width with the smallest largest deviation near a place, by shares of the width."""
     from scipy.optimize import minimize_scalar
 
@@ -235,12 +235,12 @@ def _best_place(task: Task, width: float, middle: float, look: float) -> FittedW
     return judged(task, low, low + width)
 
 
-def judged(task: Task, low: float, high: float) -> FittedWindow | None:
+def judged(task: SpringTask, low: float, high: float) -> FittedWindow | None:
     """Return the best springs for a window, judged on many places; None where there are none."""
     return _solved(task, low, high, DENSE)
 
 
-def _solved(task: Task, low: float, high: float, count: int) -> FittedWindow | None:
+def _solved(task: SpringTask, low: float, high: float, count: int) -> FittedWindow | None:
     goal = task.goal((low, high), count)
     rates = None if goal is None else minimax(goal)
     if goal is None or rates is None or not math.isfinite(goal.deviation(rates)):

@@ -36,7 +36,7 @@ DENSE = 1001
 
 
 @dataclass(frozen=True)
-class Task:
+class SpringTask:
     """A design that is wanted of a mechanism with certain lengths.
 
     Attributes
@@ -211,7 +211,7 @@ def with_lengths(spec: SliderCrankSpec, lengths: dict[str, float]) -> SliderCran
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=written)})
 
 
-def task_of(spec: SliderCrankSpec) -> Task:
+def task_of(spec: SliderCrankSpec) -> SpringTask:
     """Return the design of a specification, put together for its own drive, whatever the analysis says.
 
     Raises
@@ -221,4 +221,4 @@ def task_of(spec: SliderCrankSpec) -> Task:
     """
     design = spec.design
     assert design is not None
-    return Task(spec, replace(assemble(spec), drive=design.drive))
+    return SpringTask(spec, replace(assemble(spec), drive=design.drive))
