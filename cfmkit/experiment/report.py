@@ -1,25 +1,35 @@
-"""A measurement as the files that `measure` writes; nothing here touches a disk."""
+"""Measurements as files and lines: what `measure` writes, and what a comparison or a calibration adds to a run.
+
+Nothing here touches a disk.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.curves import Column
+from cfmkit.experiment.calibration import table
 from cfmkit.experiment.evaluation import MeasuredCurves, Measurement, numbers_of
 from cfmkit.metrics import metrics_json, split_name
+from cfmkit.metrics.branch_views import span_text
+from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
+
+    from matplotlib.figure import Figure
 
     from cfmkit.curves import Curve
+    from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.comparison import Comparison
     from cfmkit.metrics import MeasuringFrame, Window
     from cfmkit.plots.figure_options import FigureForm
-    from cfmkit.results import Finding
+    from cfmkit.results import Finding, Quantity
 
 
 @dataclass(frozen=True)
@@ -136,3 +146,136 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
         from cfmkit.plots.figure_options import PLAIN
 
         yield from (form or PLAIN).files(figures(report.source, report.numbers))
+
+
+def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str, Any]:
+    """Return what metrics.json says about the data besides the errors, which are metrics."""
+    from cfmkit.specs.units import border_unit, to_border
+
+    dimension, window = comparison.curve.motion_dimension, comparison.window
+    low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
+    return {
+        "data": {
+            "file": source.recording.name,
+            "window": {"from": low, "to": high, "unit": border_unit(dimension)},
+            "points": sum(len(item.motion) for item in comparison.samples),
+            "reading": source.recording.lines,
+        }
+    }
+
+
+def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: how the file was read, and the errors."""
+    metrics, kind = comparison.metrics(), comparison.curve.kind
+    several = len(comparison.samples) > 1
+    over = span_text(comparison.window.lo, comparison.window.hi, kind)
+    lines = [("read", text) for text in source.recording.lines]
+    for item in comparison.samples:
+        suffix = f"[{item.branch}]" if several else ""
+        values = [metrics[name + suffix].value for name in ("data_rmse", "data_offset", "data_error_max")]
+        told = ["no value" if value is None else format_short(value, kind) for value in values]
+        where = f" on {item.branch}" if several else ""
+        lines.append(("data", f"model - measured{where}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"))
+    return tuple(lines)
+
+
+def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
+    """Return the paragraph that a page shows about the causes of a departure: every number with its name."""
+    told = [
+        f"{name.removeprefix('data_').replace('_', ' ')} {_exact(item.value, item.dimension, 4)}"
+        for name, item in causes.items()
+        if item.value is not None
+    ]
+    return (("causes", ", ".join(told)),) if told else ()
+
+
+def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
+    """Return what makes the file of a comparison: the measured curve."""
+    return {"data.csv": lambda: to_csv(curves_table(source))}
+
+
+def comparison_figures(
+    comparison: Comparison, name: str, before: Comparison | None = None
+) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws the figure of a comparison: the curves overlaid."""
+    return {"data": partial(_overlay, comparison, before, name)}
+
+
+def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> Figure:
+    from cfmkit.experiment.figures import overlay
+
+    subject = "fitted model and measurement" if before else "model and measurement"
+    return overlay(comparison, before, (name, subject))
+
+
+def calibration_data(calibration: Calibration) -> dict[str, Any]:
+    """Return what metrics.json says about a fit."""
+    fit = calibration.fit
+    return {
+        "parameters": table(calibration),
+        "correlation": [[float(value) for value in row] for row in fit.correlation],
+        "fit": {
+            "noise": {"value": _border(fit.noise, calibration), "unit": _unit(calibration)},
+            "samples_that_count_as_one": float(fit.inflation),
+            "degrees_of_freedom": float(fit.freedom),
+            "rms_at_the_start": {"value": _border(_rms(calibration.before), calibration), "unit": _unit(calibration)},
+            "converged": fit.converged,
+        },
+    }
+
+
+def _rms(comparison: Comparison) -> float:
+    errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _border(value: float, calibration: Calibration) -> float:
+    from cfmkit.specs.units import to_border
+
+    return float(to_border(value, calibration.after.curve.kind))
+
+
+def _unit(calibration: Calibration) -> str:
+    from cfmkit.specs.units import border_unit
+
+    return border_unit(calibration.after.curve.kind)
+
+
+def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: each value with its interval."""
+    half = calibration.fit.half_widths()
+    lines = []
+    for k, item in enumerate(calibration.parameters):
+        value, width = float(calibration.fit.values[k]), float(half[k])
+        told = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
+        lines.append(("fitted", f"{item.path} = {told} (95 %), from {_exact(item.start, item.dimension)}"))
+    zeros, kind = calibration.zeros, calibration.after.curve.kind
+    known = {"--tare": (zeros.effort, kind), "--zero": (zeros.motion, calibration.after.curve.motion_dimension)}
+    options = " ".join(f'{name} "{_exact(value, unit, 6)}"' for name, (value, unit) in known.items() if value)
+    if options:
+        lines.append(("data", f"{options} lays the recording on the fitted model (analyze --data, measure)"))
+    return tuple(lines)
+
+
+def _exact(value: float, dimension: str, digits: int = 5) -> str:
+    return f"{value:.{digits}g}" if dimension == "ratio" else format_short(value, dimension, digits)
+
+
+def parameters_table(calibration: Calibration) -> Table:
+    """Return the fitted values as a table: units differ from row to row, so they have a column."""
+    records = table(calibration)
+    return Table(tuple(TableColumn(name, tuple(record[name] for record in records)) for name in records[0]))
+
+
+def residuals_table(calibration: Calibration) -> Table:
+    """Return what is left between model and measurement at every point that was fitted."""
+    after, curve = calibration.after, calibration.after.curve
+    branch = np.repeat([item.branch for item in after.samples], [len(item.motion) for item in after.samples])
+    motion = np.concatenate([item.motion for item in after.samples])
+    return Table(
+        (
+            TableColumn("branch", tuple(branch.tolist())),
+            border_column(curve.motion_name, motion, curve.motion_dimension),
+            border_column("residual", calibration.fit.residuals, curve.kind),
+        )
+    )

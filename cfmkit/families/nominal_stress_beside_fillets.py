@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Displacement, Network, Path, Rotation
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.outcome.sections import Sections
-    from cfmkit.families.fillet_stress_results import FilletRow
+    from cfmkit.families.fem_results import FilletRow
 
 NEGLIGIBLE = 0.1
 """Nominal stresses below this part of the beams' largest at the same displacement are none: solid and beams differ by

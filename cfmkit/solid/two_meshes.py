@@ -125,7 +125,7 @@ class MeshError:
         return STRESS_FACTOR * max(self.stress_difference, STRESS_LEAST)
 
     def values(self) -> dict[str, float | None]:
-        """Return them by the names that every family gives them (`families.fem_scalar_results`)."""
+        """Return them by the names that every family gives them (`families.fem_results`)."""
         return {
             "mesh_force_difference": self.force_difference,
             "mesh_stress_difference": self.stress_difference,

@@ -12,7 +12,7 @@ from shoulder_fillets import handbook
 import cfmkit
 from cfmkit.arrays import read_only
 from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, guided
-from cfmkit.families.fillet_stress_results import FilletRow, fillet_table, largest_concentration
+from cfmkit.families.fem_results import FilletRow, fillet_table, largest_concentration
 from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
 from cfmkit.solid.fillet_stress import FilletArc
 

@@ -69,7 +69,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
-    from cfmkit.experiment.comparison_and_calibration_outputs import (
+    from cfmkit.experiment.report import (
         causes_lines,
         comparison_data,
         comparison_figures,

@@ -78,7 +78,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     from dataclasses import replace
 
     from cfmkit import api
-    from cfmkit.experiment import comparison_and_calibration_outputs as add
+    from cfmkit.experiment import report as add
     from cfmkit.runs.run_outcome import Supplement, report_on
     from cfmkit.tables import to_csv
 

@@ -14,7 +14,7 @@ from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.scalar_results import natural, window_of
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
-from cfmkit.families.fillet_stress_results import numbered
+from cfmkit.families.fem_results import numbered
 from cfmkit.plots import parts
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure

@@ -15,7 +15,7 @@ from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.families.beam.network_elements.spec import PartSpec
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
-from cfmkit.families.fillet_stress_results import FilletRow, with_nominal
+from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.families.beam.solid_under_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
-from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.families.fillet_stress_results import FilletRow
+    from cfmkit.families.fem_results import FilletRow
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
     from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes

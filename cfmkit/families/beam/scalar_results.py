@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
-from cfmkit.families.fem_scalar_results import unknown_to_beams
+from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import unknown_to_beams
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import between

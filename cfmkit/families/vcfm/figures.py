@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.fillet_stress_results import numbered
+from cfmkit.families.fem_results import numbered
 from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
 from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf

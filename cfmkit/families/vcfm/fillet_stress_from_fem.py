@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.fillet_stress_results import FilletRow, with_nominal
+from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of

@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.fillet_stress_from_fem import fillets

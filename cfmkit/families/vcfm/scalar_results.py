@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
-from cfmkit.families.fem_scalar_results import unknown_to_beams
+from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import unknown_to_beams
 from cfmkit.families.findings import newton
 from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fillet_stress_results import numbered
+from cfmkit.families.fem_results import numbered
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
 from cfmkit.plots import parts
 from cfmkit.plots.curve_with_enlarged_band import loop_figure

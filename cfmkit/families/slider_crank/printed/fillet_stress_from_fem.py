@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fillet_stress_results import FilletRow, with_nominal
+from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import TOLERANCE, nominal_stresses, with_steps
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES
 from cfmkit.stock.spec import PaddedPart

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
-from cfmkit.families.fillet_stress_results import fillet_table, largest_concentration
+from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import CannotBuild, bracket, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
-    from cfmkit.families.fillet_stress_results import FilletRow
+    from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding

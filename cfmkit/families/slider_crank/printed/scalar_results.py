@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fem_scalar_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 
 if TYPE_CHECKING:

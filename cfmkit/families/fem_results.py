@@ -1,4 +1,7 @@
-"""Stress fillet by fillet of a part that is solved as a solid, in every family: fillets.csv, and the largest ratio."""
+"""What every family gives of a part that is solved as a solid: scalar results, and the stress in each fillet.
+
+Scalar results are errors of the mesh and the stress concentration; `fillets.csv` has a row for each fillet.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.fem_scalar_results import DEFINITIONS
 from cfmkit.results import Quantity
 from cfmkit.tables import Table, TableColumn, border_column
 
@@ -17,6 +19,44 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.fillet_stress import FilletArc
+
+
+DEFINITIONS = {
+    "mesh_force_difference": (
+        "ratio",
+        "largest difference of the force on a coarser mesh, relative to the largest force",
+    ),
+    "mesh_stress_difference": (
+        "ratio",
+        "largest difference of a pose's largest stress on a coarser mesh, relative to the largest of all poses",
+    ),
+    "mesh_force_error": (
+        "ratio",
+        "discretisation error of the force, relative to the largest force: that difference, at least 1e-4, times a "
+        "factor that covers 95 % of the parts in docs/solid.md",
+    ),
+    "mesh_stress_error": ("ratio", "the same for the largest stress, with a difference of at least 2 %"),
+    "curve_error": (
+        "ratio",
+        "difference between the interpolated curve and poses solved between its poses, where it is expected to be "
+        "largest, relative to the largest force; poses are added, up to twice as many, until it is at most 5e-4",
+    ),
+    "stress_concentration_max": (
+        "factor",
+        "largest stress of a fillet over that of beams in large deflection at the same displacement: bending and axial "
+        "stress of the section where the fillet ends, at its edge; of the fillets where that is at least a tenth of "
+        "the beams' largest",
+    ),
+}
+"""Name -> dimension and definition; `cfmkit.solid.two_meshes` and `nominal_stress_beside_fillets` compute them."""
+
+
+def unknown_to_beams() -> dict[str, Quantity]:
+    """Return them without values, for models that are no solid."""
+    return {
+        name: Quantity(None, *about, "only the model of the part as a solid has it")
+        for name, about in DEFINITIONS.items()
+    }
 
 
 @dataclass(frozen=True, eq=False)
