@@ -56,6 +56,9 @@ def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
 
 LAYERS, GRADED = 3, 1.5
 """Wedges over half the width, thinner towards the free side."""
+FIRST = "0.005, 1., 1e-6, 0.1"
+"""First increment, the travel, smallest and largest increment. A straight strip bows at once: in one step of a fiftieth
+of the travel, `slider_crank_tapered` came to another form."""
 
 
 def extruded(one: DrivenPart) -> bytes:
@@ -95,7 +98,7 @@ def extruded(one: DrivenPart) -> bytes:
         lines += [f"*NSET, NSET={word}", *(f"{place}," for (k, _), place in number.items() if k in held)]
         moves += [f"{word}, {k + 1}, {k + 1}, {1e3 * one.stops[-1] * group.driven[k]:.10g}" for k in (0, 1)]
         prints += [f"*NODE PRINT, NSET={word}, TOTALS=ONLY", "RF"]
-    lines += ["** widths are 0.5 times those of the part", "*STEP, NLGEOM, INC=100", "*STATIC", "0.25, 1., 1e-6, 0.25"]
+    lines += ["** widths are 0.5 times those of the part", "*STEP, NLGEOM, INC=100", "*STATIC", FIRST]
     return "\n".join([*lines, "*BOUNDARY", *moves, *prints, "*END STEP", ""]).encode("ascii")
 
 

@@ -59,9 +59,14 @@ class Ring:
         """Return the ring through closed points (n, 2) [m], turned so that the material is on its left."""
         ring = np.asarray(points, float)
         ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-        x, y = ring.T
-        area = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-        return cls(read_only(ring if (area > 0) != hole else ring[::-1]))
+        found = cls(read_only(ring))
+        return found if (found.area > 0) != hole else cls(read_only(ring[::-1]))
+
+    @property
+    def area(self) -> float:
+        """Of what it goes round [m2]; negative round a hole."""
+        x, y = (self.points - self.points[0]).T
+        return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
     @cached_property
     def lengths(self) -> FloatArray:

@@ -3,6 +3,9 @@
 A planar solid's force is proportional to its width. Where widths are free, all of them are multiplied by what the force
 misses; the stress stays as it is. Where a sheet fixes them, the force that is designed for is multiplied by it, and the
 design is repeated.
+
+Under a load both move as far as they give way: their forces are compared at the same travel, so that the corrected part
+moves as far under its load as the beams do.
 """
 
 from __future__ import annotations
@@ -10,11 +13,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cfmkit.designing.reported_values import searched
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
-from cfmkit.metrics import evaluate
+from cfmkit.metrics import evaluate, window_of
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
@@ -58,7 +63,7 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
         return Design(None, Status.INVALID, f"design.verify: this design cannot be a solid: {told}")
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
-    mean, own = _mean(solid), _mean(beams)
+    own, mean, where = _means(beams, solid)
     wanted = next((level for path in record.levels if (level := _level(given, path))), None) or own
     if solid.status is not Status.COMPLETE or not wanted or not mean or not own or wanted / mean <= 0:
         told = f"the part as a solid has no force to be corrected: {solid.message}"
@@ -67,7 +72,7 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     kind = solid.curve.kind
     begun = (
         f"{design.spec.fidelity} has a mean {kind} of {format_short(own, kind)}, the part as a solid of "
-        f"{format_short(mean, kind)} ({100 * (mean / own - 1):+.2g} %)"
+        f"{format_short(mean, kind)} ({100 * (mean / own - 1):+.2g} %){where}"
     )
     if _sheet(as_solid):
         return _relevelled(given, design, as_solid, factor, begun, run)
@@ -102,6 +107,28 @@ def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begu
     other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
     note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
+
+
+def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, str]:
+    """Return the mean forces or torques of both, and over which travel where that is not their window."""
+    if not beams.curves or not solid.curves or np.allclose(beams.travel or 0.0, solid.travel or 0.0, rtol=1e-9):
+        return _mean(beams), _mean(solid), ""
+    far = min(abs(float(one.curve.motion[-1])) for one in (beams, solid))
+    window = window_of(beams)
+    low, high = sorted((abs(window.lo), abs(window.hi))) if window is not None else (0.0, far)
+    told = format_short(min(high, far), solid.spec.motion or "length")
+    over = f" over the travel up to {told}, which both reach"
+    return _over_travel(beams, low, min(high, far)), _over_travel(solid, low, min(high, far)), over
+
+
+def _over_travel(result: Result, low: float, high: float) -> float | None:
+    """Return the mean over a travel of either sign [m or rad], whatever points the curve has; None if it turns back."""
+    from scipy.interpolate import PchipInterpolator
+
+    motion, effort = np.abs(result.curve.motion), result.curve.effort
+    if not (np.diff(motion) > 0).all() or low >= high:
+        return None
+    return float(PchipInterpolator(motion, effort).integrate(low, high)) / (high - low)
 
 
 def _mean(result: Result) -> float | None:

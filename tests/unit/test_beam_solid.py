@@ -11,6 +11,7 @@ from vee_leaf import VEE
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.families import family
 from cfmkit.results import Result, Status
 from cfmkit.solid.equilibrium import SolidProblem
 
@@ -216,3 +217,12 @@ def test_a_solver_that_stops_on_the_way_leaves_the_curve_up_to_there(monkeypatch
     assert 0.1e-3 <= float(result.curve.motion[-1]) < 0.16e-3
     count = len(result.curve.motion)
     assert result.curve.effort == pytest.approx(whole.curve.effort[:count], rel=1e-3)
+
+
+@pytest.mark.parametrize(("fillet", "largest"), [("0.5 mm", 1.0), ("5 mm", 1.0), ("20 mm", 4.0)])
+def test_a_part_that_is_mostly_fillets_has_larger_elements_in_its_blocks(fillet, largest):
+    spec = cfmkit.load("configs/beam_lan2010.yaml", ["analysis.fidelity=solid", f"mechanism.part.fillet={fillet}"])
+    (one,) = family("beam").driven_parts(spec)
+    assert one.part.largest == largest
+    if largest > 1.0:
+        assert len(one.part.meshed(one.size).problem.elements.mesh.nodes) < 6000  # 57 725 with elements of one size

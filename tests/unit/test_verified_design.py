@@ -58,3 +58,44 @@ def test_no_design_stays_no_design():
     spec = cfmkit.load("configs/vcfm_pla.yaml")
     found = Design(None, Status.INFEASIBLE, "why")
     assert verified(spec, found, Run()) is found
+
+
+PUSHED = """
+cfmkit: 1
+family: beam
+name: pushed
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 1 mm
+  width: 6 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [40 mm, 0 mm]}}
+  beams: {beam: {start: root, end: tip}}
+  drive: {kind: force, node: tip, direction: -90 deg}
+analysis: {force: 1 N, points: 41}
+"""
+
+
+def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_travel_of_both(tmp_path, monkeypatch):
+    """The solid stands in here by beams of a tenth more width, which move less under the load."""
+    path = tmp_path / "pushed.yaml"
+    path.write_text(PUSHED)
+    spec = cfmkit.load(str(path))
+    from cfmkit.families.beam.model import analyze
+
+    def stiffer(given, run):
+        return analyze(given.replace({"analysis.fidelity": "inextensible", "mechanism.width": 0.0066}), run)
+
+    monkeypatch.setattr("cfmkit.families.beam.plane_fem_model.analyze", stiffer)
+    found = verified(spec, Design(spec, Status.COMPLETE), Run())
+    assert found.search["verified_width_factor"].quantity.value == pytest.approx(1 / 1.1, rel=1e-4)
+    assert found.spec.at("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)
+    (told,) = (text for word, text in found.notes if word == "verify")
+    assert "which both reach" in told
+
+
+def test_a_design_under_a_load_may_end_with_its_solid(tmp_path):
+    path = tmp_path / "pushed.yaml"
+    moves = "design: {free: {mechanism.width: [3 mm, 12 mm]}, tolerances: {mechanism.thickness: {normal: 0.02 mm}}, "
+    judged = "requirements: [{metric: travel_end, min: 1 mm}]\n"
+    path.write_text(PUSHED + moves + "yield: 90 %, verify: solid}\n" + judged)
+    assert cfmkit.load(str(path)).design.verify == "solid"

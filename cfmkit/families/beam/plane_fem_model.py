@@ -256,7 +256,7 @@ def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidS
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
@@ -265,7 +265,8 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
-    return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places), obstacles=frame)
+    rings, thinnest = rings_of(cut), _thinnest(assembly)
+    return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
 
 
 def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:

@@ -366,9 +366,9 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield what the model of the part as a solid cannot do."""
     mechanism, analysis = spec.mechanism, spec.analysis
-    by_load, verified = mechanism.drive.kind in ("force", "moment"), spec.design is not None and spec.design.verify
-    if mechanism.drive.kind == "loads" or (by_load and verified == "solid"):
-        yield "needs a drive of kind 'displacement' or 'rotation': move the node, and read its force off the curve"
+    by_load = mechanism.drive.kind in ("force", "moment")
+    if mechanism.drive.kind == "loads":
+        yield "follows one node that is moved or loaded: several loads that grow together have no such node"
     things: dict[str, object] = {"springs": mechanism.springs, "loads": mechanism.loads}
     things["nodes that are moved"] = [name for name, node in mechanism.nodes.items() if node.moved is not None]
     things["pins between beams"] = [
