@@ -13,13 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.findings import mm
+from cfmkit.errors import SolutionError
+from cfmkit.families.findings import deg, mm, percent
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
-from cfmkit.families.slider_crank.springs_wound_for_wish import wound
+from cfmkit.families.slider_crank.springs_wound_for_wish import depth_of_springs, wound
+from cfmkit.families.slider_crank.torque_that_springs_carry import SprungMotion, flattest_springs, largest_torque
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
-from cfmkit.specs.units import Place
+from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.spec import MaterialSpec
 from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
 from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE
@@ -106,6 +110,15 @@ SHRUNK = (0.99, 0.8)
 ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
 """What round wire in bending holds at most, over its volume [J/m^3]."""
 
+STRONG = 4.0
+"""Torque that springs can hold by the bound over the one wished, above which more of it says nothing."""
+
+FLAT, HOPELESS = 0.45, 0.25
+"""Deviation over the ripple wished up to which springs are left out; largest one of a torque that is worth a look."""
+
+WEAK = 0.9
+"""Of the torque wished: linkages whose springs hold less by the bound are not designed; it knows some places only."""
+
 LINK_SHARE = 1.0 / 12.0
 """Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
 
@@ -126,10 +139,19 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 def _of_torque(wish: Wish) -> FamilyOffer:
     if (reason := _overfilled(wish)) is not None:
         return FamilyOffer(reason=reason)
-    found = [_turned(wish, size, one, JOINTS) for size in SHRUNK for one in TURNED]
-    # of these the slider goes far: there may be no place for a spring that is stretched so much
-    found += [_turned(wish, SHRUNK[0], one, JOINTS[:3]) for one in TURNED if math.radians(one[3]) < WOUND_UP]
-    return FamilyOffer(tuple(one for one in found if one is not None))
+    found = [_turned(wish, size, one) for size in SHRUNK for one in TURNED]
+    candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
+    if candidates:
+        return FamilyOffer(tuple(candidates))
+    return FamilyOffer(reason=_too_weak(wish, max(one for one in found if isinstance(one, float))))
+
+
+def _too_weak(wish: Wish, most: float) -> str:
+    """Return what is wrong where no springs hold the torque."""
+    if not most > 0.0:
+        return f"springs drive no crank one way over {deg(wish.travel)}: it would pass where it is stretched or folded"
+    told = format_short(most, "torque", 2)
+    return f"springs of steel wire that fit at the pins hold at most {told} over this angle"
 
 
 def _overfilled(wish: Wish) -> str | None:
@@ -141,61 +163,91 @@ def _overfilled(wish: Wish) -> str | None:
     return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
 
 
-def _turned(
-    wish: Wish, share: float, linkage: tuple[float, float, float, float], springs: tuple[str, ...]
-) -> Candidate | None:
-    """Return a linkage that turns as much as is wished around its stretched position, a share of what fits the room."""
+def _turned(wish: Wish, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
+    """Return a linkage that turns as much as is wished around its stretched position, a share of what fits the room.
+
+    Or the largest torque that springs can hold, where that is less than what is wished [N m].
+    """
     crank, coupler, offset, unloaded = linkage
     low = math.radians(unloaded)
-    within = (0.0, max(1.6 * wish.travel, math.radians(60.0)))
-    if low > WOUND_UP:
-        within = (low, low + max(3.0 * wish.travel, math.radians(20.0)))
+    within = _within(wish, low)
     angles = np.linspace(low, within[1], 181)
     y = crank * np.sin(angles)
     inside = coupler**2 - (offset - y) ** 2
     if (inside <= 0.0).any():
-        return None
+        return 0.0
     x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
     sides = np.ptp(x) + 2.0 * EYE_SHARE * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * EYE_SHARE * crank
     size = share * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
+    link = Linkage(crank * size, coupler * size, offset * size)
+    most = largest_torque(_motion(wish, link, low))
+    if most < WEAK * wish.low:
+        return most
     data = {
         "family": "slider-crank",
         "name": "suggested",
         "mechanism": {
-            "crank_length": crank * size, "coupler_length": coupler * size, "offset": offset * size,
+            "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
             "unloaded_angle": low, "springs": {}, **_plates(wish),
-        },
-        "design": {
-            "torque": wish.target, "tolerance": min(0.45 * wish.ripple, 0.2),
-            "angle_within": within, "springs": springs,
         },
         "analysis": {"angle": (low, within[1]), "points": 961},
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:finish")
+    done = "cfmkit.families.slider_crank.proposals_for_wish:finish"
+    return Candidate("springs at pins", spec, finish=done, promise=-min(most / wish.target, STRONG))
+
+
+def _within(wish: Wish, unloaded: float) -> tuple[float, float]:
+    """Return between which crank angles a torque may be held [rad]."""
+    if unloaded > WOUND_UP:
+        return unloaded, unloaded + max(3.0 * wish.travel, math.radians(20.0))
+    return 0.0, max(1.6 * wish.travel, math.radians(60.0))
+
+
+def _motion(wish: Wish, link: Linkage, unloaded: float) -> SprungMotion:
+    """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
+    low, high = _within(wish, unloaded)
+    deep = depth_of_springs(wish, thickness_of_links(wish))
+    return SprungMotion(
+        link, unloaded, low, min(high, unloaded + math.pi), wish.travel, deep, shared=wish.depth is not None
+    )
 
 
 def _plates(wish: Wish) -> dict[str, Any]:
     """Return of which sheet links are, where their depth matters."""
-    return {} if wish.depth is None else {"part": {"sheet": max(LINK_SHARE * wish.depth, wish.thinnest)}}
+    return {} if wish.depth is None else {"part": {"sheet": thickness_of_links(wish)}}
+
+
+def thickness_of_links(wish: Wish) -> float:
+    """Return how thick the links of springs at pins are [m]; zero where their depth does not matter."""
+    return 0.0 if wish.depth is None else max(LINK_SHARE * wish.depth, wish.thinnest)
 
 
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
-    """Return a designed linkage that is judged over the middle of the window found, as long as the travel wished."""
-    return wound(_in_middle(spec, wish), wish)
+    """Return a linkage for a torque with the springs that hold it best, over a window as long as the angle wished.
 
-
-def _in_middle(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
-    """Return a designed linkage whose window is the middle of the one found, as long as the travel wished."""
-    low, high = (float(end) for end in spec.analysis.window or (0.0, 0.0))
-    name = "length" if wish.kind == "force" else "angle"
-    spare = 0.5 * max(high - low - wish.travel * (1.0 + 1e-6), 0.0)
-    window = low + spare, high - spare
-    # the motion is the window: what the linkage could do outside of it needs no room
-    keys = {"analysis.window": tuple(Place(end, name) for end in window), "design": None, "requirements": ()}
-    start = spec.at("mechanism.unloaded_angle") if name == "angle" else 0.0
-    ends = (min(start, window[0]), max(start, window[1]))
-    return spec.replace(keys | {"analysis.angle" if name == "angle" else "analysis.travel": ends})
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If no springs that fit come near it.
+    """
+    unloaded = float(spec.mechanism.unloaded_angle or 0.0)
+    held = flattest_springs(_motion(wish, linkage_of(spec.mechanism), unloaded), wish.target, FLAT * wish.ripple)
+    if held is None or held.deviation > HOPELESS:
+        off = "" if held is None else f" nearer than {percent(held.deviation)}"
+        raise SolutionError(f"no springs of steel wire that fit at the pins hold this torque{off}")
+    window = held.begin, held.begin + wish.travel * (1.0 + 1e-6)
+    # the motion is up to the window's end: what the linkage could do beyond it needs no room
+    motion = min(unloaded, window[0]), window[1]
+    sprung = spec.replace(
+        {
+            "mechanism.springs": dict(zip(JOINTS, held.rates.tolist(), strict=True)),
+            "analysis.window": tuple(Place(end, "angle") for end in window),
+            "analysis.angle": motion,
+            "analysis.reference_angle": 0.5 * sum(window),
+        }
+    )
+    return wound(sprung, wish)
 
 
 def _of_force(wish: Wish) -> FamilyOffer:

@@ -46,7 +46,8 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
     turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
     pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
-    deep = room = _left_of_depth(spec, wish)
+    part = spec.mechanism.part
+    deep = room = depth_of_springs(wish, (part.sheet if part else None) or 0.0)
     if wish.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
         least = shortest_torsion_spring(*turns["pivot"], widest)
@@ -79,8 +80,6 @@ def _wound_to_measure(name: str, coil: Wound) -> dict[str, Any]:
     return {"at": name, "name": told, "wound": {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}}
 
 
-def _left_of_depth(spec: SliderCrankSpec, wish: Wish) -> float:
-    """Return how far springs may stand out from the links, on both sides together [m]."""
-    if wish.depth is None:
-        return max(wish.room[:2])
-    return wish.depth - PLATES * (spec.at("mechanism.part.sheet") or 0.0)
+def depth_of_springs(wish: Wish, sheet: float) -> float:
+    """Return how far springs may stand out from links of a sheet [m], on both sides of them together [m]."""
+    return max(wish.room[:2]) if wish.depth is None else wish.depth - PLATES * sheet

@@ -8,9 +8,15 @@ are as high as the inside of the coil.
 from __future__ import annotations
 
 from math import log2
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
 from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE, SHEAR_SHARE
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
 
 INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 """Mean diameter of the coil over that of the wire: what is wound easily."""
@@ -20,6 +26,9 @@ THINNEST = 0.2e-3
 
 FEWEST = 3.0
 """Turns below which the loops decide the rate."""
+
+HALVINGS = 16
+"""Of the wire's diameter, where the length decides it."""
 
 
 def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
@@ -62,6 +71,45 @@ def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | 
     """
     found = [_wound("torsion", index, rate, turn) for index in INDICES]
     return min((one for one in found if one.outer_diameter <= widest), key=lambda one: one.body_length, default=None)
+
+
+def stiffest(kind: Kind, deflection: FloatArray, widest: float, room: float) -> FloatArray:
+    """Return the largest rates of springs that can be stretched [m], or turned [rad], so far and fit: zero for none.
+
+    Parameters
+    ----------
+    kind : {"extension", "torsion"}
+        Of the springs.
+    deflection : (n,) array
+        How far they are stretched or turned.
+    widest, room : float
+        Largest outer diameter, and length with the loops of one that is stretched [m].
+
+    Examples
+    --------
+    >>> (rate,) = stiffest("torsion", np.array([1.0]), 5e-3, 30e-3)
+    >>> [bool(torsion_spring(share * rate, 1.0, 30e-3).outer_diameter <= 5e-3) for share in (0.999, 1.001)]
+    [True, False]
+    """
+    units = [Wound(kind, 1e-3, index * 1e-3, 1.0) for index in INDICES]
+    rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
+    power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
+    index = np.array(INDICES)[:, None]
+    ends = 1.0 + (0.0 if kind == "torsion" else 2.0 * (index - 1.0))
+    falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
+    each = rate * stress * np.maximum(deflection, 1e-12) / (share * tensile_strength(1e-3))
+
+    def turns(wire: FloatArray) -> FloatArray:  # of a wire in mm at its allowed stress: load is as its square or cube
+        return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), FEWEST))
+
+    # the thicker the wire, the stiffer, and the longer
+    low, high = np.full(each.shape, THINNEST / 1e-3), 1e3 * widest / (index + 1.0) + np.zeros(each.shape)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        fits = (turns(middle) + ends) * middle * 1e-3 <= room
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    there = (high >= THINNEST / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
+    return np.asarray(np.where(there, rate * low**power / turns(low), 0.0).max(axis=0))
 
 
 def loaded_length(spring: Wound) -> float:

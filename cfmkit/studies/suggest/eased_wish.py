@@ -30,7 +30,7 @@ STEPS = (1.0, 1.15, 1.5, 2.5, 6.0, 20.0)
 HALVINGS = 3
 """Of the last step, on a logarithmic scale: what is left is less than what the laws leave out."""
 
-FURTHER = (1.02, 1.1, 1.3, 1.7)
+FURTHER = (1.02, 1.1, 1.3, 1.7, 2.5)
 """Beyond the first candidates: laws leave out pads, margins, and what stretches."""
 
 TRIED = 3

@@ -325,8 +325,15 @@ def _sized(one: Proposal) -> Proposal:
     return replace(one, variant=f"{one.variant}, {across:.3g} x {along:.3g} mm")
 
 
+EQUAL = 1e-3
+"""Numbers that differ by less than this share are equal: searches leave as much in them, and nobody sees it."""
+
+
 def ordered(proposals: Sequence[Proposal], wish: Wish, prefer: Sequence[str]) -> list[Proposal]:
-    """Return proposals, the best first: each preference counts half as much as the one before it."""
+    """Return proposals, the best first: each preference counts half as much as the one before it.
+
+    Of equal ones, as two sizes of one shape are in their ripple, the one that was made first is the first.
+    """
     weights = {name: 0.5**place for place, name in enumerate(dict.fromkeys(prefer))}
     measures = {name: [measure(one, wish, name) for one in proposals] for name in weights}
 
@@ -334,7 +341,7 @@ def ordered(proposals: Sequence[Proposal], wish: Wish, prefer: Sequence[str]) ->
         total = 0.0
         for name, weight in weights.items():
             values = measures[name]
-            total += weight * sum(value < values[index] for value in values)
+            total += weight * sum(value < (1.0 - EQUAL) * values[index] for value in values)
         return total
 
     order = sorted(range(len(proposals)), key=lambda index: (score(index), index))
