@@ -47,11 +47,14 @@ class Moving:
         Left, bottom, right and top of what all poses need [m].
     draw : callable
         ``draw(ax, number)`` draws one pose to scale.
+    draw_as_made : callable, optional
+        The same where `draw` has symbols that are not to scale: with the size of every part that takes room.
     """
 
     motion: FloatArray
     box: tuple[float, float, float, float]
     draw: Callable[[Axes, int], Any]
+    draw_as_made: Callable[[Axes, int], Any] | None = None
 
 
 def chosen(count: int, poses: int = POSES) -> FloatArray:

@@ -109,6 +109,10 @@ UNNAMED = """() => [
     const shown = getComputedStyle(one).display !== "none";
     return shown && !one.getAttribute("aria-label") && !label && !one.textContent.trim();
   }),
+  ...[...document.querySelectorAll("[tabindex]")].filter((one) => {
+    const heading = document.getElementById(one.getAttribute("aria-labelledby"));
+    return !one.getAttribute("role") || !(one.getAttribute("aria-label") || (heading && heading.textContent.trim()));
+  }),
   ...[...document.querySelectorAll("svg")].filter((one) => {
     return one.getAttribute("role") !== "img" || !one.getAttribute("aria-label");
   }),

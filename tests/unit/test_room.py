@@ -61,3 +61,25 @@ def test_links_and_pins_have_no_known_depth():
     room, _ = room_of("slider_crank_bilancia2019")
     assert room.depth is None
     assert "springs" in room.assumed
+
+
+def test_what_proposals_draw_of_a_linkage_is_what_its_box_counts():
+    from matplotlib.figure import Figure
+
+    from cfmkit.families.slider_crank.springs.figures import draw_as_made, key, moving, scene
+    from cfmkit.plots.poses_in_one_svg import chosen
+
+    spring = {"at": "pivot", "name": "wide", "wound": {"wire": "1 mm", "coil": "13 mm", "turns": 8.05}}
+    room, result = room_of("slider_crank_bilancia2019", **{"mechanism.springs.bought": (spring,)})
+    solution, bounds = result.state, []
+    for place in solution.motion[chosen(len(solution.motion), 9)]:
+        ax = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_as_made(result, key(solution, "", float(place)), ax, scene(result))
+        bounds += [one.get_path().transformed(one.get_patch_transform()).get_extents() for one in ax.patches]
+        bounds += [one.get_path().transformed(one.get_patch_transform()).get_extents() for one in ax.artists]
+        bounds += [one.get_path().get_extents() for one in ax.lines]
+    low, high = ([f(one.extents[k] for one in bounds) for k in pair] for f, pair in ((min, (0, 1)), (max, (2, 3))))
+    corner = [1e3 * at for at in room.corner]
+    assert low == pytest.approx(corner, abs=0.3)
+    assert high == pytest.approx([corner[0] + 1e3 * room.along, corner[1] + 1e3 * room.across], abs=0.3)
+    assert moving(result).draw_as_made is not None

@@ -69,15 +69,22 @@ def _widest(spec: SliderCrankSpec) -> float:
     return max(one.width for one in parts.flexures.all) if parts.flexures else 0.0
 
 
+def radii_at_pins(spec: Any) -> tuple[float, float, float]:
+    """Return how far links and springs reach around pivot, crank pin, and the slider with its pin [m]."""
+    half, _ = eye_and_hole(spec)
+    at = ("pivot",), ("crank_pin",), ("slider_pin", "slider")
+    found = [[coil.outer_diameter for name in names for coil in spec.mechanism.springs.coils_at(name)] for names in at]
+    first, second, third = (max([half, *(0.5 * one for one in sizes)]) for sizes in found)
+    return first, second, third
+
+
 def _linkage(result: Result) -> Room:
     """Return the box of links and pins, and of springs whose wire is known, over the motion of the curve."""
     spec: Any = result.spec
     solution, springs = result.state, spec.mechanism.springs
     link, units = solution.assembly.linkage, solution.units
     half, _ = eye_and_hole(spec)
-    at = ("pivot",), ("crank_pin",), ("slider_pin", "slider")
-    coils = [[coil for name in names for coil in springs.coils_at(name)] for names in at]
-    around = [max([half, *(0.5 * coil.outer_diameter for coil in found)]) for found in coils]
+    around = radii_at_pins(spec)
     pivot, turned = np.zeros((1, 2)), link.crank * np.column_stack([np.cos(units.angle), np.sin(units.angle)])
     slid = np.column_stack([units.position, np.full(len(units.position), link.offset)])
     pins = list(zip((pivot, turned, slid), around, strict=True))

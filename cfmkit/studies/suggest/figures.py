@@ -95,7 +95,7 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
         row, column = divmod(number, COLUMNS)
         left = 5.0 + column * (150.0 / columns) + 0.5 * (150.0 / columns - cell[0])
         ax = axes_mm(figure, (left, total - 8.0 - (row + 1) * (cell[1] + above), *cell))
-        moving.draw(ax, 0)
+        (moving.draw_as_made or moving.draw)(ax, 0)
         _frame(ax, space, size, (wide, high))
         ax.set_title(names[number], fontsize=SMALL, loc="left", pad=1.5)
     figure.text(0.02, 1.0 - 5.0 / total, "the proposals to one scale, each in the room given", fontsize=NORMAL)

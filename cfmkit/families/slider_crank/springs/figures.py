@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.slider_crank.bounding_box import radii_at_pins
+from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import NEGATIVE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
@@ -383,4 +385,51 @@ def moving(result: Result) -> Moving:
     solution: Solution = result.state
     motion, view = solution.motion[chosen(len(solution.motion))], scene(result)
     poses = [key(solution, "", float(place)) for place in motion]
-    return Moving(motion, view.box, lambda ax, number: draw_linkage(solution, poses[number], ax, view))
+    return Moving(
+        motion,
+        view.box,
+        lambda ax, number: draw_linkage(solution, poses[number], ax, view),
+        lambda ax, number: draw_as_made(result, poses[number], ax, view),
+    )
+
+
+def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) -> None:
+    """Draw links and springs at one place of the motion with the sizes that the box of the mechanism counts."""
+    solution: Solution = result.state
+    spec: Any = result.spec
+    half, hole = eye_and_hole(spec)
+    rates, offset, joints = solution.assembly.rates, solution.assembly.linkage.offset, key.joints
+    way = np.array([[at, offset] for at in (solution.units.position.min(), solution.units.position.max())])
+    parts.edge(ax, way, "guide", color=GREY, linewidth=0.6)
+    parts.slider(ax, key.slider_pin, 2.0 * half)
+    for start, end, name in ((joints[0], joints[1], "crank"), (joints[1], joints[2], "coupler")):
+        parts.plate(ax, [_round_ended(start, end, half)], name)
+    for joint in joints[:2]:
+        parts.roller(ax, joint, hole, "pin")
+    for rate, joint, direction, radius in zip(rates[:3], joints, key.directions, radii_at_pins(spec), strict=True):
+        if rate > 0.0:
+            coil = np.vstack([torsion_spring(joint, direction, radius), _arc(joint, radius, direction, TURN)])
+            parts.edge(ax, coil, "torsion-spring", color=OCHRE, zorder=3.6)
+    if rates[3] > 0.0:
+        wide = max((coil.outer_diameter for coil in spec.mechanism.springs.coils_at("slider")), default=half)
+        parts.spring(ax, key.slider_pin, (view.wall, offset), wide, "spring-slider")
+    if solution.assembly.drive == "force":
+        out = view.size * solution.assembly.linkage.branch
+        tail, tip = (key.slider_pin[0] + 2.6 * out, offset), (key.slider_pin[0] + 0.6 * out, offset)
+        parts.force_arrow(ax, tail, tip)
+    parts.to_scale(ax, view.box)
+
+
+def _round_ended(start: Point, end: Point, half: float) -> FloatArray:
+    """Return the outline of a link with round ends, (n, 2) [m]."""
+    left = math.atan2(end[1] - start[1], end[0] - start[0]) + 0.5 * math.pi
+    return np.vstack([_arc(end, half, left + math.pi, 0.5 * TURN), _arc(start, half, left, 0.5 * TURN)])
+
+
+TURN = 2.0 * math.pi
+
+
+def _arc(center: Point, radius: float, begin: float, turn: float) -> FloatArray:
+    """Return an arc that turns to the left, (n, 2) [m]."""
+    angle = begin + np.linspace(0.0, turn, 41)
+    return np.column_stack([center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)])
