@@ -220,6 +220,39 @@ def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> N
     np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
 
 
+CROSSING = """
+cfmkit: 1
+family: slider-crank
+name: crosses-at-its-end
+mechanism:
+  crank_length: 54 mm
+  stretched_position: 27.7 mm
+  offset: 76.3 mm
+  unloaded_angle: 1.209 rad
+  material: {youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}
+  flexures:
+    pivot: {length: 13.6 mm, thickness: 0.6 mm, width: 2.478 mm}
+    crank_pin: {length: 7.2 mm, thickness: 1.17 mm, width: 2.621 mm}
+    slider_pin: {length: 10.1 mm, thickness: 1.1 mm, width: 2.621 mm}
+analysis: {drive: force, travel: [0 mm, 30.5 mm], points: 31}
+"""
+
+
+def test_long_flexures_that_bend_over_beyond_the_pivots_foot_have_a_curve_up_to_there(tmp_path: Path) -> None:
+    """The slider comes back to its first distance from the pivot; the crank pin is on the other side then."""
+    (path := tmp_path / "crosses.yaml").write_text(CROSSING, encoding="utf-8")
+    found = cfmkit.analyze(cfmkit.load(path))
+    assert found.status is Status.PARTIAL
+    assert names(found) >= {"wrong_branch"}
+    assert found.message == "between 28.47 and 29.48 mm the chain crosses to the side opposite to the requested one"
+    assert found.curve.motion == pytest.approx(np.linspace(0.0, 30.5, 31)[:29] * MM)
+    before = cfmkit.analyze(cfmkit.load(path, ["analysis.travel=[0 mm, 28 mm]", "analysis.points=29"]))
+    assert before.status is Status.COMPLETE
+    there = found.closed.effort("load", before.curve.motion)
+    assert there == pytest.approx(before.curve.force, abs=1e-7 * before.curve.force.max())
+    assert found.curve.stable.all()
+
+
 def test_pressing_beyond_all_reason_is_not_complete() -> None:
     found = strip_chain().press(np.array([1.0, 400.0]) * MM)
     assert found.ending is not PressingEnd.COMPLETE
