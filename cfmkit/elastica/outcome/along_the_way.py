@@ -75,8 +75,8 @@ class AlongTheWay:
             found |= self._turns(number)
         largest = seen.stress.max()
         for values, _ in seen.stresses.values():
-            turns = inner_extremes(self._arc, values)
-            near = np.interp(turns, self._arc, points)
+            turns = inner_extremes(self.arc, values)
+            near = np.interp(turns, self.arc, points)
             found |= {*near[np.interp(near, points, values) > 0.5 * largest].tolist()}
         return read_only(sorted(found))
 
@@ -85,8 +85,8 @@ class AlongTheWay:
         points = np.arange(float(len(self.path)))
         ways, values = points, self._states_at_points[which]
         for _ in range(ROUNDS):
-            extremes = inner_extremes(np.interp(ways, points, self._arc), values)
-            more = np.array(sorted({*np.interp(extremes, self._arc, points).tolist()} - {*ways.tolist()}))
+            extremes = inner_extremes(np.interp(ways, points, self.arc), values)
+            more = np.array(sorted({*np.interp(extremes, self.arc, points).tolist()} - {*ways.tolist()}))
             if not len(more):
                 break
             at = np.searchsorted(ways, more)
@@ -163,7 +163,7 @@ class AlongTheWay:
         return weights
 
     @cached_property
-    def _arc(self) -> FloatArray:
+    def arc(self) -> FloatArray:
         """Length of the way up to every point, (n,)."""
         steps = np.diff(self._places, axis=0)
         return np.concatenate([[0.0], np.cumsum(np.sqrt(steps**2 @ self._metric))])
@@ -177,12 +177,12 @@ class AlongTheWay:
     def _guesses(self, left: Any, share: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the polynomials through up to four points of the branch at shares of the way behind some points."""
         near = np.where(share > 0.5, left + 1, left)
-        arc = self._arc[left] + share * (self._arc[left + 1] - self._arc[left])
+        arc = self.arc[left] + share * (self.arc[left + 1] - self.arc[left])
         rows = np.column_stack([self.path.points.y, self.path.points.drive])
         found = np.empty((len(left), rows.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
-            found[here] = values_at(self._arc[own], rows[own], arc[here])
+            found[here] = values_at(self.arc[own], rows[own], arc[here])
         return found[:, :-1].copy(), found[:, -1].copy()
 
 

@@ -66,7 +66,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     status, message = _ending(solution)
     all_of_it = run.wanted is None
     curves: tuple[Curve, ...] = (_curve(solution) if all_of_it else _effort_and_stress(solution),)
-    values = values_of(solution) if run.wants(DEFINITIONS) else {}
+    values = values_of(solution, run) if run.wants(DEFINITIONS) else {}
     warnings = findings_of(solution) if all_of_it else ()
     if (along := ride(solution)) is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.fem_results import unknown_to_beams
@@ -17,7 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
     from cfmkit.elastica.outcome.between_points import BetweenPoints
+    from cfmkit.families.base import Run
     from cfmkit.families.beam.solution import OnCurve, Solution
 
 
@@ -33,7 +37,7 @@ DEFINITIONS = {
     "stress_at_end": ("stress", "largest stress at d"),
     "stress_limit_displacement": ("length", "travel at which the stress first reaches the allowable stress"),
     "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`; of several materials, the smallest"),
-    "stress_total_max": ("stress", "largest stress in the window with the axial part, at places along each beam"),
+    "stress_total_max": ("stress", "largest stress in the window with the axial part"),
     "prestress_force": ("force", "force at rest: not zero where beams are forced into place"),
     "prestress_stress": ("stress", "largest stress at rest"),
     "closure_rotation_max": ("angle", "largest angle by which a beam was turned to fit between its nodes"),
@@ -57,7 +61,8 @@ DEFINITIONS = {
     "cross_stiffness": (
         "stiffness",
         "smallest stiffness of the driven node across the drive, in the window: force over displacement with the drive "
-        "held and the rotation as supported, without what guides the node across; of all copies",
+        "held and the rotation as supported, without what guides the node across; of all copies; none where it has no "
+        "bound, at a bifurcation",
     ),
     "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
     "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),
@@ -68,8 +73,8 @@ DEFINITIONS = {
 }
 
 
-def values_of(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where a value does not exist."""
+def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; None where a value does not exist, or takes long and is not looked at."""
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         "error_estimate": solution.path.error,
@@ -78,7 +83,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "gap_min_moving": None if solution.gaps[1] is None else solution.gaps[1].size,
         **_closure(solution),
         **_rest(solution),
-        **_parasitic(solution),
+        **(_across(solution) if run.wants(ACROSS) else {}),
         **_swings(solution),
     }
     if solution.spec.mechanism.drive.kind in ("displacement", "force", "loads"):
@@ -212,32 +217,70 @@ def _closure(solution: Solution) -> dict[str, float | None]:
 
 
 def _rest(solution: Solution) -> dict[str, float | None]:
-    """Return what happens at rest, and the stress with all its parts."""
-    path, every = solution.path, solution.with_ends
-    stresses = [path.sections(name).stress()[every.keep].max(axis=1) for name in path.layout.network.beams]
-    total, inside = np.max(stresses, axis=0), within(every, *window_of(solution))
+    """Return what happens at rest."""
     return {
         "prestress_force": _significant(solution.effort, solution.path.error),
         "prestress_stress": _significant(solution.stress, solution.path.error),
-        "stress_total_max": float(total[inside].max()) if inside.any() else None,
     }
 
 
-def _parasitic(solution: Solution) -> dict[str, float | None]:
-    """Return how far the driven node goes where it is not to; of drives that turn it, nothing."""
-    drive, low, high = solution.spec.mechanism.drive, *window_of(solution)
-    solution = solution.with_ends
-    inside = within(solution, low, high)
-    if drive.kind not in ("displacement", "force", "loads") or not inside.any():
-        return {}
-    x, y, turn = solution.path.motion(drive.node)[solution.keep][inside].T
-    across = np.cos(drive.direction) * y - np.sin(drive.direction) * x
-    stiffness = solution.cross_stiffness[inside]
-    return {
-        "parasitic_motion": float(np.abs(across).max()),
-        "parasitic_rotation": float(np.abs(turn).max()),
-        "cross_stiffness": float(np.nanmin(stiffness)) if np.isfinite(stiffness).any() else None,
+ACROSS = ("stress_total_max", "parasitic_motion", "parasitic_rotation", "cross_stiffness")
+"""What is solved for by itself: it takes a third as long as all else about a path."""
+
+
+def _across(solution: Solution) -> dict[str, float | None]:
+    """Return the stress with all its parts, and how far the driven node goes where it is not to.
+
+    Of drives that turn it, only the stress.
+    """
+    drive, window = solution.spec.mechanism.drive, window_of(solution)
+    names = list(solution.path.layout.network.beams)
+
+    def stresses(path: Path) -> FloatArray:
+        return np.array([path.beam_stress(name, True)[0] for name in names])
+
+    total = {"stress_total_max": largest(solution, stresses, window)}
+    if drive.kind not in ("displacement", "force", "loads"):
+        return total
+
+    def across(path: Path) -> FloatArray:
+        x, y, _ = path.motion(drive.node).T
+        away = np.cos(drive.direction) * y - np.sin(drive.direction) * x
+        return np.array([away, -away])
+
+    def turned(path: Path) -> FloatArray:
+        turn = path.motion(drive.node)[:, 2]
+        return np.array([turn, -turn])
+
+    def gives(path: Path) -> FloatArray:
+        return -replace(solution, path=path, keep=np.arange(len(path)), ends=()).cross_stiffness[None]
+
+    least = None if _is_unbounded(solution, gives, window) else largest(solution, gives, window)
+    return total | {
+        "parasitic_motion": largest(solution, across, window),
+        "parasitic_rotation": largest(solution, turned, window),
+        "cross_stiffness": None if least is None else -least,
     }
+
+
+BESIDE = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
+"""Shares of the travel by which places are beside a bifurcation where a value is looked at."""
+
+
+def _is_unbounded(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> bool:
+    """Tell whether a value has a pole at a bifurcation in a window: nearer by ten times it is ten times as large.
+
+    Such is the stiffness across the drive of a node that is guided, where the part buckles under its guide.
+    """
+    law = solution.everywhere
+    if law is None or solution.spec.mechanism.drive.kind != "displacement":
+        return False
+    for place in (event.drive for event in solution.path.events if event.kind == "bifurcation"):
+        if window[0] <= place <= window[1]:
+            far, near, later, farther = np.abs(observe(law.at(place + BESIDE * float(np.ptp(solution.motion))))[0])
+            if near > 5.0 * far or later > 5.0 * farther:
+                return True
+    return False
 
 
 def natural(solution: Solution) -> dict[str, FloatArray]:

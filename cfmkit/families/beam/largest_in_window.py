@@ -1,0 +1,123 @@
+"""The largest value of something along a path in a window: an extreme between points is solved for, not sampled.
+
+Where a cubic through the points may be higher than all of them, the equilibrium is solved for and looked at, and the
+cubic is drawn again; so are the ends of the window and corners of the path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import distinct
+from cfmkit.metrics.winding_branches import inside
+from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
+    from cfmkit.elastica.outcome.along_the_way import AlongTheWay
+    from cfmkit.families.beam.solution import Solution
+
+ROUNDS = 4
+"""Extremes are solved for, and looked for again with what was found: the last moves them by less than 1e-9."""
+
+NEARLY, RISE = 0.05, 1e-10
+"""Shares of a row's range: how much too low the first cubic may be, and what a later one is to add to count."""
+
+FAR = 1e6
+"""Values so many times as large as the middle one are left out of cubics: a straight beam is nearly rigid lengthwise."""
+
+SAME = 1e-12
+"""Share of the largest place within which two places are one."""
+
+SLACK = 1e-9
+"""Share of the range of motion by which the ends of a window, where they were looked for, may be beside it."""
+
+
+def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> float | None:
+    """Return the largest of some values along a path, where its motion is in a window; None where there is none.
+
+    Parameters
+    ----------
+    solution : Solution
+        A solved mechanism.
+    observe : callable
+        From equilibria to rows of values that are smooth along the path, (rows, points); NaN where there is none.
+    window : (float, float)
+        [m or rad].
+    """
+    path, law, winding = solution.path, solution.everywhere, solution.winding
+    points = replace(solution, keep=np.arange(len(path)), ends=())
+    rows, reached = observe(path), points.motion
+    ask: Callable[[FloatArray], Path]
+    if law is not None:
+        order = np.argsort(reached)
+        x, rows = reached[order], rows[:, order]
+        wanted, ask = np.array([*np.clip(window, x[0], x[-1]), *law.corners]), law.at
+    elif winding is not None:
+        x, wanted, ask = winding.arc, _arcs(winding, inside(winding, *window)), partial(_solved, winding)
+    else:
+        return _top(rows, points.accurate & _within(reached, window))
+    top = None
+    for number in range(ROUNDS):
+        wanted = wanted[np.abs(wanted[:, None] - x).min(axis=1) > SAME * np.abs(x).max()]
+        if len(wanted):
+            there = ask(wanted)
+            known = np.flatnonzero(there.accurate)
+            places = np.searchsorted(x, wanted[known])
+            x = np.insert(x, places, wanted[known])
+            rows = np.insert(rows, places, observe(there)[:, known], axis=1)
+        reached = x if winding is None else winding.states(_ways(winding, x))[0]
+        top = _top(rows, _within(reached, window))
+        if top is None:
+            break
+        # what was missed by little is looked at once; then only what is higher is
+        bounds = [top - (NEARLY if number == 0 else -RISE) * float(np.ptp(row[np.isfinite(row)])) for row in rows]
+        wanted = distinct(np.concatenate([_higher(x, row, bound) for row, bound in zip(rows, bounds, strict=True)]))
+        if not len(wanted):
+            break
+    return top
+
+
+def _arcs(winding: AlongTheWay, ways: FloatArray) -> FloatArray:
+    """Return the lengths of the way at some of its places: over them values are smooth."""
+    return np.asarray(np.interp(ways, np.arange(float(len(winding.arc))), winding.arc))
+
+
+def _ways(winding: AlongTheWay, arcs: FloatArray) -> FloatArray:
+    """Return the places at which the way has some lengths."""
+    return np.asarray(np.interp(arcs, winding.arc, np.arange(float(len(winding.arc)))))
+
+
+def _solved(winding: AlongTheWay, arcs: FloatArray) -> Path:
+    """Return the equilibria after some lengths of the way."""
+    return winding.at(_ways(winding, arcs))
+
+
+def _within(motion: FloatArray, window: tuple[float, float]) -> FloatArray:
+    """Tell which places are in a window, (n,) of bool."""
+    slack = SLACK * float(np.ptp(motion)) if len(motion) else 0.0
+    return np.asarray((motion >= window[0] - slack) & (motion <= window[1] + slack))
+
+
+def _top(rows: FloatArray, kept: FloatArray) -> float | None:
+    """Return the largest value of some columns, None without any."""
+    found = rows[:, kept]
+    known = found[np.isfinite(found)]
+    return float(known.max()) + 0.0 if len(known) else None  # not -0
+
+
+def _higher(x: FloatArray, row: FloatArray, bound: float) -> FloatArray:
+    """Return where the cubics between values have extremes above a bound."""
+    size = np.abs(row)
+    finite = np.sort(size[np.isfinite(size)])
+    known = size <= FAR * finite[len(finite) // 2]  # np.median would load numpy.ma
+    x, row = x[known], row[known]
+    found = inner_extremes(x, row)
+    return found[values_at(x, row, found) > bound] if len(found) else found
