@@ -236,7 +236,7 @@ def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
     [36.232, 72.464]
     """
-    from cfmkit.studies.study_result import swept
+    from cfmkit.studies.sweep_and_sensitivity_api import swept
 
     return swept(spec_of(spec), jobs, block)
 
@@ -272,7 +272,7 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     >>> found.summary["yield"]["value"]
     0.8
     """
-    from cfmkit.studies.study_result import examined
+    from cfmkit.studies.sweep_and_sensitivity_api import examined
 
     return examined(spec_of(spec), jobs, block)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.batch_sources_and_outcomes import KeptRuns
+    from cfmkit.studies.kept_batch_runs import KeptRuns
     from cfmkit.studies.metric_changes import Known
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
@@ -425,9 +425,10 @@ def batch(
     """
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch_sources_and_outcomes import KeptRuns, folders, sources
+    from cfmkit.studies.batch_sources_and_outcomes import folders, sources
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
+    from cfmkit.studies.kept_batch_runs import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():

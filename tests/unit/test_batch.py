@@ -14,7 +14,6 @@ from cfmkit.errors import ExitCode, UsageError
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
     Entry,
-    KeptRuns,
     folders,
     message,
     requirements_table,
@@ -23,6 +22,7 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 )
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
+from cfmkit.studies.kept_batch_runs import KeptRuns
 
 
 @pytest.fixture
@@ -248,7 +248,7 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
     monkeypatch.setattr(
-        "cfmkit.studies.batch_sources_and_outcomes.origin", lambda libraries: origin(libraries) | {"content": "another"}
+        "cfmkit.studies.kept_batch_runs.origin", lambda libraries: origin(libraries) | {"content": "another"}
     )
     assert recalled() is None
 

@@ -19,13 +19,13 @@ from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
-from cfmkit.families.vcfm.longest_window import longest_window
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.model import rest_of, rests_of
 from cfmkit.families.vcfm.pose_outlines import centre_line
 from cfmkit.families.vcfm.scalar_results import forces, spread
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.metrics import Window, evaluate
+from cfmkit.metrics.longest_interval_in_band import longest_window
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.noted_metrics import metrics_of

@@ -13,10 +13,10 @@ from cfmkit.families.fem_results import numbered
 from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
 from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
-from cfmkit.families.vcfm.longest_window import flat_window
 from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
+from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve

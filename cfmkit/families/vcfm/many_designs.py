@@ -30,9 +30,9 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     VBeam,
     overrated,
 )
-from cfmkit.families.vcfm.longest_window import extremes, flat_window
 from cfmkit.families.vcfm.solution import FLAT_PLACES, is_constant
 from cfmkit.metrics.continuous_means_and_extremes import extremes as extremes_next_to
+from cfmkit.metrics.longest_interval_in_band import extremes, flat_window
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.specs.units import between
 

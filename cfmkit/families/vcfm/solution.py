@@ -14,8 +14,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
-from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.metrics.longest_interval_in_band import extreme, flat_window
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:

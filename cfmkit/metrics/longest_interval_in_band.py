@@ -1,9 +1,9 @@
-"""The longest stretch of a curve on which the force stays within a band: for one curve or many at once.
+"""The longest interval of a curve on which the force stays within a band: for one curve or many at once.
 
 Found among samples first, each start with the place in the next cell where the force leaves the band. Then again with
 more samples around both ends and around the highest and the lowest force in between, until they are 1/4000000 of a step
-apart: the ends are those of the curve, not of its samples. Where the leaves buckle the curve has a corner, and a window
-that ends there, or is limited by the force there, is known no better than the last step.
+apart: the ends are those of the curve, not of its samples. An interval that ends at a corner of the curve, or is
+limited by the force there, is known no better than the last step.
 """
 
 from __future__ import annotations
