@@ -31,7 +31,7 @@ NEARLY, RISE = 0.05, 1e-10
 """Shares of a row's range: how much too low the first cubic may be, and what a later one is to add to count."""
 
 FAR = 1e6
-"""Values so many times as large as the middle one are left out of cubics: a straight beam is nearly rigid lengthwise."""
+"""Values so many times as large as the middle one are in no cubic: a straight beam is nearly rigid lengthwise."""
 
 SAME = 1e-12
 """Share of the largest place within which two places are one."""

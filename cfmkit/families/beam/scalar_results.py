@@ -255,7 +255,7 @@ def _across(solution: Solution) -> dict[str, float | None]:
     def gives(path: Path) -> FloatArray:
         return -replace(solution, path=path, keep=np.arange(len(path)), ends=()).cross_stiffness[None]
 
-    least = None if _is_unbounded(solution, gives, window) else largest(solution, gives, window)
+    least = None if _has_pole(solution, gives, window) else largest(solution, gives, window)
     return total | {
         "parasitic_motion": largest(solution, across, window),
         "parasitic_rotation": largest(solution, turned, window),
@@ -267,7 +267,7 @@ BESIDE = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
 """Shares of the travel by which places are beside a bifurcation where a value is looked at."""
 
 
-def _is_unbounded(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> bool:
+def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> bool:
     """Tell whether a value has a pole at a bifurcation in a window: nearer by ten times it is ten times as large.
 
     Such is the stiffness across the drive of a node that is guided, where the part buckles under its guide.
