@@ -1,18 +1,15 @@
-"""How families speak of a mechanism: findings by name, numbers as users read them, and why there is no mechanism."""
+"""How families word their findings: by name, with numbers as users read them."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Protocol
 
-from cfmkit.errors import SolutionError
-from cfmkit.results import Design, Finding, Result, Status
+from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-
-    from cfmkit.specs.spec import Spec
 
 
 TOO_SOFT = 0.01
@@ -127,35 +124,3 @@ def _rounded(length: float, way: Callable[[float], int]) -> str:
         return "0 mm"
     digits = 3 - math.floor(math.log10(length * 1e3))
     return f"{way(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"
-
-
-class CannotBuild(SolutionError):
-    """The mechanism cannot exist as described; carries the finding that says why."""
-
-    def __init__(self, found: Finding) -> None:
-        """Keep the finding."""
-        self.finding = found
-        super().__init__(found.message)
-
-    def __reduce__(self) -> tuple[type[CannotBuild], tuple[Finding]]:
-        """Return what pickling needs: worker processes hand these errors back."""
-        return type(self), (self.finding,)
-
-
-class Infeasible(Exception):
-    """Nothing meets the targets of a design; carries the finding that says why, and what would be feasible."""
-
-    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
-        """Keep the reason and the nearest feasible values by path."""
-        self.finding, self.nearest = found, dict(nearest or {})
-        super().__init__(found.message)
-
-
-def no_result(spec: Spec, found: Finding) -> Result:
-    """Return the result of a mechanism that cannot exist, with the reason."""
-    return Result(spec, Status.NO_EQUILIBRIUM, found.message, warnings=(found,))
-
-
-def no_design(found: Finding, nearest: Mapping[str, str] | None = None) -> Design:
-    """Return the outcome of targets that cannot be met, with the reason and the nearest feasible values by path."""
-    return Design(None, Status.INFEASIBLE, found.message, nearest_feasible=dict(nearest or {}), warnings=(found,))

@@ -17,7 +17,7 @@ from cfmkit.families.cam.geometry.mounted_roller_track import NoTrack, Track
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.families.findings import CannotBuild
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)
 FAST = settings(deadline=None, max_examples=200)

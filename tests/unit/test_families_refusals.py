@@ -6,20 +6,8 @@ import pickle
 
 import pytest
 
-from cfmkit.families.findings import (
-    CannotBuild,
-    at_least,
-    at_most,
-    deg,
-    finder,
-    mm,
-    mpa,
-    newton,
-    no_design,
-    no_result,
-    percent,
-    rate,
-)
+from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_design, no_result
 from cfmkit.results import Finding, Status
 from cfmkit.specs.spec import Spec
 

@@ -37,7 +37,8 @@ from cfmkit.families.cam.mechanism_from_spec import (
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
-from cfmkit.families.findings import CannotBuild, Infeasible, at_least, at_most, mm, newton, no_design, rate
+from cfmkit.families.findings import at_least, at_most, mm, newton, rate
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of

@@ -48,7 +48,8 @@ from cfmkit.families.cam.scalar_results import (
     values_of_built,
 )
 from cfmkit.families.cam.solution import Assembly, Built, Sides
-from cfmkit.families.findings import CannotBuild, mm, no_result
+from cfmkit.families.findings import mm
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
 from cfmkit.numerics.registration import CurveFrame, Registration, feet, gaps_across, register, registered_where_it_is
 from cfmkit.numerics.smoothing import smoothed
 from cfmkit.results import Quantity, Result, Status, quantities

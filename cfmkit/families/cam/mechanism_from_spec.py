@@ -22,7 +22,8 @@ from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
-from cfmkit.families.findings import CannotBuild, mm
+from cfmkit.families.findings import mm
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

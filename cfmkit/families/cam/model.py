@@ -36,7 +36,8 @@ from cfmkit.families.cam.mechanism_from_spec import (
 from cfmkit.families.cam.scalar_results import contact_pressure, curve_cut_for, target_force, values_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
-from cfmkit.families.findings import CannotBuild, mm, no_result
+from cfmkit.families.findings import mm
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import listed
 

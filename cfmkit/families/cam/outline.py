@@ -14,7 +14,8 @@ import numpy as np
 
 from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Drawing, DrawnDimension, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
-from cfmkit.families.findings import CannotBuild, mm, rate
+from cfmkit.families.findings import mm, rate
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +37,7 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.findings.CannotBuild
+    cfmkit.families.infeasible_or_not_buildable.CannotBuild
         If there is no cam to draw.
     """
     sides = assemble_sides(spec)

@@ -10,7 +10,8 @@ import numpy as np
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
-from cfmkit.families.findings import CannotBuild, Infeasible, at_most, mm, newton
+from cfmkit.families.findings import at_most, mm, newton
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.cut import CamProfile

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import Infeasible, at_least, mm, mpa, newton, no_design
+from cfmkit.families.findings import at_least, mm, mpa, newton
+from cfmkit.families.infeasible_or_not_buildable import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import Infeasible, mm, mpa, no_design
+from cfmkit.families.findings import mm, mpa
+from cfmkit.families.infeasible_or_not_buildable import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.leaf_sizing import (

@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import SolutionError
-from cfmkit.families.findings import Infeasible, mm
+from cfmkit.families.findings import mm
+from cfmkit.families.infeasible_or_not_buildable import Infeasible
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.spec import VcfmSpec

@@ -31,7 +31,8 @@ from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.findings import finding, rubbing_left_out
 from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
 from cfmkit.families.cam.scalar_results import constant_force
-from cfmkit.families.findings import CannotBuild, mm, newton, no_result
+from cfmkit.families.findings import mm, newton
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 

@@ -19,7 +19,8 @@ from cfmkit.designing.bounds_and_rounding import rounded
 from cfmkit.designing.reported_values import measured, searched
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
-from cfmkit.families.findings import CannotBuild, mm, mpa, newton, no_design, percent
+from cfmkit.families.findings import mm, mpa, newton, percent
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge

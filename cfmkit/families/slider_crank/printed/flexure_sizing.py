@@ -19,7 +19,8 @@ import numpy as np
 
 from cfmkit.designing.reported_values import searched
 from cfmkit.errors import InputError
-from cfmkit.families.findings import mm, no_design
+from cfmkit.families.findings import mm
+from cfmkit.families.infeasible_or_not_buildable import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import side_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (

@@ -18,7 +18,8 @@ from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import CannotBuild, bracket, no_result
+from cfmkit.families.findings import bracket
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.families.findings import Infeasible, percent
+from cfmkit.families.findings import percent
+from cfmkit.families.infeasible_or_not_buildable import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import CannotBuild, Infeasible, no_design
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from cfmkit.designing.reported_values import measured, searched
 from cfmkit.families.base import Run
-from cfmkit.families.findings import Infeasible, percent
+from cfmkit.families.findings import percent
+from cfmkit.families.infeasible_or_not_buildable import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest

@@ -20,7 +20,8 @@ import numpy as np
 
 from cfmkit.arrays import distinct
 from cfmkit.curves import Column, Curve
-from cfmkit.families.findings import CannotBuild, deg, mm, no_result
+from cfmkit.families.findings import deg, mm
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of

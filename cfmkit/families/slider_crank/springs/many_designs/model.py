@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.findings import CannotBuild
+from cfmkit.families.infeasible_or_not_buildable import CannotBuild
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.many_designs.forces_for_given_rates import EACH, PLACES, Base, Slab

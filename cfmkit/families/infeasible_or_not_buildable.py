@@ -1,0 +1,45 @@
+"""A mechanism that cannot exist, and targets that no mechanism meets: with the finding that says why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import SolutionError
+from cfmkit.results import Design, Finding, Result, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.specs.spec import Spec
+
+
+class CannotBuild(SolutionError):
+    """The mechanism cannot exist as described; carries the finding that says why."""
+
+    def __init__(self, found: Finding) -> None:
+        """Keep the finding."""
+        self.finding = found
+        super().__init__(found.message)
+
+    def __reduce__(self) -> tuple[type[CannotBuild], tuple[Finding]]:
+        """Return what pickling needs: worker processes hand these errors back."""
+        return type(self), (self.finding,)
+
+
+class Infeasible(Exception):
+    """Nothing meets the targets of a design; carries the finding that says why, and what would be feasible."""
+
+    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+        """Keep the reason and the nearest feasible values by path."""
+        self.finding, self.nearest = found, dict(nearest or {})
+        super().__init__(found.message)
+
+
+def no_result(spec: Spec, found: Finding) -> Result:
+    """Return the result of a mechanism that cannot exist, with the reason."""
+    return Result(spec, Status.NO_EQUILIBRIUM, found.message, warnings=(found,))
+
+
+def no_design(found: Finding, nearest: Mapping[str, str] | None = None) -> Design:
+    """Return the outcome of targets that cannot be met, with the reason and the nearest feasible values by path."""
+    return Design(None, Status.INFEASIBLE, found.message, nearest_feasible=dict(nearest or {}), warnings=(found,))
