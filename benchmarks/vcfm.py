@@ -19,10 +19,10 @@ from cfmkit import api
 from cfmkit.elastica import Displacement, trace
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.springs import Diamond
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.studies.engine import run
-from cfmkit.studies.sensitivity.methods import carry_out
+from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"

@@ -50,13 +50,13 @@ if TYPE_CHECKING:
         SpecError,
         UsageError,
     )
+    from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.report import MeasureReport
     from cfmkit.families.base import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
     from cfmkit.runs.examples import Example, examples
-    from cfmkit.runs.measure_and_calibrate import calibrate, measure
+    from cfmkit.runs.measure_and_calibrate_api import calibrate, measure
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.study_result import StudyResult
 
@@ -94,9 +94,9 @@ _HOMES = {
         "UsageError",
     ),
     "cfmkit.experiment.reading": ("Recording",),
-    "cfmkit.experiment.report": ("MeasureReport",),
+    "cfmkit.experiment.measurement_and_calibration_outputs": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
-    "cfmkit.runs.measure_and_calibrate": ("calibrate", "measure"),
+    "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "measure"),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
     "cfmkit.studies.study_result": ("StudyResult",),

@@ -16,7 +16,7 @@ from cfmkit.cli import completion_candidates
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.experiment.evaluation import MeasuredCurves
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.plots.figure_options import FigureForm
 
 
@@ -262,7 +262,7 @@ def data_record(name: str) -> dict[str, Any]:
 
 def read_measured(name: str, options: Measuring) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
-    from cfmkit.experiment.evaluation import read_measured as read
+    from cfmkit.experiment.curves_and_metrics_of_recording import read_measured as read
 
     return read(name, options.units, options.tare, options.zero, options.flips)
 

@@ -263,7 +263,7 @@ def found(name: str) -> Answer | None:
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families; they are imported for it."""
-    from cfmkit.runs.parameter_sketch_file import scheme
+    from cfmkit.runs.nomenclature_figure_file import scheme
 
     return [
         {"name": one.symbol, "family": record.name, "key": one.key, "meaning": one.meaning}

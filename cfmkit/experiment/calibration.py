@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
-from cfmkit.experiment.fitted_parameters import DATA, ZEROS
+from cfmkit.experiment.parameters_to_fit import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.metrics import Window
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.evaluation import MeasuredCurves
-    from cfmkit.experiment.fitted_parameters import FitParameter
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
+    from cfmkit.experiment.parameters_to_fit import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
-from cfmkit.experiment.evaluation import elapsed
+from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.experiment.evaluation import MeasuredCurves
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.metrics.curve_differences import Measure
     from cfmkit.results import Quantity, Result
 
@@ -198,7 +198,7 @@ def _averaged(samples: Samples, places: FloatArray) -> FloatArray:
 
 def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branches: set[str]) -> Window:
     """Return where every branch of model and measurement exists, inside the window that is wanted."""
-    from cfmkit.experiment.evaluation import common_window
+    from cfmkit.experiment.curves_and_metrics_of_recording import common_window
 
     measured, kind = common_window(source.raw), curve.kind
     ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.on, branches)]

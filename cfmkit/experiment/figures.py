@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.experiment.comparison import model_at
+from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, write_heading
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, axis_label, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.evaluation import MeasuredCurves, Measurement
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
 LITTLE_MORE = 2.0

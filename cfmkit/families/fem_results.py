@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.fillet_stress import FilletArc
+    from cfmkit.solid.stress_along_fillets import FilletArc
 
 
 DEFINITIONS = {

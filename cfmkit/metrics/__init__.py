@@ -1,25 +1,12 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
 `metric_definitions` lists what there is and what a name may mean, `window_metrics` and `ranges` compute it,
-`branch_windows` cuts windows, `branch_views` is what a metric looks at, `evaluation` runs the definitions over a
-curve, `requirements` compares with bounds, `metrics_json` writes border units.
+`branches_cut_to_window` cuts windows, `branch_views` is what a metric looks at, `metric_values` runs the definitions
+over a curve, `requirements` compares with bounds, `metrics_json` writes border units.
 """
 
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
-from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window, restrict, traces
-from cfmkit.metrics.cycles import Cycle
-from cfmkit.metrics.evaluation import (
-    Survey,
-    evaluate,
-    frame_of,
-    gaps,
-    left_of,
-    measure,
-    survey,
-    travel_of,
-    window_of,
-    windows_judged,
-)
+from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window, restrict, traces
 from cfmkit.metrics.metric_definitions import (
     TABLE,
     Definition,
@@ -32,8 +19,21 @@ from cfmkit.metrics.metric_definitions import (
     unknown_metric,
     values_of_family,
 )
+from cfmkit.metrics.metric_values import (
+    Survey,
+    evaluate,
+    frame_of,
+    gaps,
+    left_of,
+    measure,
+    survey,
+    travel_of,
+    window_of,
+    windows_judged,
+)
 from cfmkit.metrics.metrics_json import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
+from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 __all__ = [
     "TABLE",

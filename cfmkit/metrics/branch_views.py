@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.metrics import continuous_means_and_extremes, winding_branches
-from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
+from cfmkit.metrics.branches_cut_to_window import (
+    ROUNDING,
+    TOLERANCE,
+    BranchTrace,
+    Undefined,
+    Window,
+    covers,
+    restrict,
+    traces,
+)
 from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.branch_windows import Undefined, Window, traces
+from cfmkit.metrics.branches_cut_to_window import Undefined, Window, traces
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

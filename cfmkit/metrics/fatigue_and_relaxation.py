@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfmkit.metrics.branch_windows import Undefined
+from cfmkit.metrics.branches_cut_to_window import Undefined
 
 
 @dataclass(frozen=True)

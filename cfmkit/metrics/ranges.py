@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import ranges_many
-from cfmkit.metrics.branch_windows import Undefined
+from cfmkit.metrics.branches_cut_to_window import Undefined
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.branch_views import Branch
-    from cfmkit.metrics.cycles import Cycle, Interval
     from cfmkit.metrics.ranges_many import ManyBranches
+    from cfmkit.metrics.usable_interval_of_all_branches import Cycle, Interval
 
 
 @np.errstate(all="ignore")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.branch_windows import ROUNDING
+from cfmkit.metrics.branches_cut_to_window import ROUNDING
 from cfmkit.numerics.where_condition_ends import last_places
 
 if TYPE_CHECKING:

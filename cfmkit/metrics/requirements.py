@@ -11,8 +11,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric
+from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
 from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Kind
-    from cfmkit.metrics.branch_windows import Window
+    from cfmkit.metrics.branches_cut_to_window import Window
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Spec
 

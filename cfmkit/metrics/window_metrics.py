@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import ranges_many, spread, winding_branches
-from cfmkit.metrics.branch_windows import BranchTrace, Undefined, Window
+from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.branch_views import Branch
-    from cfmkit.metrics.cycles import Cycle
+    from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
 def mean(branch: Branch) -> float:

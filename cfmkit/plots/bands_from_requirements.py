@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
-from cfmkit.metrics.cycles import cycle
+from cfmkit.metrics.usable_interval_of_all_branches import cycle
+from cfmkit.plots.axis_labels_and_headings import value_text
 from cfmkit.plots.stacked_line_diagrams import Limit
-from cfmkit.plots.text import value_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable

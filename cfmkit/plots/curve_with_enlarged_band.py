@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.evaluation import window_of
+from cfmkit.metrics.metric_values import window_of
+from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, write_heading
 from cfmkit.plots.bands_from_requirements import bands_of
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.style import GREY, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, finite_range, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import frame_of, window_of
+from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, shown_range, value_text
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, padded, shade
 from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, styled
-from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
 

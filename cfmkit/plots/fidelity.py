@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.plots.axis_labels_and_headings import axis_label, remark, shown_range, write_heading
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import padded
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
-from cfmkit.plots.text import axis_label, remark, shown_range, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.plots.text import Heading
+    from cfmkit.plots.axis_labels_and_headings import Heading
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.label_placement import Label
 from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

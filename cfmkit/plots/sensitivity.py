@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, metric_label, metric_values, write_heading
 from cfmkit.plots.rounding_noise import is_level, levelled
 from cfmkit.plots.style import (
     BAND,
@@ -29,7 +30,6 @@ from cfmkit.plots.style import (
     size_mm,
     styled,
 )
-from cfmkit.plots.text import LEFT, Heading, metric_label, metric_values, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.plots.axis_labels_and_headings import (
+    Heading,
+    axis_label,
+    finite_range,
+    plain_ticks,
+    shown_range,
+    write_heading,
+)
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.style import GREY, TROUBLE, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, axis_label, finite_range, plain_ticks, shown_range, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

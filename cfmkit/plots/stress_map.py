@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.style import VERMILLION, axes_mm, color_bar, new_figure, styled
-from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
-    from cfmkit.solid.fillet_stress import FilletArc
     from cfmkit.solid.meshed_part import MeshSolution
+    from cfmkit.solid.stress_along_fillets import FilletArc
 
 WIDE, BESIDE, ABOVE = 140.0, 110.0, 62.0
 """Room for the parts: across, and in height where they stand beside or above each other [mm]."""

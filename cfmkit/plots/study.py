@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from matplotlib.colors import to_hex
 
+from cfmkit.plots.axis_labels_and_headings import finite_range
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.rounding_noise import is_level, levelled
 from cfmkit.plots.stacked_line_diagrams import padded
 from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, color_bar, new_figure, styled
-from cfmkit.plots.text import finite_range
 from cfmkit.plots.tick_numbers import digits_that_differ, widen
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_figure_types import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.study_figure_data import DrawnScale, StudyCurve, StudyMarks
 
 
 MOST_PANELS = 8

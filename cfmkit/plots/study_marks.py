@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.plots.axis_labels_and_headings import LEFT, Heading, write_heading
 from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, room_above, size_mm, styled
-from cfmkit.plots.text import LEFT, Heading, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_figure_types import DrawnScale, StudyMarks
+    from cfmkit.plots.study_figure_data import DrawnScale, StudyMarks
 
 COLOURS = "viridis"
 EMPTY = "#EFEFEF"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store import Manifest, RunFolder, safe_disk_changes
-from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, hash_in, mode_of
+from cfmkit.store.file_names_and_overwrite_checks import JOURNAL, MANIFEST, hash_in, mode_of
 from cfmkit.store.lock import LOCK, has_signed_lock
 from cfmkit.store.safe_disk_changes import reporting
 from cfmkit.studies.journal import has_foreign_lines, is_journal

@@ -124,7 +124,7 @@ class ComputedRow:
 
 def rows() -> tuple[PrintedRow, ...]:
     """Return every row, paper by paper as they are in the file."""
-    from cfmkit.specs.yamlio.package_yaml import read_plain
+    from cfmkit.specs.yamlio.parse_trusted_yaml import read_plain
 
     text = Path(__file__).with_name("printed_numbers.yaml").read_text(encoding="utf-8")
     papers: Mapping[str, Mapping[str, Any]] = read_plain(text)

@@ -16,7 +16,7 @@ from cfmkit.families.base import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import run_outcome
-from cfmkit.runs.run_files import files
+from cfmkit.runs.run_file_contents import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
@@ -277,7 +277,7 @@ def designed(spec: Spec, run: Run) -> Report:
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
-    from cfmkit.studies.bench_instructions import bench
+    from cfmkit.studies.expected_forces_at_bench import bench
 
     found = _with_yield(found, nominal, given, run)
     told = bench(nominal, run)

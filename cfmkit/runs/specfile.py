@@ -110,7 +110,7 @@ def standard_input() -> bytes:
     cfmkit.errors.UsageError
         If nothing can come in.
     """
-    from cfmkit.specs.yamlio.source_text import LARGEST
+    from cfmkit.specs.yamlio.text_decoding import LARGEST
 
     if sys.stdin is None:
         raise UsageError("standard input is closed; name a file")
@@ -125,7 +125,7 @@ def content(name: str) -> bytes:
     cfmkit.errors.UsageError
         In one sentence, if it is not there, a folder or not readable.
     """
-    from cfmkit.specs.yamlio.source_text import LARGEST
+    from cfmkit.specs.yamlio.text_decoding import LARGEST
 
     if not name or "\0" in name:
         raise UsageError(f"{name!r} is not the name of a file")

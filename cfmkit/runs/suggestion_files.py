@@ -190,11 +190,11 @@ def files(
 
 def _pictures(found: Suggestions) -> dict[str, Figure]:
     """Return the pictures of a search, by name."""
-    from cfmkit.studies.suggest import figures
+    from cfmkit.studies.suggest import pareto_and_scale_drawings
 
     return {
-        "pareto": figures.pareto(found.proposals, found.wish),
-        "proposals": figures.to_one_scale(found.proposals, found.wish),
+        "pareto": pareto_and_scale_drawings.pareto(found.proposals, found.wish),
+        "proposals": pareto_and_scale_drawings.to_one_scale(found.proposals, found.wish),
     }
 
 
@@ -204,7 +204,7 @@ def _made(
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
     from cfmkit.results import Design, Status
-    from cfmkit.runs.run_files import files
+    from cfmkit.runs.run_file_contents import files
     from cfmkit.runs.run_outcome import report_on
 
     proposal = proposals[index]

@@ -22,7 +22,7 @@ What a user can rely on
 While a run lives, ``.cfmkit.lock`` and ``.cfmkit-run/`` stand in the folder; both
 are gone after it, and after a kill both are cleared by the next run.
 
-`safe_disk_changes` makes changes and turns their errors into sentences, `allowed_file_names` says what may
+`safe_disk_changes` makes changes and turns their errors into sentences, `file_names_and_overwrite_checks` says what may
 be written, `lock` keeps other runs out, `transaction` changes many files as one,
 `manifest` is the list of what a run wrote, `run_folder` is what a run works with, and
 `content_hashes_and_versions` gives content its name.

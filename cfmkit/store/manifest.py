@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store.allowed_file_names import CURE, MANIFEST, checked_name, hash_in, mode_of
+from cfmkit.store.file_names_and_overwrite_checks import CURE, MANIFEST, checked_name, hash_in, mode_of
 from cfmkit.store.safe_disk_changes import FileRecord, reporting, shown
 
 if TYPE_CHECKING:

@@ -14,8 +14,15 @@ from typing import TYPE_CHECKING, Any, Self
 
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import safe_disk_changes, transaction
-from cfmkit.store.allowed_file_names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
 from cfmkit.store.content_hashes_and_versions import file_hash
+from cfmkit.store.file_names_and_overwrite_checks import (
+    JOURNAL,
+    MANIFEST,
+    checked_name,
+    hash_in,
+    mode_of,
+    refuse_in_the_way,
+)
 from cfmkit.store.lock import FolderLock
 from cfmkit.store.manifest import Manifest
 from cfmkit.store.safe_disk_changes import TEMPORARY, FileRecord, reporting, shown

@@ -25,7 +25,14 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError
 from cfmkit.store import safe_disk_changes
-from cfmkit.store.allowed_file_names import CURE, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
+from cfmkit.store.file_names_and_overwrite_checks import (
+    CURE,
+    MANIFEST,
+    checked_name,
+    hash_in,
+    mode_of,
+    refuse_in_the_way,
+)
 from cfmkit.store.safe_disk_changes import reason, remove_empty, reporting, shown, sync_folder
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from cfmkit.errors import ExitCode, OutputError
 from cfmkit.families import origins
 from cfmkit.results import Status
 from cfmkit.store import Manifest, file_hash, origin, stable_hash
-from cfmkit.store.allowed_file_names import MANIFEST
+from cfmkit.store.file_names_and_overwrite_checks import MANIFEST
 from cfmkit.store.lock import LOCK
 from cfmkit.store.transaction import RUN
 from cfmkit.studies.batch_sources_and_outcomes import Entry

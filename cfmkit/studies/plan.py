@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cfmkit.errors import UsageError
 from cfmkit.specs.units import Place, format_quantity, from_border, place_of, to_border
-from cfmkit.specs.units.decimals import even_grid, shift_decimal
+from cfmkit.specs.units.decimal_scaling_and_grids import even_grid, shift_decimal
 from cfmkit.studies.varied_axes import is_place
 from cfmkit.tables import border_values
 

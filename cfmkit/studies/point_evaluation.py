@@ -29,7 +29,7 @@ from cfmkit.store import file_hash, origin, stable_hash
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.metrics.evaluation import Surveys
+    from cfmkit.metrics.metric_values import Surveys
     from cfmkit.results import Quantity
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends

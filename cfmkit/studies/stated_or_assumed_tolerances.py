@@ -17,9 +17,9 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.specs.spec import Sensitivity, Tolerance
+from cfmkit.stock.material_and_part_spec import PartProcess
 from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES, usual
-from cfmkit.stock.spec import PartProcess
 from cfmkit.studies.sensitivity.distributions import draw, values_at
 from cfmkit.studies.sensitivity.parameters import correlations, groups, parameters_of
 

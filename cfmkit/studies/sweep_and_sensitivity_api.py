@@ -44,9 +44,9 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
 def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sensitivity study; see `cfmkit.sensitivity`."""
     from cfmkit.studies.engine import run
-    from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import outputs
     from cfmkit.studies.sensitivity.parameters import with_options
+    from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
     if block:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cfmkit.arrays import Several, ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import CfmError
-from cfmkit.specs.units.decimals import shift_decimal
+from cfmkit.specs.units.decimal_scaling_and_grids import shift_decimal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

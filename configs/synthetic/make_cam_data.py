@@ -20,7 +20,7 @@ import numpy as np
 import cfmkit
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank, arc_lengths
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.numerics.registration import turned
+from cfmkit.numerics.rigid_point_registration import turned
 
 HERE = Path(__file__).resolve().parent
 WIDER, WAVES, NOISE = 15.5e-6, 17e-6, 2e-6

@@ -13,7 +13,7 @@ import pytest
 
 from cfmkit.cli.main import main
 from cfmkit.elastica.warming import warm
-from cfmkit.store.allowed_file_names import JOURNAL
+from cfmkit.store.file_names_and_overwrite_checks import JOURNAL
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 ALLOWED = {0, 3, 4, 5, 6}

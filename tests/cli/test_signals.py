@@ -94,13 +94,13 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
 
 EARLY = """
 import signal, sys
-from cfmkit.cli import main, run_verbs
+from cfmkit.cli import main, run_spec_and_print_page
 from cfmkit.runs import batch, read_wish
 
 def ended(*_, **__):
     signal.raise_signal(signal.SIGTERM)
 
-run_verbs.folder_of = run_verbs.execute = batch.batch = read_wish.wish_of = ended
+run_spec_and_print_page.folder_of = run_spec_and_print_page.execute = batch.batch = read_wish.wish_of = ended
 print(main.main(sys.argv[1:]))
 """
 

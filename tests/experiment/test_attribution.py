@@ -10,7 +10,7 @@ from cam_support import analyze, cam
 
 import cfmkit
 from cfmkit.experiment.comparison import compare
-from cfmkit.experiment.evaluation import measured
+from cfmkit.experiment.curves_and_metrics_of_recording import measured
 from cfmkit.experiment.reading import Recording, read_recording
 
 CONFIGS = Path(__file__).parents[2] / "configs"

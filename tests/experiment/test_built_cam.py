@@ -12,7 +12,7 @@ from flanks import Errors, flanks, measured, parameters
 
 import cfmkit
 from cfmkit.errors import DataError, SpecError
-from cfmkit.families.cam.measured_cam import built_flank, built_track, flanks_of
+from cfmkit.families.cam.measured_cam_analysis import built_flank, built_track, flanks_of
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.studies.point_evaluation import Study
 

@@ -11,8 +11,8 @@ import cfmkit
 from cfmkit.errors import DataError, SolutionError, UsageError
 from cfmkit.experiment.calibration import calibrate, resolved
 from cfmkit.experiment.comparison import compare
-from cfmkit.experiment.evaluation import measured
-from cfmkit.experiment.fitted_parameters import parameters, read_bounds
+from cfmkit.experiment.curves_and_metrics_of_recording import measured
+from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
 

@@ -8,7 +8,7 @@ from experiment_support import reference_case
 from scipy.signal import sosfreqz
 
 from cfmkit.experiment.branches import split
-from cfmkit.experiment.evaluation import Measurement, measured, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import Measurement, measured, numbers_of
 from cfmkit.experiment.low_pass import LowPass, low_passed
 from cfmkit.metrics import Window
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from experiment_support import triangle
 
-from cfmkit.experiment.evaluation import measured
+from cfmkit.experiment.curves_and_metrics_of_recording import measured
 from cfmkit.experiment.figures import figures
+from cfmkit.experiment.measurement_and_calibration_outputs import report_on
 from cfmkit.experiment.reading import Recording
-from cfmkit.experiment.report import report_on
 from cfmkit.metrics import Window
 from cfmkit.plots.style import png
 

@@ -9,7 +9,7 @@ import pytest
 from experiment_support import lossy_loop, reference_case, rows, triangle
 
 import cfmkit
-from cfmkit.experiment.evaluation import LEFT_OUT, measured, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, numbers_of
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import spikes

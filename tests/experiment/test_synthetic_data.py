@@ -10,8 +10,8 @@ import pytest
 
 import cfmkit
 from cfmkit.experiment.calibration import calibrate, resolved
-from cfmkit.experiment.evaluation import measured
-from cfmkit.experiment.fitted_parameters import parameters
+from cfmkit.experiment.curves_and_metrics_of_recording import measured
+from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import read_recording
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -14,8 +14,8 @@ from slider_crank import DEG, LI, START, config, li
 
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.springs.bistability_class import scale_factors, small_angle_number
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import scale_factors, small_angle_number
 from cfmkit.families.slider_crank.unit_springs import along_crank
 
 T2 = LI.stretched_angle

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from vcfm_support import leaf, side
 
-from cfmkit.families.vcfm.leaves import springs, truss
+from cfmkit.families.vcfm.leaves import positive_stiffness_springs, truss
 from cfmkit.families.vcfm.leaves import v_beam as vbeam
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.springs import force_change, measured_stiffness_for, rest_shift
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, measured_stiffness_for, rest_shift
 
 
 def printed_diamond_stiffness(strip):
@@ -34,8 +34,8 @@ def test_diamond_is_twice_as_stiff_as_the_paper_counts():
     """Eq. 15 as printed gives 1.622122, eq. 19 gives 1.631369, one chain has 1.601138 and the whole diamond 3.2023."""
     assert printed_diamond_stiffness(side()) == pytest.approx(1.622122, abs=5e-7)
     assert truss.TrussDiamond(side(), 0.5).stiffness == pytest.approx(1.631369, abs=5e-7)
-    assert springs.Diamond(side(), 0.5).stiffness == pytest.approx(1.601138, abs=5e-7)
-    assert springs.Diamond(side()).stiffness == pytest.approx(3.202276, abs=5e-7)
+    assert positive_stiffness_springs.Diamond(side(), 0.5).stiffness == pytest.approx(1.601138, abs=5e-7)
+    assert positive_stiffness_springs.Diamond(side()).stiffness == pytest.approx(3.202276, abs=5e-7)
 
 
 @pytest.mark.parametrize(
@@ -46,12 +46,12 @@ def test_diamond_is_twice_as_stiff_as_the_paper_counts():
     ],
 )
 def test_what_one_chain_would_need_for_the_papers_positive_stiffness(size, chain):
-    assert springs.Diamond(side(**size), 0.5).stiffness == pytest.approx(chain, rel=1e-5)
+    assert positive_stiffness_springs.Diamond(side(**size), 0.5).stiffness == pytest.approx(chain, rel=1e-5)
 
 
 def test_diamond_stress_per_compression():
-    assert springs.Diamond(side()).stress(1.0) == pytest.approx(5.2776, abs=5e-5)
-    assert springs.Diamond(side()).stress(11.5) == pytest.approx(60.7, abs=0.05)
+    assert positive_stiffness_springs.Diamond(side()).stress(1.0) == pytest.approx(5.2776, abs=5e-5)
+    assert positive_stiffness_springs.Diamond(side()).stress(11.5) == pytest.approx(60.7, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -130,13 +130,13 @@ def test_truss_law_of_a_leaf_and_its_error():
 @pytest.mark.parametrize(("radius", "stiffness"), [(2.5, 0.622156), (5.0, 0.441058)])
 def test_u_shape_is_softer_than_the_diamond(radius, stiffness):
     strip = side(1.0, degrees=0.0)
-    found = springs.UShape(strip, radius).stiffness
+    found = positive_stiffness_springs.UShape(strip, radius).stiffness
     assert found == pytest.approx(stiffness, abs=5e-7)
-    assert found < springs.Diamond(side(1.0)).stiffness == pytest.approx(0.954742, abs=5e-7)
+    assert found < positive_stiffness_springs.Diamond(side(1.0)).stiffness == pytest.approx(0.954742, abs=5e-7)
 
 
 def test_folded_beams():
-    assert springs.folded(side(1.0, degrees=0.0)).stiffness == pytest.approx(1.881169, abs=5e-7)
+    assert positive_stiffness_springs.folded(side(1.0, degrees=0.0)).stiffness == pytest.approx(1.881169, abs=5e-7)
 
 
 def test_straight_beam_stiffens_as_it_bends():
@@ -144,9 +144,12 @@ def test_straight_beam_stiffens_as_it_bends():
     travel = np.array([0.01, 0.25, 0.5, 1, 1.5, 2, 3, 4, 5])
     exact = [0.018813, 0.491389, 1.10849, 3.199559, 7.157727, 13.749862, 37.524081, 79.510073, 144.221255]
     strip = side(1.0, degrees=0.0)
-    force = springs.StraightSpring(strip).force(travel)
+    force = positive_stiffness_springs.StraightSpring(strip).force(travel)
     assert force == pytest.approx(exact, rel=0.012)
-    usual = springs.StraightSpring(strip).stiffness * travel + np.pi**4 / 8 * strip.axial * travel**3 / 50.0**3
+    usual = (
+        positive_stiffness_springs.StraightSpring(strip).stiffness * travel
+        + np.pi**4 / 8 * strip.axial * travel**3 / 50.0**3
+    )
     assert usual[-1] / exact[-1] == pytest.approx(1.31, abs=0.01)
 
 

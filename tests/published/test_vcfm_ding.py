@@ -14,8 +14,8 @@ from cfmkit import api
 from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
 from cfmkit.studies.engine import run
-from cfmkit.studies.sensitivity.methods import carry_out
 from cfmkit.studies.sensitivity.output import outputs
+from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
 from cfmkit.tables import read_csv
 

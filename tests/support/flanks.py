@@ -10,7 +10,7 @@ from cam_support import cam
 
 from cfmkit.families.cam.geometry.designed_and_built_flanks import DesignFlank
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.numerics.registration import turned
+from cfmkit.numerics.rigid_point_registration import turned
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.cut import CamProfile

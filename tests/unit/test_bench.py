@@ -10,7 +10,7 @@ import pytest
 import cfmkit
 from cfmkit.families.base import Run
 from cfmkit.specs.spec import Requirement
-from cfmkit.studies.bench_instructions import bench
+from cfmkit.studies.expected_forces_at_bench import bench
 
 MODULUS = "mechanism.material.youngs_modulus"
 
@@ -59,13 +59,13 @@ def test_of_a_strip_its_thickness_is_measured_not_the_error_of_it():
 
 
 def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monkeypatch):
-    from cfmkit.studies import bench_instructions
+    from cfmkit.studies import expected_forces_at_bench
 
     spec = cfmkit.load("configs/beam_design_arch.yaml")
     result, numbers = cfmkit.analyze(spec), []
-    exact = bench_instructions.exact_slopes
+    exact = expected_forces_at_bench.exact_slopes
     for slopes in (exact, lambda *_: {}):
-        monkeypatch.setattr(bench_instructions, "exact_slopes", slopes)
+        monkeypatch.setattr(expected_forces_at_bench, "exact_slopes", slopes)
         numbers.append([float(text) for text in re.findall(r"([\d.]+) N", bench(result, Run()))])
     assert exact(result.spec, np.array([0.006, 0.012]), ("mechanism.beams.s.thickness", "mechanism.thickness"))
     assert len(numbers[0]) == 6

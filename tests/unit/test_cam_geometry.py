@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
-from cfmkit.families.cam.geometry.mounted_roller_track import NoTrack, Track
 from cfmkit.families.cam.geometry.path import reach
+from cfmkit.families.cam.geometry.roller_track_on_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)
 FAST = settings(deadline=None, max_examples=200)

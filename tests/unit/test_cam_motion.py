@@ -11,10 +11,10 @@ from cam_motion import moving, response
 from cam_support import analyze, cam
 
 from cfmkit.errors import SpecError
+from cfmkit.families.cam.dynamics.force_of_given_motion import inverse_history, multibody_history
 from cfmkit.families.cam.dynamics.inverse import respond, statics
+from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.dynamics.machine_from_spec import build
-from cfmkit.families.cam.dynamics.model import inverse_history, multibody_history
-from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Moment
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.cam.statics import forces

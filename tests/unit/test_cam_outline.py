@@ -11,7 +11,7 @@ from cfmkit.errors import SpecError
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Smooth
 from cfmkit.families import family
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 TURNS_AT_ONCE = {
     "brace_length": "1647.65 mm",

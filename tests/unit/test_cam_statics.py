@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cfmkit.families.cam.mechanism_from_spec import assemble, hanging_weights
 from cfmkit.families.cam.statics import GRAVITY
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=60)
 

@@ -8,7 +8,7 @@ import pytest
 from cfmkit.errors import FolderInUse
 from cfmkit.runs.cleaning import remains_below, remains_in, remove
 from cfmkit.store import RunFolder
-from cfmkit.store.allowed_file_names import JOURNAL
+from cfmkit.store.file_names_and_overwrite_checks import JOURNAL
 from cfmkit.store.lock import LOCK
 from cfmkit.studies.journal import Journal
 

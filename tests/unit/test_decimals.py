@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cfmkit.specs.units.decimals import even_grid, shift_decimal
+from cfmkit.specs.units.decimal_scaling_and_grids import even_grid, shift_decimal
 
 POWERS = (-15, -6, -3, -1, 1, 3, 6, 15)
 finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e250, max_value=1e250)

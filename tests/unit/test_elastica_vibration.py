@@ -35,7 +35,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.vibration import NetworkMasses, frequencies
-from cfmkit.elastica.vibration.linearised import Linearisation
+from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearisation
 from cfmkit.errors import InputError
 
 MODULUS, WIDTH, THICKNESS, LENGTH, DENSITY = 200e9, 10e-3, 1e-3, 0.1, 7850.0
@@ -305,6 +305,6 @@ def test_masses_must_be_known_and_positive() -> None:
 
 
 def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cfmkit.elastica.vibration.linearised._MOST", 20)
+    monkeypatch.setattr("cfmkit.elastica.vibration.stiffness_and_mass_matrices._MOST", 20)
     with pytest.raises(InputError, match="unknowns, more than 20: beams wind or are taut"):
         frequencies(under(1e-9, beam()), WHOLE, 3)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import split, turning_points
-from cfmkit.experiment.evaluation import measured, numbers_of
-from cfmkit.experiment.hysteresis import loop_area
+from cfmkit.experiment.curves_and_metrics_of_recording import measured, numbers_of
+from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.experiment.low_pass import LowPass, low_passed, read_filter
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window

@@ -151,7 +151,7 @@ BAD = {
 
 @pytest.mark.parametrize(("data", "complaint"), BAD.values(), ids=BAD)
 def test_bad_data_is_refused_in_one_clear_line(tmp_path, data, complaint):
-    from cfmkit.experiment.evaluation import measured
+    from cfmkit.experiment.curves_and_metrics_of_recording import measured
 
     with pytest.raises(DataError) as caught:
         measured(read(tmp_path, data))

@@ -12,7 +12,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.runs.explorer import Explorer, ExplorerServer
+from cfmkit.runs.explorer_server import Explorer, ExplorerServer
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_design, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_design, no_result
 from cfmkit.results import Finding, Status
 from cfmkit.specs.spec import Spec
 

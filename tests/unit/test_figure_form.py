@@ -10,9 +10,9 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import UsageError
 from cfmkit.plots import style
+from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.figure_options import PLAIN, FigureForm, form_of
 from cfmkit.plots.parts import to_scale
-from cfmkit.plots.text import Heading, write_heading
 
 SIZE = style.MM
 

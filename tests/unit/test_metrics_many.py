@@ -5,8 +5,8 @@ import pytest
 
 from cfmkit.curves import Curve
 from cfmkit.metrics import MeasuringFrame, Window
-from cfmkit.metrics.evaluation import survey
 from cfmkit.metrics.metric_definitions import TABLE
+from cfmkit.metrics.metric_values import survey
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import ManyWindows, Spread, metric_of, metrics_of
 

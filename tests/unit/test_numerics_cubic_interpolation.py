@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at, values_at
-from cfmkit.specs.formula import formula
+from cfmkit.specs.formula_of_x import formula
 
 X = np.array([0.0, 0.3, 1.0, 1.4, 2.0, 3.1])
 

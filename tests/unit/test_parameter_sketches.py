@@ -9,7 +9,7 @@ import pytest
 
 from cfmkit import families
 from cfmkit.cli.main import main
-from cfmkit.runs.parameter_sketch_file import drawn, scheme
+from cfmkit.runs.nomenclature_figure_file import drawn, scheme
 from cfmkit.specs.keys_and_schema import keys
 
 DRAWN = [record.name for record in families.records() if record.scheme]

@@ -18,12 +18,12 @@ from PIL import Image
 from plot_support import axes, data_lines, loop_curve, result_of
 
 from cfmkit.families.base import Family
+from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.figures import figures
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.style import BAND, GREY, INK, LINES, OCHRE, TAN, TROUBLE, new_figure, png, style
-from cfmkit.plots.text import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.results import Result, Status
 from cfmkit.specs.spec import Spec
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flanks import Errors, flanks, measured, parameters, profile
 
-from cfmkit.numerics.registration import feet, gaps_across, register, registered_where_it_is, turned
+from cfmkit.numerics.rigid_point_registration import feet, gaps_across, register, registered_where_it_is, turned
 from cfmkit.numerics.robust_statistics import neighbour_noise
-from cfmkit.numerics.smoothing import smoothed
+from cfmkit.numerics.smoothing_spline import smoothed
 
 ANGLE, SHIFT = -0.3, (-1.49579067, 0.80784298)
 """Printed in the note: deg and mm."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfmkit.studies.sensitivity import failed_sample_policy as failures
-from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity import local, monte_carlo_yield, morris, oat, sobol
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
 
 SLOPES = np.array([5.0, 1.0])
@@ -29,7 +29,11 @@ def morris_setup():
 def tolerance_setup():
     unit = np.random.default_rng(0).standard_normal((500, 2))
     outputs = np.stack([linear(unit), linear(unit * [0.5, 1]), linear(unit * [1, 0.5])], axis=1)
-    return outputs, lambda found: tolerance.variance_drops(found, 0), nothing((tolerance.VARIANCE_DROP,), 2)
+    return (
+        outputs,
+        lambda found: monte_carlo_yield.variance_drops(found, 0),
+        nothing((monte_carlo_yield.VARIANCE_DROP,), 2),
+    )
 
 
 every_method = pytest.mark.parametrize("setup", [sobol_setup, morris_setup, tolerance_setup])
@@ -164,10 +168,10 @@ def test_failed_samples_leave_the_yield_open_or_bounded():
     met = np.array([True] * 80 + [False] * 10 + [False] * 10)
     failed = np.array([False] * 90 + [True] * 10)
     for policy in ("fail", "resample"):
-        found = tolerance.yield_of(met, failed, policy)
+        found = monte_carlo_yield.yield_of(met, failed, policy)
         assert np.isnan(found.value)
         assert found.failed == 10
-    bounded = tolerance.yield_of(met, failed, "bound")
+    bounded = monte_carlo_yield.yield_of(met, failed, "bound")
     assert bounded.value == pytest.approx(0.85)
     assert bounded.wilson[0] < 0.8
     assert bounded.wilson[1] > 0.9
@@ -177,6 +181,6 @@ def test_a_failed_sample_leaves_the_yield_gain_of_its_tolerance_open():
     met = np.array([[True, True, True]] * 50 + [[False, True, False]] * 50)
     failed = np.zeros(met.shape, bool)
     failed[3, 2] = True
-    gain = tolerance.yield_gains(met, failed, "fail")
+    gain = monte_carlo_yield.yield_gains(met, failed, "fail")
     assert gain.value[0] == pytest.approx(0.5)
     assert np.isnan(gain.value[1])

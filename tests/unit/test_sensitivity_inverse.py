@@ -11,8 +11,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.studies.sensitivity.inverse import WIDEST, LimitsAlong, answered
+from cfmkit.studies.sensitivity.monte_carlo_yield import yield_of
 from cfmkit.studies.sensitivity.output import by_interval, yield_ok
-from cfmkit.studies.sensitivity.tolerance import yield_of
 
 TWO_SIDED = NormalDist().inv_cdf(0.975)
 ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))

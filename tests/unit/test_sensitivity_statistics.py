@@ -12,11 +12,11 @@ from scipy.stats import binom
 from cfmkit.studies.sensitivity import (
     distributions,
     local,
+    monte_carlo_yield,
     morris,
     oat,
     probability_confidence_intervals,
     sobol,
-    tolerance,
 )
 from cfmkit.studies.sensitivity.distributions import ParameterSpread
 
@@ -171,13 +171,13 @@ def normal(deviation, nominal=0.0, low=-np.inf, high=np.inf):
 
 def made(tolerances, matrix, count=40_000, seed=0, groups=()):
     unit = distributions.draw(matrix, count, np.random.default_rng(seed))
-    return tolerance.sample(unit, tolerances, groups)
+    return monte_carlo_yield.sample(unit, tolerances, groups)
 
 
 def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
     points = made([normal(0.1, 5.0)], np.eye(1))[:, 0, 0]
     met = np.abs(points - 5.0) <= 0.15
-    found = tolerance.yield_of(met, np.zeros(len(met), bool), "fail")
+    found = monte_carlo_yield.yield_of(met, np.zeros(len(met), bool), "fail")
     exact = 2 * NormalDist().cdf(1.5) - 1
     assert found.wilson[0] < exact < found.wilson[1]
     assert found.value == pytest.approx(exact, abs=0.005)
@@ -224,11 +224,11 @@ def test_a_tightened_tolerance_is_the_same_about_the_nominal_value(spread):
 def test_the_tolerance_that_matters_is_the_one_to_tighten():
     points = made([normal(3.0), normal(1.0), normal(1.0)], np.eye(3), groups=((0,), (1, 2)))
     outputs = points.sum(axis=2)
-    (drop,) = tolerance.variance_drops(outputs, 0)
+    (drop,) = monte_carlo_yield.variance_drops(outputs, 0)
     # Halving a tolerance takes three quarters of its share of the variance away.
     np.testing.assert_allclose(drop.value, [0.75 * 9 / 11, 0.75 * 2 / 11], atol=0.01)
     assert (drop.low < drop.value).all()
-    gain = tolerance.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool), "fail")
+    gain = monte_carlo_yield.yield_gains(np.abs(outputs) < 4, np.zeros(outputs.shape, bool), "fail")
     exact = [
         (2 * NormalDist(0, sqrt(after)).cdf(4) - 1) - (2 * NormalDist(0, sqrt(11)).cdf(4) - 1)
         for after in (9 / 4 + 2, 9 + 2 / 4)
@@ -240,8 +240,8 @@ def test_the_tolerance_that_matters_is_the_one_to_tighten():
 def test_common_random_numbers_make_a_gain_sharper_than_two_separate_yields():
     points = made([normal(1.0), normal(0.1)], np.eye(2), 1000, groups=((1,),))
     met = np.abs(points.sum(axis=2)) < 1
-    gain = tolerance.yield_gains(met, np.zeros(met.shape, bool), "fail")
-    alone = tolerance.yield_of(met[:, 0], np.zeros(len(met), bool), "fail").wilson
+    gain = monte_carlo_yield.yield_gains(met, np.zeros(met.shape, bool), "fail")
+    alone = monte_carlo_yield.yield_of(met[:, 0], np.zeros(len(met), bool), "fail").wilson
     assert gain.high[0] - gain.low[0] < 0.5 * (alone[1] - alone[0])
 
 

@@ -17,8 +17,8 @@ from cfmkit.plots.sensitivity import figures, short
 from cfmkit.plots.style import MM, png
 from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
-from cfmkit.studies.sensitivity.methods import METHODS, carry_out
 from cfmkit.studies.sensitivity.output import as_json, exit_code, message, outputs
+from cfmkit.studies.sensitivity.run_sensitivity_method import METHODS, carry_out
 from cfmkit.studies.sensitivity.setup import points_of, prepare
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
@@ -122,7 +122,7 @@ def test_a_family_that_knows_its_gradient_is_asked_for_it(monkeypatch):
         return {"theoretical_force": dict.fromkeys(paths, 3.0)}
 
     known = dataclasses.replace(record, gradient=gradient)
-    monkeypatch.setattr("cfmkit.studies.sensitivity.methods.family", lambda name: known)
+    monkeypatch.setattr("cfmkit.studies.sensitivity.run_sensitivity_method.family", lambda name: known)
     found = study("local", metrics=("theoretical_force",))
     assert asked == [found.setup.paths]
     assert found.evaluator.count == 0

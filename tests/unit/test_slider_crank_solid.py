@@ -8,7 +8,7 @@ import pytest
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
-from cfmkit.families.slider_crank.printed.plane_fem_model import part_of
+from cfmkit.families.slider_crank.printed.plane_fem_analysis import part_of
 from cfmkit.plots.style import is_to_scale
 from cfmkit.results import Status
 

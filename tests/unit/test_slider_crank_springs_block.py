@@ -9,9 +9,9 @@ from slider_crank import config
 import cfmkit
 from cfmkit import api
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
+from cfmkit.families.slider_crank.springs.many_designs.requested_values_and_findings import analyze_block
 from cfmkit.plots.study import draw_map, draw_metric
-from cfmkit.plots.study_figure_types import DrawnScale, StudyMarks
+from cfmkit.plots.study_figure_data import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid, zipped

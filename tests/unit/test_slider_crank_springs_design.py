@@ -56,7 +56,7 @@ def test_least_squares_holds_a_slope_too(caps, slope):
     from scipy.optimize import minimize
 
     from cfmkit.families.slider_crank.springs.fit_rates import least_squares
-    from cfmkit.families.slider_crank.springs.targets import task_of
+    from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 
     design = {
         "torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg"), "objective": "least-squares",
@@ -169,8 +169,8 @@ def test_a_window_may_end_exactly_where_a_joint_reaches_its_limit(force):
 @pytest.mark.slow  # some thousand linear programmes
 @pytest.mark.parametrize("seed", range(6))
 def test_no_window_anywhere_is_wider_than_the_widest(seed):
+    from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
     from cfmkit.families.slider_crank.springs.rates_for_widest_window import judged, widest_of_all
-    from cfmkit.families.slider_crank.springs.targets import task_of
 
     random = np.random.default_rng(seed)
     about = {

@@ -13,8 +13,8 @@ import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.figures import figures
+from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
-from cfmkit.families.slider_crank.springs.targets import task_of
 from cfmkit.families.slider_crank.unit_springs import JOINTS, along_slider
 
 EQUAL = {

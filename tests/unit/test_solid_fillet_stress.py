@@ -10,7 +10,7 @@ from vee_leaf import VEE
 
 import cfmkit
 from cfmkit.solid.boundary_and_element_sizes import Ring
-from cfmkit.solid.fillet_stress import FilletStress, arcs
+from cfmkit.solid.stress_along_fillets import FilletStress, arcs
 
 SHORT = {
     "mechanism.part.fillet": "0.3 mm",

@@ -20,7 +20,7 @@ from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.stock.springs.helical import Wound
-from cfmkit.stock.springs.offers_and_generic_series import Miss, generic, nearest
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
 
 CONFIGS = Path(__file__).parents[2] / "configs"

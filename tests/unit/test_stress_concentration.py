@@ -14,7 +14,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Path, Section, guided
 from cfmkit.families.fem_results import FilletRow, fillet_table, largest_concentration
 from cfmkit.families.nominal_stress_beside_fillets import SolvedBeams, both_images, nominal_stresses, with_steps
-from cfmkit.solid.fillet_stress import FilletArc
+from cfmkit.solid.stress_along_fillets import FilletArc
 
 if TYPE_CHECKING:
     from cfmkit.results import Result

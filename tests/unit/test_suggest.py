@@ -25,9 +25,9 @@ from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
-from cfmkit.stock.springs.offers_and_generic_series import SHEAR_SHARE
+from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.suggest import figures, good_parts, search
+from cfmkit.studies.suggest import pareto_and_scale_drawings, search, yield_of_proposal
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
@@ -156,7 +156,7 @@ PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
 
 @pytest.fixture
 def few_parts(monkeypatch):
-    monkeypatch.setattr(good_parts, "PARTS", 20)
+    monkeypatch.setattr(yield_of_proposal, "PARTS", 20)
 
 
 def test_the_yield_of_a_proposal_is_what_sensitivity_says_of_its_file(few_parts):
@@ -365,7 +365,7 @@ def long_names(count):
     return [SimpleNamespace(family="cam", variant=variant, spec=spec, numbers=numbers) for _ in range(count)]
 
 
-@pytest.mark.parametrize("drawn", [figures.pareto, figures.to_one_scale])
+@pytest.mark.parametrize("drawn", [pareto_and_scale_drawings.pareto, pareto_and_scale_drawings.to_one_scale])
 def test_names_of_proposals_stay_on_the_page_and_off_each_other(drawn):
     figure = drawn(long_names(12), wish())
     figure.draw_without_rendering()

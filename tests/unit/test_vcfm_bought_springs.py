@@ -12,9 +12,9 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.vcfm.leaves.springs import Coils
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
-from cfmkit.stock.springs.offers_and_generic_series import generic
+from cfmkit.stock.springs.offer_type_and_generic_series import generic
 
 CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
 

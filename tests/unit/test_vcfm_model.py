@@ -16,8 +16,8 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.families.vcfm.findings import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
-from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.model import rest_of, rests_of

@@ -38,7 +38,7 @@ def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
         found = analyze(given.replace({"analysis.fidelity": "analytic"}), run)
         return replace(found, curves=tuple(replace(one, effort=1.04 * one.effort) for one in found.curves))
 
-    monkeypatch.setattr("cfmkit.families.vcfm.plane_fem_model.analyze", stiffer)
+    monkeypatch.setattr("cfmkit.families.vcfm.plane_fem_analysis.analyze", stiffer)
     found = verified(spec, Design(spec, Status.COMPLETE), Run())
     mean = found.search["verified_solid_before"].quantity.value
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(11.15 / mean)
@@ -85,7 +85,7 @@ def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_t
     def stiffer(given, run):
         return analyze(given.replace({"analysis.fidelity": "inextensible", "mechanism.width": 0.0066}), run)
 
-    monkeypatch.setattr("cfmkit.families.beam.plane_fem_model.analyze", stiffer)
+    monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", stiffer)
     found = verified(spec, Design(spec, Status.COMPLETE), Run())
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(1 / 1.1, rel=1e-4)
     assert found.spec.at("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)

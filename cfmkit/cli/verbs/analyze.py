@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.verb_result import Answer
-    from cfmkit.experiment.evaluation import MeasuredCurves
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.base import Run
     from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
@@ -52,7 +52,7 @@ class AnalyzeOptions(Computing, Measuring):
 
 def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; with --data also a measured curve."""
-    from cfmkit.cli.run_verbs import execute
+    from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.runs.run import Verb, analysed
 
     work, inputs = analysed, {}
@@ -69,7 +69,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
-    from cfmkit.experiment.report import (
+    from cfmkit.experiment.measurement_and_calibration_outputs import (
         causes_lines,
         comparison_data,
         comparison_figures,
@@ -115,8 +115,8 @@ def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> R
 
 def _picture(compared: FidelityComparison) -> Figure:
     """Return the curves overlaid."""
+    from cfmkit.plots.axis_labels_and_headings import Heading
     from cfmkit.plots.fidelity import Gap, fidelity_figure
-    from cfmkit.plots.text import Heading
 
     solved = [item for item in compared.variants if item.result.curves]
     gaps = [

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.page_block_types import Block
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.metric_changes import BatchComparison
+    from cfmkit.studies.changes_since_earlier_batch import BatchComparison
 
 
 PLACE = 26
@@ -107,12 +107,12 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.
     """
-    from cfmkit.cli import study_verbs
+    from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch, unreached
     from cfmkit.studies.batch_sources_and_outcomes import message
 
-    start = study_verbs.now()
+    start = run_study_in_folder.now()
     with watching(terminal, "specs") as progress:
         found = batch(
             options.specs,
@@ -134,9 +134,9 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             form=options.form,
             arguments=terminal.arguments,
             monitor=progress,
-            noting=study_verbs.noting,
+            noting=run_study_in_folder.noting,
         )
-    written = Written(found.folder, found.files, study_verbs.now() - start)
+    written = Written(found.folder, found.files, run_study_in_folder.now() - start)
     return Answer(
         dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
         _page(found, written, tuple(filter(None, (options.junit, options.summary))), terminal.verbose > 0),

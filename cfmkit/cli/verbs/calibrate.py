@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.verb_result import Answer
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.evaluation import MeasuredCurves
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.families.base import Run
     from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
@@ -50,7 +50,7 @@ class CalibrateOptions(Computing, Measuring):
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
-    from cfmkit.cli.run_verbs import execute
+    from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.run import Verb
@@ -64,9 +64,9 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
 
 def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
-    from cfmkit.experiment.fitted_parameters import split_bounds
+    from cfmkit.experiment.parameters_to_fit import split_bounds
     from cfmkit.numerics.least_squares import LOSSES
-    from cfmkit.runs.measure_and_calibrate import calibrate
+    from cfmkit.runs.measure_and_calibrate_api import calibrate
 
     loss = next(name for name in LOSSES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
@@ -78,7 +78,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     from dataclasses import replace
 
     from cfmkit import api
-    from cfmkit.experiment import report as add
+    from cfmkit.experiment import measurement_and_calibration_outputs as add
     from cfmkit.runs.run_outcome import Supplement, report_on
     from cfmkit.tables import to_csv
 

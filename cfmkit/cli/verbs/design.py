@@ -32,7 +32,7 @@ class DesignOptions(Computing):
 
 def run(options: DesignOptions, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
-    from cfmkit.cli.run_verbs import execute
+    from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.runs.run import Verb, designed
     from cfmkit.studies.serial_and_cluster_executors import cores
 
@@ -44,7 +44,7 @@ def run(options: DesignOptions, terminal: Terminal) -> Answer:
 
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> AbstractContextManager[Run]:
     """Return a run in several processes that says on a signal whether the same command goes on."""
-    from cfmkit.cli.study_verbs import noting
+    from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.runs import run
 
     return run.long_run(jobs, fresh, folder, plain, noting)

@@ -37,7 +37,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     or written. Ctrl-C ends it.
     """
     from cfmkit.errors import UsageError
-    from cfmkit.runs.explorer import Explorer, ExplorerServer
+    from cfmkit.runs.explorer_server import Explorer, ExplorerServer
     from cfmkit.runs.specfile import STDIN
 
     if options.spec == STDIN:

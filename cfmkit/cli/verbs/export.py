@@ -38,7 +38,7 @@ class ExportOptions(OneSpec):
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
     from cfmkit import api
-    from cfmkit.cli.run_verbs import folder_of
+    from cfmkit.cli.run_spec_and_print_page import folder_of
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder

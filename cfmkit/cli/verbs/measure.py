@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
-    from cfmkit.experiment.report import MeasureReport
+    from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
 
 PLACE = 32
 EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
@@ -57,7 +57,7 @@ class MeasureOptions(Measuring, FigureChoice):
 
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
-    from cfmkit.experiment.report import files
+    from cfmkit.experiment.measurement_and_calibration_outputs import files
     from cfmkit.store import RunFolder
 
     out, form = _folder(options), options.form
@@ -88,7 +88,7 @@ def _folder(options: MeasureOptions) -> str:
 
 
 def _report(options: MeasureOptions) -> MeasureReport:
-    from cfmkit.runs.measure_and_calibrate import measure
+    from cfmkit.runs.measure_and_calibrate_api import measure
 
     return measure(
         options.data,
@@ -124,7 +124,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
 
 def _numbers(report: MeasureReport) -> CellGrid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from cfmkit.cli.run_verbs import words
+    from cfmkit.cli.run_spec_and_print_page import words
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []

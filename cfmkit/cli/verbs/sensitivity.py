@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
-    from cfmkit.studies.sensitivity.tolerance import Yield
 
 PLACE = 24
 EXAMPLE = "cfmkit sensitivity cam.yaml --method tolerance --vary mechanism.roller_radius=normal:0.05mm --samples 400"
@@ -122,31 +122,37 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
     interruption, run the same command again to continue.
     """
-    from cfmkit.cli import study_verbs
-    from cfmkit.cli.run_verbs import folder_of
+    from cfmkit.cli import run_study_in_folder
+    from cfmkit.cli.run_spec_and_print_page import folder_of
     from cfmkit.runs import study_page
     from cfmkit.runs.run import placing, read
-    from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import exit_code, outputs
+    from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
     from cfmkit.studies.sensitivity.setup import prepare
 
-    start = study_verbs.now()
-    out, form, in_parquet = folder_of(options, "sensitivity"), options.form, study_verbs.wants_parquet(options.table)
+    start = run_study_in_folder.now()
+    out, form, in_parquet = (
+        folder_of(options, "sensitivity"),
+        options.form,
+        run_study_in_folder.wants_parquet(options.table),
+    )
     document, spec = read(options)
     with placing(document, [f"sensitivity.{key}" for key in changes_of(options)]):
         setup = prepare(changed_by(options, spec), options.seed, options.max_points)
-    with study_verbs.desk(out, terminal, options.fresh) as place:
+    with run_study_in_folder.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
-        found = replace(carry_out(setup, lambda work: study_verbs.compute(work, options, place)), fresh=options.fresh)
+        found = replace(
+            carry_out(setup, lambda work: run_study_in_folder.compute(work, options, place)), fresh=options.fresh
+        )
         for piece in found.evaluator.pieces:
-            study_verbs.tracebacks(piece.records, terminal)
+            run_study_in_folder.tracebacks(piece.records, terminal)
         kept: dict[str, bytes] = {}
         for name, data in outputs(found):
             if options.report or (in_parquet and name == "results.csv"):
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
         if in_parquet:
-            place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
+            place.folder.write("results.parquet", run_study_in_folder.as_parquet(kept["results.csv"]))
         makers = _pictures(found) if options.report or not options.no_plots else {}
         drawn = {} if options.no_plots else {stem: form.draw(make) for stem, make in makers.items()}
         for stem, figure in drawn.items():
@@ -156,13 +162,15 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
             study = found.setup.study
-            point = study_verbs.command_of_a_point(options, study.design)
+            point = run_study_in_folder.command_of_a_point(options, study.design)
             page = study_page.page(study.spec, found.setup.paths, kept, command, shown, point)
             place.folder.write(study_page.NAME, page)
-        made = study_verbs.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
-        manifest = study_verbs.commit(place, made, terminal, exit_code(found))
-        study_verbs.finish(place, [piece.records for piece in found.evaluator.pieces])
-    written = Written(out, (*manifest.files, "manifest.json"), study_verbs.now() - start)
+        made = run_study_in_folder.Made(
+            "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
+        )
+        manifest = run_study_in_folder.commit(place, made, terminal, exit_code(found))
+        run_study_in_folder.finish(place, [piece.records for piece in found.evaluator.pieces])
+    written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
     return _answer(found, written, terminal.verbose > 0)
 
 
@@ -200,7 +208,7 @@ def _sets_samples(change: str) -> bool:
 
 def changes_of(options: SensitivityOptions) -> dict[str, Any]:
     """Return what the options say, by key of the block."""
-    from cfmkit.cli.study_verbs import names
+    from cfmkit.cli.run_study_in_folder import names
 
     said = {
         "method": options.method,

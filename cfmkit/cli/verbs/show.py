@@ -72,7 +72,7 @@ def _drawn(name: str | None, given: str) -> Answer:
     """Write the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
-    from cfmkit.runs.parameter_sketch_file import drawn, scheme
+    from cfmkit.runs.nomenclature_figure_file import drawn, scheme
     from cfmkit.store.safe_disk_changes import reporting, write_new
 
     found = scheme(name)

@@ -118,7 +118,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     Candidates from every family are designed and analysed from their written files with the exact model. Only those
     that meet the whole wish are listed.
     """
-    from cfmkit.cli.study_verbs import noting
+    from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestion_files

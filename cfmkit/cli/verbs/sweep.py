@@ -82,21 +82,21 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
 
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
-    from cfmkit.cli import study_verbs
-    from cfmkit.cli.run_verbs import folder_of
+    from cfmkit.cli import run_study_in_folder
+    from cfmkit.cli.run_spec_and_print_page import folder_of
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sweep_request_and_files import outputs, prepare, summary_of, writes_curves
 
-    start = study_verbs.now()
-    out, form, in_parquet = folder_of(options, "sweep"), options.form, study_verbs.wants_parquet(options.table)
+    start = run_study_in_folder.now()
+    out, form, in_parquet = folder_of(options, "sweep"), options.form, run_study_in_folder.wants_parquet(options.table)
     document, spec = read(options)
     asked = request(options)
     with placing(document):
         work = prepare(spec, asked)
-    with study_verbs.desk(out, terminal, options.fresh) as place:
+    with run_study_in_folder.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "metrics.json", "resolved.yaml")
-        records = study_verbs.compute(work, options, place)
-        study_verbs.tracebacks(records, terminal)
+        records = run_study_in_folder.compute(work, options, place)
+        run_study_in_folder.tracebacks(records, terminal)
         summary = summary_of(records)
         kept: dict[str, bytes] = {}
         for name, data in outputs(records, summary, writes_curves(spec, asked)):
@@ -104,7 +104,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
         if in_parquet:
-            place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
+            place.folder.write("results.parquet", run_study_in_folder.as_parquet(kept["results.csv"]))
         makers = {} if options.no_plots and not options.report else _pictures(records, summary)
         drawn: dict[str, Figure] = {}
         for stem, make in makers.items() if not options.no_plots else ():
@@ -118,14 +118,14 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
-            point = study_verbs.command_of_a_point(options, work.study.design)
+            point = run_study_in_folder.command_of_a_point(options, work.study.design)
             place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command, shown, point))
         code = exit_code(records, summary)
-        made = study_verbs.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
-        manifest = study_verbs.commit(place, made, terminal, code)
-        study_verbs.finish(place, [records])
+        made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
+        manifest = run_study_in_folder.commit(place, made, terminal, code)
+        run_study_in_folder.finish(place, [records])
         told = summary.as_json(records)
-    written = Written(out, (*manifest.files, "manifest.json"), study_verbs.now() - start)
+    written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
     about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     page = _page(records, told, code, written, terminal.verbose > 0)
     return Answer(told | about, page, code, tuple(_complaints(records, code, options, document)))
@@ -139,7 +139,7 @@ def request(options: SweepOptions) -> SweepRequest:
     cfmkit.errors.UsageError
         If one is malformed, or two contradict each other.
     """
-    from cfmkit.cli.study_verbs import names
+    from cfmkit.cli.run_study_in_folder import names
     from cfmkit.studies.sweep_request_and_files import SweepRequest
     from cfmkit.studies.varied_axes import wish
 

@@ -23,8 +23,8 @@ from cfmkit.elastica.continuation import (
 from cfmkit.elastica.continuation.branch_rejoins_path import end_at, predicted_end
 from cfmkit.elastica.continuation.path_and_moves import PRIMARY, Leg, Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.points_at_bifurcation import NEAR_BIFURCATION
+from cfmkit.elastica.continuation.switch_to_uncondensed_solver import uncondensed
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
-from cfmkit.elastica.continuation.uncondensed import uncondensed
 from cfmkit.elastica.equilibrium.network_solver import FORCE_WEIGHT
 from cfmkit.elastica.kernels.status_codes import DENIED, DONE, INERTIA, NO_START, STALLED
 from cfmkit.elastica.outcome.path import Event, PathStatus

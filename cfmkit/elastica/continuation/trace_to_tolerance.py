@@ -135,7 +135,7 @@ def _early(problem: PathProblem, trail: Trail) -> bool:
 
 def _further(problem: PathProblem, trail: Trail, before: Trail) -> bool:
     """Tell whether shorter segments lead any further: a path pulled straight is only followed nearer to its end."""
-    from cfmkit.elastica.continuation.uncondensed import pulled_straight
+    from cfmkit.elastica.continuation.switch_to_uncondensed_solver import pulled_straight
 
     if not pulled_straight(trail) or not len(before.points) or trail.requested != before.requested:
         return True

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.network_arrays import HALVES, TABLE_COLUMNS, DiscreteNetwork
+from cfmkit.elastica.kernels.network_array_types import HALVES, TABLE_COLUMNS, DiscreteNetwork
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
 from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
@@ -63,7 +63,7 @@ class Grid:
     beam_of_step, piece : (steps,) int arrays
         The beam that a step is on, and the smooth piece of it; pieces count through all beams.
     segment_step, beam_segment : int arrays
-        As in `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
+        As in `cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`.
     """
 
     edges: FloatArray
@@ -191,8 +191,8 @@ def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
 def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     """Return what the drifts and kicks of all steps take, dimensionless.
 
-    See `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`. `known` is the table of the layout that this one took
-    fits over from: the rows of beams that are neither plain nor changed are taken over too.
+    See `cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`. `known` is the table of the layout that this one
+    took fits over from: the rows of beams that are neither plain nor changed are taken over too.
     """
     bundle, units = layout.bundle, layout.units
     plain: Any = None
@@ -272,7 +272,7 @@ _RISE = np.array([[0.0, 1.0, 2 * x, 3 * x * x] for x in _PAIR]) @ np.linalg.inv(
 def _strip_columns(
     fitted: Fit, section: Section, ends: tuple[Any, Any], where: tuple[float, float], whole: tuple[Any, Any]
 ) -> list[Any]:
-    """Return the columns of wide strips beside others, in SI: see `cfmkit.elastica.kernels.network_arrays.HALVES`.
+    """Return the columns of wide strips beside others, in SI: see `cfmkit.elastica.kernels.network_array_types.HALVES`.
 
     ends: parameters at both ends of the drifts; whole: their lengths, and integrals of ds/EI.
     """

@@ -15,7 +15,7 @@ from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.kernels.network_arrays import DiscreteNetwork
+    from cfmkit.elastica.kernels.network_array_types import DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
     from cfmkit.elastica.model.network_under_drive import Layout
 

@@ -17,7 +17,7 @@ from cfmkit.elastica.equilibrium.network_solver import Points, Solver, Spot
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.network_solver import MarchOptions
-    from cfmkit.elastica.kernels.network_arrays import DiscreteNetwork
+    from cfmkit.elastica.kernels.network_array_types import DiscreteNetwork
 
 
 _POSE = np.array([0, 1, 2, 2])  # degrees of freedom of a node, as in `DiscreteNetwork.place_dof`

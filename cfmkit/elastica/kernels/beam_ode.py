@@ -9,7 +9,7 @@ Reissner (1972)]:
 
 by the arc length; w is a dead load per reference length. The equations are integrated by the symmetric splitting of
 `cfmkit.elastica.kernels.symplectic_splitting_coefficients`, from a table that does not depend on the state: see
-`cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
+`cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`.
 
 Derivatives are those of the discrete solution. That by the rotation at the start follows from the others, since the
 whole segment may be turned together with its force.
@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.network_arrays import TABLE_COLUMNS
+from cfmkit.elastica.kernels.network_array_types import TABLE_COLUMNS
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 from cfmkit.elastica.kernels.wide_strip import strip_drift
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from cfmkit.elastica.kernels.beam_ode import sincos
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.network_arrays import HALVES, SHARE, TABLE_COLUMNS
+from cfmkit.elastica.kernels.network_array_types import HALVES, SHARE, TABLE_COLUMNS
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS as STEP_ROWS
 from cfmkit.elastica.kernels.wide_strip import bent, by_section, strain_energy
 

@@ -21,7 +21,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
 from numba.core.typing.context import Context
 
-from cfmkit.elastica.kernels import entry_points
+from cfmkit.elastica.kernels import functions_called_from_python
 from cfmkit.elastica.kernels.compiler import KERNELS, OPTIONS
 from cfmkit.elastica.kernels.machine_code import SYMBOL, Code
 from cfmkit.elastica.kernels.passing_arrays_by_address import (
@@ -353,6 +353,6 @@ _libraries: list[Any] = []  # code lives as long as its library
 
 def _typed(name: str) -> Any:
     signature = tuple(_type(each) for each in DOORS[name])
-    dispatcher = numba.njit(**OPTIONS)(getattr(entry_points, name))
+    dispatcher = numba.njit(**OPTIONS)(getattr(functions_called_from_python, name))
     dispatcher.compile(signature)
     return dispatcher.overloads[signature]

@@ -20,7 +20,7 @@ from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
+    from cfmkit.elastica.kernels.network_array_types import DesignSlopes, DiscreteNetwork
     from cfmkit.elastica.kernels.workspace import WorkSpace
 
 _Pair = ctypes.c_int64 * 2
@@ -175,19 +175,19 @@ def march(
 
 
 def forces(m: DiscreteNetwork, n_free: int, ys: Any, drives: Any, out: Any, scratch: WorkSpace) -> None:
-    """Set residual forces and spring energy at points; see `cfmkit.elastica.kernels.observe.forces`."""
+    """Set residual forces and spring energy at points; see `cfmkit.elastica.kernels.forces_and_beam_states.forces`."""
     arrays = (drives, ys, drives, drives, drives, out, drives)
     _solver(_numbers(FORCES, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
 def tangent(m: DiscreteNetwork, n_free: int, y: Any, drive: float, scratch: WorkSpace) -> None:
-    """Set the first matrix of the work space to the Jacobian; see `cfmkit.elastica.kernels.observe.tangent`."""
+    """Set the first matrix of the work space to the Jacobian; see `forces_and_beam_states.tangent`."""
     arrays = (y, y[None], y, y, y, _NONE, y)
     _solver(_numbers(TANGENT, n_free, drive), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
 def states(m: DiscreteNetwork, n_free: int, ys: Any, drives: Any, out: Any) -> None:
-    """Set the states along all beams at points, real or complex; see `cfmkit.elastica.kernels.observe.states`."""
+    """Set the states along all beams at points, real or complex; see `forces_and_beam_states.states`."""
     door = _doors["complex_states" if ys.dtype.kind == "c" else "states"]
     door(_whole(n_free), m.block, objects((ys, drives, out)))
 

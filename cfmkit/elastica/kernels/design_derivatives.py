@@ -2,10 +2,10 @@
 
 They are exact: the derivative of everything that the solver integrates and sums.
 
-`cfmkit.elastica.kernels.network_arrays.DesignSlopes` holds how a model changes with each variable. At equilibria the
-residual stays zero, so the unknowns change by the solution of a linear system with the tangent that Newton's method
-uses; its right sides are the changes of the residual at unchanged unknowns. Along a beam those come from the
-drifts and kicks of the state, differentiated: one sweep for all the variables that a beam depends on.
+`network_array_types.DesignSlopes` holds how a model changes with each variable. At equilibria the residual stays
+zero, so the unknowns change by the solution of a linear system with the tangent that Newton's method uses; its right
+sides are the changes of the residual at unchanged unknowns. Along a beam those come from the drifts and kicks of the
+state, differentiated: one sweep for all the variables that a beam depends on.
 """
 
 from __future__ import annotations
@@ -393,7 +393,7 @@ def beam_slopes(m, design, k, y, n_free, values, dvalues, dstart, dend, w, out):
 def held_slopes(m, design, n_free, ys, drives, dys, out, room):
     """Set the derivatives of the forces on all degrees of freedom and of the springs' energy, (points, dofs + 1, k).
 
-    The forces are those of `cfmkit.elastica.kernels.observe.forces`.
+    The forces are those of `cfmkit.elastica.kernels.forces_and_beam_states.forces`.
     """
     count, beams, dofs = design.moves.shape[0], m.beam_end.shape[0], m.slot.shape[0]
     n = n_free + 3 * beams

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
+from cfmkit.elastica.kernels.network_array_types import DesignSlopes, DiscreteNetwork
 from cfmkit.elastica.kernels.passing_arrays_by_address import complexes, floats
 from cfmkit.elastica.kernels.workspace import HELD_SLOPES, MARCHING, SLOPES, SOLVING
 
@@ -50,4 +50,4 @@ DOORS: dict[str, tuple[Any, ...]] = {
         HELD_SLOPES,
     ),
 }
-"""Arguments of each function of `cfmkit.elastica.kernels.entry_points`."""
+"""Arguments of each function of `cfmkit.elastica.kernels.functions_called_from_python`."""

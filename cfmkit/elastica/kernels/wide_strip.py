@@ -29,7 +29,7 @@ from math import factorial
 import numpy as np
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.network_arrays import HALVES, SHARE
+from cfmkit.elastica.kernels.network_array_types import HALVES, SHARE
 
 _ITERATIONS = 40  # of Newton's method, which takes three to five: the law is nearly a straight line
 _CLOSE = 1e-13  # of the turn; two steps more end at rounding, also in an imaginary part

@@ -11,7 +11,7 @@ from cfmkit.elastica.kernels.passing_arrays_by_address import Packed, floats, ob
 from cfmkit.elastica.kernels.status_codes import KEPT
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.kernels.network_arrays import DesignSlopes, DiscreteNetwork
+    from cfmkit.elastica.kernels.network_array_types import DesignSlopes, DiscreteNetwork
 
 SOLVING = (
     floats(2),  # system, with the drive's column and the bordering row

@@ -183,9 +183,9 @@ class Layout:
 
     @cached_property
     def units(self) -> Any:
-        """Factors that make the columns of a table dimensionless, (6,), as in `network_arrays.DiscreteNetwork`.
+        """Factors that make the columns of a table dimensionless, (6,), as in `network_array_types.DiscreteNetwork`.
 
-        Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.network_arrays.HALVES`.
+        Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.network_array_types.HALVES`.
         """
         length, force, turn = self.scales.length, self.scales.force, self.scales.moment
         own = [1.0, 1 / length, turn, force / length, force / length, 1 / length]

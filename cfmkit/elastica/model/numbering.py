@@ -19,7 +19,7 @@ from cfmkit.elastica.model.network import LineLoad, Network, PointLoad, SlideSpr
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.kernels.network_arrays import IntArray
+    from cfmkit.elastica.kernels.network_array_types import IntArray
     from cfmkit.elastica.model.network import LoadOn, Spring
 
 LINE, TURN, SLIDE = 0, 1, 2  # as in cfmkit.elastica.kernels.springs_and_loads
@@ -42,7 +42,7 @@ class NumberingPlan:
     pins : dict
         (beam, side) and names of pinned nodes to the rotation that they have of their own.
     place_dof : (n, 4) int array
-        As in `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
+        As in `cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`.
     place_node, place_master, place_offset : (n,) int arrays
         Node and master of an attachment, GROUND for places on the ground; its beam's end, 2 beam + side, or NOWHERE.
     ground_of : dict

@@ -155,7 +155,7 @@ class Bundle:
         """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
 
         powers (m, n), shares (n, 5): see `cfmkit.elastica.equilibrium.mesh.Grid.rows`; what the table holds:
-        `cfmkit.elastica.kernels.network_arrays.DiscreteNetwork`.
+        `cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`.
         """
         if self._compliances is None:
             g = self.length

@@ -24,7 +24,7 @@ from cfmkit.arrays import ShortRepr, distinct, read_only
 from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.outcome.corners import Corner, SmoothStretch
+from cfmkit.elastica.outcome.smooth_stretches_between_bifurcations import Corner, SmoothStretch
 from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
 if TYPE_CHECKING:

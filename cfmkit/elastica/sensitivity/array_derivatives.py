@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import assemble_model, table
-from cfmkit.elastica.kernels.network_arrays import TABLE_COLUMNS, DesignSlopes, in_order
+from cfmkit.elastica.kernels.network_array_types import TABLE_COLUMNS, DesignSlopes, in_order
 from cfmkit.elastica.model.beam import GAUSS
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.model.numbering import NOWHERE
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.mesh import Grid
-    from cfmkit.elastica.kernels.network_arrays import DiscreteNetwork
+    from cfmkit.elastica.kernels.network_array_types import DiscreteNetwork
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network

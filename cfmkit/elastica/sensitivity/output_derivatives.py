@@ -26,7 +26,7 @@ from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.kernels.network_arrays import DesignSlopes
+    from cfmkit.elastica.kernels.network_array_types import DesignSlopes
     from cfmkit.elastica.model.network import LineLoad, Network
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.sensitivity.array_derivatives import ComplexSteps, PlainSlopes

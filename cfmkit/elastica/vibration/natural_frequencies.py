@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.vibration.linearised import Linearisation
+from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearisation
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
-    from cfmkit.elastica.vibration.linearised import Linearised
+    from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearised
 
 _AT_ONCE = 16  # points whose matrices are in memory together: some megabytes
 _TIED = 1e-10  # share of the largest row from which a constraint counts: a straight beam's along itself is rounding

@@ -25,7 +25,7 @@ from cfmkit.families.beam.scalar_results import ranges, window_of
 from cfmkit.numerics.cubic_interpolation import value_at
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, Share, format_short
-from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run

@@ -16,6 +16,7 @@ from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
 from cfmkit.families.fem_results import numbered
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, color_key, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
@@ -25,7 +26,6 @@ from cfmkit.plots.rounding_noise import vanishing
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, color_key, value_text, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.families.beam.plane_fem_model import SolidSolution
+    from cfmkit.families.beam.plane_fem_analysis import SolidSolution
     from cfmkit.families.beam.solution import Solution
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result

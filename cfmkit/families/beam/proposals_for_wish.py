@@ -28,7 +28,7 @@ from cfmkit.families.flattest_window import flattest, ripples
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
-from cfmkit.stock.spec import MaterialSpec
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

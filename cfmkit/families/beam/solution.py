@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.arrays import ShortRepr, distinct, read_only
-from cfmkit.elastica.outcome.along_the_way import along_the_way
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
+from cfmkit.elastica.outcome.folding_path_between_points import along_the_way
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.elastica.outcome.along_the_way import AlongTheWay
     from cfmkit.elastica.outcome.between_points import BetweenPoints
+    from cfmkit.elastica.outcome.folding_path_between_points import AlongTheWay
     from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.beam.spec import BeamSpec
 

@@ -15,12 +15,12 @@ from cfmkit.families.beam.network_elements.spec import (
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.formula import formula
+from cfmkit.specs.formula_of_x import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque, format_short
 from cfmkit.specs.units.fields import LARGEST
-from cfmkit.stock.spec import sheet_faults, sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_faults, sheet_of
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}

@@ -85,7 +85,7 @@ def course_of(surface: Surface) -> SurfaceCourse:
 
 
 def _of_formula(given: FormulaProfile) -> SurfaceCourse:
-    from cfmkit.specs.formula import formula, slope
+    from cfmkit.specs.formula_of_x import formula, slope
 
     height, rise = formula(given.height), slope(given.height)
     rows = np.linspace(0.0, given.length, given.points)

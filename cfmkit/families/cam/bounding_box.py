@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.families.base import Room
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.picture_parts import pose, roller_path
+from cfmkit.families.cam.part_positions_for_pictures import pose, roller_path
 from cfmkit.stock.springs.made_to_measure import extension_spring
 
 if TYPE_CHECKING:

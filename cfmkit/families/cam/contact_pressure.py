@@ -18,10 +18,10 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.mounted_roller_track import TrackStates
+    from cfmkit.families.cam.geometry.roller_track_on_cam import TrackStates
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Contact, Mechanism
-    from cfmkit.stock.spec import MaterialSpec
+    from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 
 YIELD_PRESSURE = 1.67

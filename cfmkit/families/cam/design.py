@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.mounted_roller_track import TrackStates
 from cfmkit.families.cam.geometry.path import reach
+from cfmkit.families.cam.geometry.roller_track_on_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.mechanism_from_spec import (
@@ -38,9 +38,9 @@ from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
-from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Finding
-    from cfmkit.stock.springs.offers_and_generic_series import Offer
+    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 
 @dataclass(frozen=True)

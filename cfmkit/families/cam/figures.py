@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.clearance import nearest_pairs
-from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
+from cfmkit.families.cam.part_positions_for_pictures import (
+    moment,
+    pivoting,
+    pose,
+    scene,
+    spring_count,
+    start_curve,
+    swallowtail,
+)
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
@@ -19,7 +28,6 @@ from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
-from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -29,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.picture_parts import Scene
+    from cfmkit.families.cam.part_positions_for_pictures import Scene
     from cfmkit.families.cam.solution import Built, Solution
     from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result

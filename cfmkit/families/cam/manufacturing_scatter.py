@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Manufacturing
-    from cfmkit.numerics.registration import CurveFrame
+    from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 
 WAVES = 24

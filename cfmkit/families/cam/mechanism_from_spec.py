@@ -15,15 +15,15 @@ import numpy as np
 
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.mounted_roller_track import NoTrack, Track
 from cfmkit.families.cam.geometry.path import RollerPath, reach
+from cfmkit.families.cam.geometry.roller_track_on_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -37,14 +37,14 @@ from cfmkit.families.cam.scalar_results import contact_pressure, curve_cut_for, 
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.findings import mm
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status
 from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.geometry.mounted_roller_track import TrackStates
+    from cfmkit.families.cam.geometry.roller_track_on_cam import TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
@@ -76,7 +76,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         If the two sides differ and nobody has said that the symmetric model will do.
     """
     if spec.mechanism.profile.file is not None:
-        from cfmkit.families.cam.measured_cam import analyze_built
+        from cfmkit.families.cam.measured_cam_analysis import analyze_built
 
         return analyze_built(spec)
     left = spec.mechanism.left

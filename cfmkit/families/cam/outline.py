@@ -12,10 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Drawing, DrawnDimension, Edge, Line, Sheet, Smooth
+from cfmkit.export.contours import (
+    TOLERANCE,
+    Arc,
+    Contour,
+    Curve2D,
+    Drawing,
+    DrawnDimension,
+    Edge,
+    Line,
+    Sheet,
+    Smooth,
+)
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm, rate
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +48,7 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.infeasible_or_not_buildable.CannotBuild
+    cfmkit.families.no_mechanism.CannotBuild
         If there is no cam to draw.
     """
     sides = assemble_sides(spec)

@@ -23,7 +23,7 @@ from cfmkit.families.cam.spec import CamSpec, Springs
 from cfmkit.families.findings import mm
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
-from cfmkit.stock.spec import MaterialSpec
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -11,7 +11,7 @@ from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
-from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
+from cfmkit.stock.material_and_part_spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
 
 Positive = Field(gt=0)

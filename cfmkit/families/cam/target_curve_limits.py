@@ -11,7 +11,7 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.findings import at_most, mm, newton
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.cut import CamProfile

@@ -7,13 +7,13 @@ from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.bistability_class import CLASSES
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import CLASSES
 
 PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
 """One model for flexures and strips: the chain is another one."""
 
-SOLID = "cfmkit.families.slider_crank.printed.plane_fem_model:analyze"
+SOLID = "cfmkit.families.slider_crank.printed.plane_fem_analysis:analyze"
 """The part as drawn, of flexures or a strip."""
 
 FAMILY = Family(
@@ -26,21 +26,23 @@ FAMILY = Family(
         "beam": PRINTED,
         "solid": SOLID,
     },
-    analyze_block=when_called("cfmkit.families.slider_crank.springs.many_designs.model:analyze_block"),
+    analyze_block=when_called(
+        "cfmkit.families.slider_crank.springs.many_designs.requested_values_and_findings:analyze_block"
+    ),
     design=when_called("cfmkit.families.slider_crank.design:design"),
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
     values=OF_SPRINGS | OF_PARTS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
-    errors="cfmkit.families.slider_crank.movable_and_erring_values:errors",
+    errors="cfmkit.families.slider_crank.redesign_variables_and_process_errors:errors",
     sampled="cfmkit.families.slider_crank.force_at_few_poses:sampled",
-    free="cfmkit.families.slider_crank.movable_and_erring_values:free",
+    free="cfmkit.families.slider_crank.redesign_variables_and_process_errors:free",
     gradient=when_called("cfmkit.families.slider_crank.springs.model:gradient"),
     draw="cfmkit.families.slider_crank.figures",
-    scheme="cfmkit.families.slider_crank.parameter_sketch",
+    scheme="cfmkit.families.slider_crank.nomenclature_figure",
     outline="cfmkit.families.slider_crank.outline",
-    elastic_parts="cfmkit.families.slider_crank.printed.plane_fem_model:elastic_parts",
-    elastic_networks="cfmkit.families.slider_crank.printed.plane_fem_model:elastic_networks",
+    elastic_parts="cfmkit.families.slider_crank.printed.plane_fem_analysis:elastic_parts",
+    elastic_networks="cfmkit.families.slider_crank.printed.plane_fem_analysis:elastic_networks",
     levels=("design.force",),
     propose="cfmkit.families.slider_crank.proposals_for_wish:propose",
     room="cfmkit.families.slider_crank.bounding_box:room",

@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import deg, mm
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage import Linkage
 

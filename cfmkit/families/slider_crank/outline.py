@@ -21,7 +21,7 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.infeasible_or_not_buildable.CannotBuild
+    cfmkit.families.no_mechanism.CannotBuild
         If it cannot be assembled.
     """
     made: Drawing = function_named(f"cfmkit.families.slider_crank.{spec.built_as}.outline:drawing")(resolve(spec))

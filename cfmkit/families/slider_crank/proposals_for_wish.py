@@ -24,9 +24,9 @@ from cfmkit.families.slider_crank.torque_that_springs_carry import SprungMotion,
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place, format_short
-from cfmkit.stock.spec import MaterialSpec
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
-from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE
+from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run

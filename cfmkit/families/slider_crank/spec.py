@@ -13,7 +13,7 @@ from cfmkit.families.slider_crank.springs.spec import Limits, SpringDesign, Spri
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
-from cfmkit.stock.spec import Guide, Pins, sheet_faults
+from cfmkit.stock.material_and_part_spec import Guide, Pins, sheet_faults
 
 
 class Mechanism(Printed):

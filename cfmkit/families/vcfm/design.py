@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import at_least, mm, mpa, newton
-from cfmkit.families.infeasible_or_not_buildable import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -39,13 +39,13 @@ from cfmkit.families.vcfm.leaf_sizing import (
     thickness_for,
 )
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.springs import Diamond
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import onset_and_exit
 from cfmkit.families.vcfm.leaves_around_bought_springs import with_bought_springs
 from cfmkit.families.vcfm.model import LawSampler, rest_of
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
-from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-    from cfmkit.families.vcfm.leaves.springs import Coils
+    from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
 
@@ -140,7 +140,7 @@ class ExactSampler:
         How far it is pulled back at most, positive [m].
     """
 
-    # paths of beams, or of solids (`plane_fem_model.SolidPath`), which answer the same questions
+    # paths of beams, or of solids (`plane_fem_analysis.SolidPath`), which answer the same questions
     pushed: Any
     pulled: Any
     sides: list[Any]

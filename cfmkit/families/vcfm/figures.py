@@ -10,14 +10,15 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.families.fem_results import numbered
-from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
-from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
+from cfmkit.families.vcfm.largest_stress_in_each_fillet import fillets
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
@@ -36,7 +37,6 @@ from cfmkit.plots.style import (
     new_figure,
     styled,
 )
-from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable

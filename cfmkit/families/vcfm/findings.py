@@ -11,8 +11,8 @@ from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton,
 from cfmkit.families.vcfm.bought_parts import spring_faults
 from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, spring_room
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE
-from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
 from cfmkit.families.vcfm.leaves.v_beam import (
     FLAT_BUCKLED_ABOVE,
     LINEAR_ABOVE,

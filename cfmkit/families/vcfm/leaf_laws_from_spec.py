@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.springs import Coils, Diamond, StraightSpring, UShape, folded
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils, Diamond, StraightSpring, UShape, folded
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.vcfm.leaves.springs import Spring
+    from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Spring
     from cfmkit.families.vcfm.spec import Bistable, BoughtSprings, LeafMaterial, Positive, VcfmSpec
 
 

@@ -16,7 +16,7 @@ from math import asin, ceil, floor, log10, pi, sin, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, at_most, mm, mpa
-from cfmkit.families.infeasible_or_not_buildable import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import mm, mpa
-from cfmkit.families.infeasible_or_not_buildable import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -34,8 +34,8 @@ from cfmkit.families.vcfm.leaf_sizing import (
 )
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, onset_and_exit
 from cfmkit.results import Design, Status
-from cfmkit.stock.spec import sheet_of
-from cfmkit.stock.springs.offers_and_generic_series import Miss, nearest
+from cfmkit.stock.material_and_part_spec import sheet_of
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.spec import BoughtSprings, VcfmDesign, VcfmSpec
-    from cfmkit.stock.springs.offers_and_generic_series import Offer
+    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 TRIED = 12
 """Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""

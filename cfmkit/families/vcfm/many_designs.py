@@ -18,7 +18,7 @@ from cfmkit.families.findings import TOO_SOFT
 from cfmkit.families.vcfm.findings import EXACT_FORM, PRESSED, ROUNDING, returns
 from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, share_of
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import (
     FLAT_BUCKLED_ABOVE,

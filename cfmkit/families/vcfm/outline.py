@@ -35,7 +35,7 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
 from cfmkit.families.vcfm.part.spec import VcfmPart
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
-from cfmkit.stock.spec import CutPart
+from cfmkit.stock.material_and_part_spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -18,8 +18,8 @@ import numpy as np
 from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import UShape
 from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE, axial_root, pose
-from cfmkit.families.vcfm.leaves.springs import UShape
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam, critical_force
 

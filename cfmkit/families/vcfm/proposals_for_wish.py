@@ -22,13 +22,13 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
-from cfmkit.families.infeasible_or_not_buildable import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
-from cfmkit.stock.springs.offers_and_generic_series import generic
+from cfmkit.stock.springs.offer_type_and_generic_series import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:

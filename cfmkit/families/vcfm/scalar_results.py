@@ -11,7 +11,7 @@ from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.fem_results import unknown_to_beams
 from cfmkit.families.findings import newton
 from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
-from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.results import Quantity
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities

@@ -22,7 +22,7 @@ from cfmkit.specs.spec import (
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
+from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
 
 if TYPE_CHECKING:

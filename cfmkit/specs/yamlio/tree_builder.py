@@ -26,7 +26,7 @@ from yaml.events import (
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.number_reading import shown
 from cfmkit.specs.yamlio.scalars import check_text, read_plain
-from cfmkit.specs.yamlio.source_text import Fault, Unreadable, decode, without_odd_characters
+from cfmkit.specs.yamlio.text_decoding import Fault, Unreadable, decode, without_odd_characters
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
-from cfmkit.stock.springs.offers_and_generic_series import BENDING_SHARE, SHEAR_SHARE
+from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

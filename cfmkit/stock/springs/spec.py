@@ -12,9 +12,9 @@ from cfmkit.errors import DataError
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
-from cfmkit.stock.spec import Fatigue
+from cfmkit.stock.material_and_part_spec import Fatigue
 from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
-from cfmkit.stock.springs.offers_and_generic_series import GENERIC, Offer, generic
+from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.metrics.branch_windows import Undefined
+from cfmkit.metrics.branches_cut_to_window import Undefined
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
     from cfmkit.stock.springs.helical import Wound
-    from cfmkit.stock.springs.offers_and_generic_series import Offer
+    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 WIRE_DEFINITIONS = {
     "wire_stress_max": (

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store.safe_disk_changes import Data
+    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.result_types import Findings, IndexLine
     from cfmkit.studies.sensitivity.setup import Setup
-    from cfmkit.studies.sensitivity.tolerance import Yield
 
 YIELD = "share of parts that meet every requirement, of those drawn from the tolerances"
 POLICIES = {

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.failed_sample_policy import Analysis
+    from cfmkit.studies.sensitivity.monte_carlo_yield import Yield
     from cfmkit.studies.sensitivity.setup import Setup
-    from cfmkit.studies.sensitivity.tolerance import Yield
 
 IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
 """Indices that are amounts of the metric; others are ratios."""

@@ -16,7 +16,7 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.studies.suggest.good_parts import GoodParts, good_parts, with_made_parts
+from cfmkit.studies.suggest.yield_of_proposal import GoodParts, good_parts, with_made_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -11,8 +11,8 @@ from cfmkit.families.base import article
 from cfmkit.families.wishes import Wish
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
+from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
 from cfmkit.stock.processes import PROCESSES, ProcessName
-from cfmkit.stock.spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]

@@ -11,7 +11,7 @@ from math import hypot, sqrt
 
 from cfmkit.families.base import Run
 from cfmkit.families.findings import at_least, at_most, mm
-from cfmkit.families.infeasible_or_not_buildable import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit_oblique.model import finding

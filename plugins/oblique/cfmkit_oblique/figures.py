@@ -6,11 +6,11 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.stacked_line_diagrams import Limit
 from cfmkit.plots.style import styled
-from cfmkit.plots.text import Heading, value_text
 from cfmkit.results import Result
 from cfmkit_oblique.model import Solution
 

@@ -26,7 +26,7 @@ from cfmkit.families.beam.network_elements.spec import (
     checked_thickness,
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
-from cfmkit.stock.spec import SafetyFactor
+from cfmkit.stock.material_and_part_spec import SafetyFactor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

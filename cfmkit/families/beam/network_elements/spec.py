@@ -21,8 +21,8 @@ from cfmkit.specs.units import (
     Stiffness,
     Torque,
 )
+from cfmkit.stock.material_and_part_spec import MaterialSpec, PaddedPart, material_input
 from cfmkit.stock.materials import material
-from cfmkit.stock.spec import MaterialSpec, PaddedPart, material_input
 
 if TYPE_CHECKING:
     pass

@@ -1,10 +1,10 @@
 """Dynamics of a cam mechanism: two sides without symmetry, moved by a slider.
 
-`inverse` is the product route, `multibody` the paper's formulation and its check.
+`inverse` is the product route, `lagrange_multiplier_check` the paper's formulation and its check.
 """
 
 from __future__ import annotations
 
-from cfmkit.families.cam.dynamics.model import analyze
+from cfmkit.families.cam.dynamics.force_of_given_motion import analyze
 
 __all__ = ["analyze"]

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.scalar_results import constant_force
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
 from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
-from cfmkit.plots.text import Heading, value_text
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

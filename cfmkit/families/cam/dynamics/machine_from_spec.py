@@ -9,7 +9,7 @@ from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, cam_start_height, directions
 from cfmkit.families.cam.statics import GRAVITY
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Assembly

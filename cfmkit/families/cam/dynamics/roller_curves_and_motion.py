@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.cut import CamProfile
-    from cfmkit.families.cam.geometry.mounted_roller_track import Track
+    from cfmkit.families.cam.geometry.roller_track_on_cam import Track
 
     ComplexArray = NDArray[np.complex128]
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.registration import CurveFrame
+from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.cut import CamProfile
-    from cfmkit.numerics.smoothing import SmoothedFunction
+    from cfmkit.numerics.smoothing_spline import SmoothedFunction
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.slope_law import brace_tangent, drop, rise_rate
-from cfmkit.families.cam.many_designs.forces_inside_given_window import CutWindows, SampledBranch
+from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.statics import levers

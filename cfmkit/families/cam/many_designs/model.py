@@ -31,7 +31,7 @@ from cfmkit.families.cam.many_designs.measures import (
 from cfmkit.families.cam.many_designs.same_cam_other_parts import Around, BuiltSlab
 from cfmkit.families.cam.many_designs.undercut_forces import CornerSlab, shapes
 from cfmkit.families.cam.mechanism_from_spec import assemble, weights
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:

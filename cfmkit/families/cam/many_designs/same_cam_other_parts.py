@@ -1,7 +1,7 @@
 """Many mechanisms at once around one cut cam: other braces, rollers, springs and weights than those it is cut for.
 
 The cam is put together once. Where a roller of another radius or a brace of another length runs on it is
-solved for all mechanisms and samples together; the formulas are those of `mounted_roller_track.Track`, `statics` and
+solved for all mechanisms and samples together; the formulas are those of `roller_track_on_cam.Track`, `statics` and
 `contact`. A mechanism whose curve is not complete, or whose force changes sign, is left to the model of one cam.
 """
 
@@ -17,10 +17,10 @@ from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stres
 from cfmkit.families.cam.geometry.many_tracks_one_cam import Poses, sign_changes
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
-from cfmkit.families.cam.many_designs.forces_inside_given_window import CutWindows, SampledBranch
+from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
-from cfmkit.metrics.branch_windows import ROUNDING, TOLERANCE
+from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.results import WINDOW_OUTSIDE
 

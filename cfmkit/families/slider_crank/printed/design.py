@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import rounded
-from cfmkit.designing.reported_values import measured, searched
+from cfmkit.designing.measured_and_searched_values import measured, searched
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_design
+from cfmkit.families.no_mechanism import CannotBuild, no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
@@ -41,7 +41,7 @@ from cfmkit.families.slider_crank.printed.strip_thickness_search import (
 )
 from cfmkit.numerics.sqp import SearchEnding
 from cfmkit.results import Design, Finding, Searched, Status
-from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

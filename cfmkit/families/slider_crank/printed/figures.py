@@ -10,13 +10,13 @@ import numpy as np
 from cfmkit.families.fem_results import numbered
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import STRIP
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.reported_values import searched
+from cfmkit.designing.measured_and_searched_values import searched
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
-from cfmkit.families.infeasible_or_not_buildable import no_design
+from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import side_of
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (
@@ -35,7 +35,7 @@ from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
-from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

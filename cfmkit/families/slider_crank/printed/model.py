@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.errors import InputError
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import (

@@ -29,7 +29,7 @@ from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import corners, flexures_of, strip_of, travel_direction
 from cfmkit.specs.units import format_short
-from cfmkit.stock.spec import PaddedPart
+from cfmkit.stock.material_and_part_spec import PaddedPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
+from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, SafetyFactor
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.stock.spec import MaterialField, PaddedPart, SafetyFactor
 
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 

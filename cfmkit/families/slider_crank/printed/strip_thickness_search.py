@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
 from cfmkit.families.base import Run
 from cfmkit.families.findings import mm, mpa, newton, percent
-from cfmkit.families.infeasible_or_not_buildable import no_design
+from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.sqp_program import SMALL, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize

@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.families.findings import percent
-from cfmkit.families.infeasible_or_not_buildable import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.offers_and_generic_series import Miss, Offer, nearest
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
-    from cfmkit.families.slider_crank.springs.targets import SpringTask
+    from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
 
 
 PLACES = 41

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
@@ -38,10 +38,10 @@ from cfmkit.families.slider_crank.springs.design_outcome import (
     too_far,
 )
 from cfmkit.families.slider_crank.springs.fit_rates import least_squares, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import EDGE
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, default_motion
-from cfmkit.families.slider_crank.springs.targets import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
-    from cfmkit.families.slider_crank.springs.targets import SpringTask
+    from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
     from cfmkit.results import Finding
 
 

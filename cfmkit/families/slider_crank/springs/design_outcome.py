@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.reported_values import measured, searched
+from cfmkit.designing.measured_and_searched_values import measured, searched
 from cfmkit.families.base import Run
 from cfmkit.families.findings import percent
-from cfmkit.families.infeasible_or_not_buildable import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
+from cfmkit.families.slider_crank.springs.rate_fit_task import FREE
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest
-from cfmkit.families.slider_crank.springs.targets import FREE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.bought_springs import SpringOption
-    from cfmkit.families.slider_crank.springs.targets import SpringTask
+    from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
     from cfmkit.results import Finding, Searched
 
 

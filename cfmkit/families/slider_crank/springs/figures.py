@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.bounding_box import radii_at_pins
+from cfmkit.families.slider_crank.springs.bistability_class import NEGATIVE
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import NEGATIVE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
+from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
 from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.curves import CurveLook, plot_curve
@@ -21,7 +22,6 @@ from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, value_text, write_heading
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.stock.springs.made_to_measure import loaded_length
 

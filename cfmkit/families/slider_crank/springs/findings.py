@@ -9,8 +9,8 @@ import numpy as np
 
 from cfmkit.families.findings import deg, mm, newton
 from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.bistability_class import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.arrays import distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
@@ -29,7 +29,7 @@ from cfmkit.families.slider_crank.springs.scalar_results import values_of, value
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.metrics.branch_windows import between_ends
+from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.fit_rates import minimax
-from cfmkit.families.slider_crank.springs.targets import DENSE
+from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.targets import SpringTask
+    from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
 
 
 COARSE = 48

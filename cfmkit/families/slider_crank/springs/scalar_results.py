@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, scale_factors, small_angle_number
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import CLASSES, scale_factors, small_angle_number
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import CLASSES, Classified, classify, signs
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone
 from cfmkit.numerics.roots import bracketed_root

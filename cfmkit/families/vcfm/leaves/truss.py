@@ -87,6 +87,6 @@ class TrussDiamond:
 
     def stress(self, compression: Any) -> Any:
         """Return the largest bending stress [Pa]."""
-        from cfmkit.families.vcfm.leaves.springs import leaf_stress
+        from cfmkit.families.vcfm.leaves.positive_stiffness_springs import leaf_stress
 
         return leaf_stress(self.strip, 0.5 * compression)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from cfmkit.specs.spec import NonNegativeLength, PositiveLength
-from cfmkit.stock.spec import CutPart, PartFrame
+from cfmkit.stock.material_and_part_spec import CutPart, PartFrame
 
 
 class StandingFrame(PartFrame):

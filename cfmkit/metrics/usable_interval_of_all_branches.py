@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.metrics import ranges_many, winding_branches
 from cfmkit.metrics.branch_views import Branch, MeasuringFrame
-from cfmkit.metrics.branch_windows import ROUNDING, BranchTrace, Undefined, Window, traces
+from cfmkit.metrics.branches_cut_to_window import ROUNDING, BranchTrace, Undefined, Window, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -66,7 +66,7 @@ def moved_far_enough(
         If the part cannot be meshed.
     """
     from cfmkit.solid.meshed_part import ACROSS, COARSER
-    from cfmkit.solid.under_load import travel_for
+    from cfmkit.solid.path_up_to_load import travel_for
 
     guess = _travel_of_beams(assemble(spec))
     moved = moved_by(spec, guess)

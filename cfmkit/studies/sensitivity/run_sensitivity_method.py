@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.point_evaluation import Metric
-from cfmkit.studies.sensitivity import inverse, local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity import inverse, local, monte_carlo_yield, morris, oat, sobol
 from cfmkit.studies.sensitivity.distributions import draw, values_across, values_at
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
@@ -185,7 +185,7 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
     def drawn(start: int, number: int) -> FloatArray:
         # One stream, so that more samples leave the first ones as they are.
         unit = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
-        return tolerance.sample(unit.reshape(number, count), spreads, groups)
+        return monte_carlo_yield.sample(unit.reshape(number, count), spreads, groups)
 
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
     roles = [DRAWN, *(f"halved {name}" for name in names)]
@@ -195,8 +195,8 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
         analysis = _stated(
             setup,
             blocks.outputs[..., m],
-            lambda one: tolerance.variance_drops(one, setup.seed),
-            (tolerance.VARIANCE_DROP,),
+            lambda one: monte_carlo_yield.variance_drops(one, setup.seed),
+            (monte_carlo_yield.VARIANCE_DROP,),
             len(names),
         )
         found += lines_of(metric, names, analysis, len(blocks.outputs))
@@ -229,9 +229,9 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     met = blocks.outputs[..., len(setup.study.metrics) :]
     failed: NDArray[np.bool_] = np.asarray(np.isnan(blocks.outputs).any(axis=-1))[:, 0]
     good: NDArray[np.bool_] = (~np.isnan(met) & (met > 0.5))[:, 0]
-    each = (tolerance.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
+    each = (monte_carlo_yield.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
     whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
-    return replace(plain, all_met=tolerance.yield_of(whole, failed, setup.policy), each_met=tuple(each))
+    return replace(plain, all_met=monte_carlo_yield.yield_of(whole, failed, setup.policy), each_met=tuple(each))
 
 
 def _answered(setup: Setup, errors: FloatArray, costs: FloatArray, wanted: float) -> inverse.ToleranceFactors:
@@ -271,12 +271,12 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     failed: NDArray[np.bool_] = np.asarray(np.isnan(outputs).any(axis=-1))
     good: NDArray[np.bool_] = ~np.isnan(met) & (met > 0.5)
     whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
-    gains = tolerance.yield_gains(whole, failed, setup.policy)
-    each = (tolerance.yield_of(good[:, 0, k], failed[:, 0], setup.policy) for k in range(met.shape[-1]))
+    gains = monte_carlo_yield.yield_gains(whole, failed, setup.policy)
+    each = (monte_carlo_yield.yield_of(good[:, 0, k], failed[:, 0], setup.policy) for k in range(met.shape[-1]))
     return replace(
         found,
         lines=(*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines),
-        all_met=tolerance.yield_of(whole[:, 0], failed[:, 0], setup.policy),
+        all_met=monte_carlo_yield.yield_of(whole[:, 0], failed[:, 0], setup.policy),
         each_met=tuple(each),
     )
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from cfmkit.api import AnySpec
     from cfmkit.curves import Kind
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.evaluation import MeasuredCurves
+    from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
+    from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.report import MeasureReport
     from cfmkit.numerics.least_squares import Loss
 
 
@@ -71,10 +71,10 @@ def measure(
     >>> round(found.numbers.filtered["force_mean[load]"].value, 2)
     50.46
     """
-    from cfmkit.experiment.evaluation import LEFT_OUT, measured, require_loop
+    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, require_loop
     from cfmkit.experiment.low_pass import read_filter
+    from cfmkit.experiment.measurement_and_calibration_outputs import report_on
     from cfmkit.experiment.reading import Recording, read_recording
-    from cfmkit.experiment.report import report_on
     from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.metrics import MeasuringFrame
 
@@ -151,8 +151,8 @@ def calibrate(
     0.00224
     """
     from cfmkit.experiment.calibration import calibrate as fitted
-    from cfmkit.experiment.evaluation import LEFT_OUT, MeasuredCurves, measured, read_measured
-    from cfmkit.experiment.fitted_parameters import parameters, read_bounds
+    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, MeasuredCurves, measured, read_measured
+    from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.metrics import Window

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
-from cfmkit.experiment.hysteresis import repeatability, turned_loop
+from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import settled

@@ -14,8 +14,7 @@ import numpy as np
 
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import MeasuringFrame, span_text
-from cfmkit.metrics.branch_windows import Undefined, Window, covers, traces
-from cfmkit.metrics.cycles import Cycle, cycle
+from cfmkit.metrics.branches_cut_to_window import Undefined, Window, covers, traces
 from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.metric_definitions import (
     Definition,
@@ -25,6 +24,7 @@ from cfmkit.metrics.metric_definitions import (
     time_of,
     unknown_metric,
 )
+from cfmkit.metrics.usable_interval_of_all_branches import Cycle, cycle
 from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import Share, between
 

@@ -14,7 +14,7 @@ from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
-from cfmkit.stock.spec import CutPart
+from cfmkit.stock.material_and_part_spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
-    from cfmkit.solid.fillet_stress import FilletStress
     from cfmkit.solid.meshed_part import MeshSolution
+    from cfmkit.solid.stress_along_fillets import FilletStress
 
 
 def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow, ...]]:
@@ -84,7 +84,7 @@ def _in_chain(spec: VcfmSpec, points: FloatArray) -> FloatArray:
 
 def _both_ways(pushed: MeshSolution, pulled: MeshSolution, radius: float) -> Iterator[FilletStress]:
     """Yield the fillets of a part with the poses of both ways: they are of one mesh, and begin with the same pose."""
-    from cfmkit.solid.fillet_stress import FilletStress, stressed_fillets
+    from cfmkit.solid.stress_along_fillets import FilletStress, stressed_fillets
 
     back = {tuple(one.arc.middle.tolist()): one for one in stressed_fillets(pulled, radius)}
     for one in stressed_fillets(pushed, radius):

@@ -24,15 +24,15 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
+from cfmkit.families.cam.dynamics.lagrange_multiplier_check import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.machine_from_spec import build, stated_motion
-from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.findings import finding, rubbing_left_out
 from cfmkit.families.cam.mechanism_from_spec import displacement_origin, flanks_cross, rollers_overlap
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.families.findings import mm, newton
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.dynamics.multibody import Scheme
+    from cfmkit.families.cam.dynamics.lagrange_multiplier_check import Scheme
     from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding

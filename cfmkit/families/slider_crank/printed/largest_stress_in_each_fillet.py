@@ -12,7 +12,7 @@ import numpy as np
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import TOLERANCE, nominal_stresses, with_steps
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES
-from cfmkit.stock.spec import PaddedPart
+from cfmkit.stock.material_and_part_spec import PaddedPart
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -27,7 +27,7 @@ def fillets(
 
     chain: the leg as beams, unloaded.
     """
-    from cfmkit.solid.fillet_stress import stressed_fillets
+    from cfmkit.solid.stress_along_fillets import stressed_fillets
 
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []

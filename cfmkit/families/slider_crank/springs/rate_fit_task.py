@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.infeasible_or_not_buildable import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import table
-from cfmkit.experiment.evaluation import MeasuredCurves, Measurement, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.specs.units import format_short

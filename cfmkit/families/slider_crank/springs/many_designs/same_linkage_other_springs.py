@@ -15,6 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.springs.bistability_class import (
+    Classified,
+    classify,
+    scale_factors,
+    small_angle_number,
+)
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
 from cfmkit.families.slider_crank.springs.model import (
@@ -26,14 +32,8 @@ from cfmkit.families.slider_crank.springs.model import (
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import (
-    Classified,
-    classify,
-    scale_factors,
-    small_angle_number,
-)
 from cfmkit.metrics.branch_views import MeasuringFrame
-from cfmkit.metrics.branch_windows import between_ends
+from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.metrics.continuous_means_and_extremes import extremes, mean
 from cfmkit.metrics.ranges_many import (
     UNIFORM_POINTS,

@@ -49,9 +49,16 @@ from cfmkit.families.cam.scalar_results import (
 )
 from cfmkit.families.cam.solution import Assembly, Built, Sides
 from cfmkit.families.findings import mm
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
-from cfmkit.numerics.registration import CurveFrame, Registration, feet, gaps_across, register, registered_where_it_is
-from cfmkit.numerics.smoothing import smoothed
+from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.numerics.rigid_point_registration import (
+    CurveFrame,
+    Registration,
+    feet,
+    gaps_across,
+    register,
+    registered_where_it_is,
+)
+from cfmkit.numerics.smoothing_spline import smoothed
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.tables.measured_outline import read_sides

@@ -15,16 +15,16 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
-from cfmkit.families.beam.fillet_stress_from_fem import fillets
 from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.largest_stress_in_each_fillet import fillets
 from cfmkit.families.beam.network_elements.spec import PartSpec
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, resolve, thinnest_of
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
-from cfmkit.families.beam.solid_under_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
+from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status, quantities
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.path_up_to_load import LoadPath
     from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
-    from cfmkit.solid.under_load import LoadPath
     from cfmkit.tables import Table
 
 
@@ -242,7 +242,7 @@ def _moved(assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
 
 def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
     """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
-    from cfmkit.solid.under_load import travels_at, up_to_load, with_poses
+    from cfmkit.solid.path_up_to_load import travels_at, up_to_load, with_poses
 
     load, through = load_of_one(spec), spec.analysis.through_folds
     fine, reached = up_to_load(meshes.fine, load, through)
@@ -356,7 +356,7 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
 
 def _ended(solution: SolidSolution) -> str:
     """Return why the curve ends early, and where; empty if it does not."""
-    from cfmkit.solid.under_load import LoadEnd
+    from cfmkit.solid.path_up_to_load import LoadEnd
 
     course, turns = solution.fine.course, _turns(solution.spec)
     where = format_short(solution.end if solution.reached else float(course.travel[-1]), "angle" if turns else "length")
@@ -416,7 +416,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
 
 def _limit(solution: SolidSolution) -> dict[str, float | None]:
     """Return the first maximum of a load; nothing of parts that are moved."""
-    from cfmkit.solid.under_load import LoadEnd, first_maximum
+    from cfmkit.solid.path_up_to_load import LoadEnd, first_maximum
 
     reached, course = solution.reached, solution.fine.course
     if reached is None:

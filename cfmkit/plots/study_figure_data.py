@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.plots.text import axis_label
+from cfmkit.plots.axis_labels_and_headings import axis_label
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
+from cfmkit.families.slider_crank.springs.bistability_class import (
+    BOUNDARY,
+    SNAPS,
+)
 from cfmkit.families.slider_crank.springs.findings import findings_of
-from cfmkit.families.slider_crank.springs.many_designs.forces_for_given_rates import EACH, PLACES, Base, Slab
+from cfmkit.families.slider_crank.springs.many_designs.same_linkage_other_springs import EACH, PLACES, Base, Slab
 from cfmkit.families.slider_crank.springs.model import (
     RATES,
     asked_motion,
@@ -24,10 +28,6 @@ from cfmkit.families.slider_crank.springs.model import (
 )
 from cfmkit.families.slider_crank.springs.solution import GRID
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble
-from cfmkit.families.slider_crank.springs.stiffness_class_of_curve import (
-    BOUNDARY,
-    SNAPS,
-)
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ Importing this imports the compiler: only `cfmkit.elastica.kernels.build` does, 
 from __future__ import annotations
 
 from cfmkit.elastica.kernels import design_derivatives as _design
+from cfmkit.elastica.kernels import forces_and_beam_states as _observe
 from cfmkit.elastica.kernels import march as _march
 from cfmkit.elastica.kernels import newton as _newton
-from cfmkit.elastica.kernels import observe as _observe
 from cfmkit.elastica.kernels.signatures import EACH, MARCH, SOLVE, TANGENT
 
 _follow, _solve, _each = _march.march, _newton.solve, _newton.solve_each

@@ -30,7 +30,7 @@ EXACT = 1e-6
 
 def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> tuple[FilletRow, ...]:
     """Return the fillets with their largest stress in a window [m or rad]; those of a mirrored half with a prime."""
-    from cfmkit.solid.fillet_stress import stressed_fillets
+    from cfmkit.solid.stress_along_fillets import stressed_fillets
 
     spec = assembly.spec
     beams, nodes = _named(assembly)

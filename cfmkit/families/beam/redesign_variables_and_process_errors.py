@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.designing.bounds_and_rounding import around
-from cfmkit.stock.spec import sheet_of
+from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,13 +19,13 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
-from cfmkit.families.infeasible_or_not_buildable import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
-from cfmkit.families.slider_crank.printed.fillet_stress_from_fem import fillets
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
+from cfmkit.families.slider_crank.printed.largest_stress_in_each_fillet import fillets
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
@@ -33,7 +33,7 @@ from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
-from cfmkit.stock.spec import PaddedPart
+from cfmkit.stock.material_and_part_spec import PaddedPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -20,14 +20,14 @@ from cfmkit.export.arc_outlines import outlines
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
-from cfmkit.families.vcfm.fillet_stress_from_fem import fillets
 from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.largest_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import drawing, solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
-from cfmkit.stock.spec import CutPart
+from cfmkit.stock.material_and_part_spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
