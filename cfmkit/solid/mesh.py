@@ -273,7 +273,10 @@ def _too_many(nodes: int) -> GeometryError:
 
 
 def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
-    """Return points (k, 2) [m] by size along a line through the part, none of them close to its boundary."""
+    """Return points (k, 2) [m] by size along a line through the part, none of them close to its boundary.
+
+    An end inside the part is one of them: the section at a node where beams meet is held over its whole length.
+    """
     from shapely import contains_xy
 
     fine = seam[0] + np.linspace(0.0, 1.0, 2000)[:, None] * (seam[1] - seam[0])
@@ -284,7 +287,7 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
     for piece in np.split(fine, jumps):
         if len(piece) > 2:
             count = np.cumsum(np.hypot(*np.diff(piece, axis=0, prepend=piece[:1]).T) / field(piece))
-            places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)[1:-1]
+            places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)
             found.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
     points = np.concatenate(found)
     return points[field.clearance(points) > 0.5 * ROOM * field(points)]

@@ -231,8 +231,9 @@ def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balan
     if found is None:
         return None
     size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
-    correction = float(np.abs(found.unknowns - state.unknowns - predicted).max())
-    return found if correction <= STRAY * float(np.abs(predicted).max()) + SOFTLY * size else None
+    moves = len(problem.supports.loose)  # behind them are turns, whose radians are no metres
+    correction = float(np.abs((found.unknowns - state.unknowns - predicted)[:moves]).max())
+    return found if correction <= STRAY * float(np.abs(predicted[:moves]).max()) + SOFTLY * size else None
 
 
 def _bending(before: Balance, state: Balance, travel: float) -> FloatArray:

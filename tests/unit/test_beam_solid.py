@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.results import Result, Status
-from cfmkit.solid.equilibrium import SolidProblem
+from cfmkit.solid.equilibrium import Balance, SolidProblem
+from cfmkit.solid.path_following import advanced
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 LAN = CONFIGS / "beam_lan2010.yaml"
@@ -226,3 +229,55 @@ def test_a_part_that_is_mostly_fillets_has_larger_elements_in_its_blocks(fillet,
     assert one.part.largest == largest
     if largest > 1.0:
         assert len(one.part.meshed(one.size).problem.elements.mesh.nodes) < 6000  # 57 725 with elements of one size
+
+
+BRACED = """
+cfmkit: 1
+family: beam
+name: braced
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 1 mm
+  width: 6 mm
+  nodes:
+    a: {at: [0 mm, 0 mm], support: clamped}
+    b: {at: [0 mm, 30 mm], support: clamped}
+    c: {at: [40 mm, 0 mm]}
+    d: {at: [40 mm, 30 mm]}
+  beams: {lower: {start: a, end: c}, upper: {start: b, end: d}}
+  links: [{master: c, node: d}]
+  part: {fillet: 1 mm}
+  drive: {kind: displacement, node: c, direction: -90 deg}
+analysis: {travel: 2 mm, fidelity: solid, points: 5, solid: {poses: 3, mesh: 1 mm}}
+"""
+
+
+def test_a_node_on_a_link_is_moved_over_its_whole_section(tmp_path):
+    """One node of the mesh had been moved, whose turn nothing resists: there was no equilibrium."""
+    path = tmp_path / "braced.yaml"
+    path.write_text(BRACED)
+    spec = cfmkit.load(str(path))
+    (one,) = family("beam").driven_parts(spec)
+    solved = one.part.meshed(one.size).followed([0.0, 1e-3, 2e-3])
+    (driven,) = (group for group in solved.problem.supports.groups if group.name == "c")
+    at = solved.problem.elements.mesh.nodes[driven.nodes]
+    assert np.ptp(at[:, 1]) == pytest.approx(1e-3, abs=0.15e-3)
+    assert solved.course.travel[-1] == 2e-3
+    beams = cfmkit.analyze(spec.replace({"analysis.fidelity": "reissner"})).curve.effort[-1]
+    assert 1.0 < solved.course.poses[-1].effort / beams < 1.2
+
+
+def test_turns_do_not_count_as_displacements_where_branches_are_told_apart():
+    """The radians of a driven node that turns at once in a bifurcation had been taken for metres off the branch."""
+    rest = Balance(0.0, np.zeros(5), 0.0, 1.0, 0, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), None)
+
+    def problem(off, turn):
+        answer = replace(rest, travel=1e-6, unknowns=np.array([off, 1e-6, 0.0, 0.0, turn]))
+        mesh = SimpleNamespace(nodes=np.array([[0.0, 0.0], [0.06, 0.0]]))
+        supports = SimpleNamespace(loose=np.arange(4))
+        return SimpleNamespace(
+            elements=SimpleNamespace(mesh=mesh), supports=supports, solve=lambda _guess, _travel: answer
+        )
+
+    assert advanced(problem(1e-5, 2e-3), rest, 1e-6) is not None
+    assert advanced(problem(1e-3, 0.0), rest, 1e-6) is None
