@@ -98,11 +98,7 @@ def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
     if isinstance(error, SpecError):
         yield from (asdict(problem) for problem in error.problems)
     else:
-        yield {"message": _sentence(error)}
-
-
-def _sentence(error: BaseException) -> str:
-    return shortened(_told(error))
+        yield {"message": shortened(_told(error))}
 
 
 def _told(error: BaseException) -> str:

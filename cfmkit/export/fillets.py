@@ -17,7 +17,6 @@ from cfmkit.export.contours import Arc, Contour, Line, Smooth
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Edge
 
 SMOOTH = math.radians(0.5)
@@ -109,7 +108,7 @@ def _between_lines(before: Line, after: Line, radius: float, side: float) -> tup
 def _onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
     """Return the arc from a line to the smooth edge that begins at its end."""
     way, start = _direction(line, -1), line.ends[0]
-    points, tangents = (_complex(values) for values in (smooth.points, smooth.tangents))
+    points, tangents = (np.asarray(values[:, 0] + 1j * values[:, 1]) for values in (smooth.points, smooth.tangents))
     centers = points - 1j * side * radius * tangents  # of arcs that touch the smooth edge
     over = ((centers - start) / way).imag + side * radius  # how far these are from touching the line
     beyond = np.flatnonzero(over[:-1] * over[1:] <= 0)
@@ -136,10 +135,6 @@ def _arc(center: complex, radius: float, first: complex, last: complex, side: fl
     """Return the arc that turns towards the waste: clockwise where the material is on the left."""
     start, turn = float(np.angle(first - center)), float(np.angle((last - center) / (first - center)))
     return Arc(_pair(center), radius, start, start - side * abs(turn))
-
-
-def _complex(points: FloatArray) -> np.ndarray:
-    return np.asarray(points[:, 0] + 1j * points[:, 1])
 
 
 def _pair(point: complex) -> tuple[float, float]:

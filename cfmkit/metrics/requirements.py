@@ -287,7 +287,7 @@ def _outcome(
     surveys: Surveys,
 ) -> Outcome:
     definition = _meant(requirement, table[split_name(requirement.metric)[0]])
-    window = _window(requirement, result)
+    window = window_of(result, requirement.over)
     values = _values(requirement.metric, definition, survey_of(result, window, surveys), result)
     limits = Bounds.of(requirement, definition.dimension)
     value = min(values, key=limits.margin)
@@ -309,10 +309,6 @@ def _outcome(
 def _meant(requirement: Requirement, items: Sequence[Definition]) -> Definition:
     """Return the definition in whose dimension the bounds are: without a curve nothing else tells angle from length."""
     return next((item for item in items if not list(_bound_faults(requirement, (item.dimension,)))), items[0])
-
-
-def _window(requirement: Requirement, result: Result) -> Window | None:
-    return window_of(result, requirement.over)
 
 
 def _values(name: str, definition: Definition, view: Survey | None, result: Result) -> tuple[Value, ...]:

@@ -80,7 +80,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
     """
     try:
         _keep_old(root, plan)
-        safe_disk_changes.atomic_write(root / RUN / PLAN, _to_json(plan))
+        safe_disk_changes.atomic_write(root / RUN / PLAN, json.dumps(asdict(plan), indent=1).encode())
         _roll_forward(root, plan)
     except BaseException as error:
         with suppress(OSError, OutputError):
@@ -216,10 +216,6 @@ def _parents(name: str) -> list[str]:
     """Return the folders above a name, outermost first: ``a/b/c`` -> ``a``, ``a/b``."""
     parts = name.split("/")
     return ["/".join(parts[:count]) for count in range(1, len(parts))]
-
-
-def _to_json(plan: CommitPlan) -> bytes:
-    return json.dumps(asdict(plan), indent=1).encode()
 
 
 def _read_plan(root: Path, name: str) -> CommitPlan:

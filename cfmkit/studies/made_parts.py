@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import CfmError, Problem, SpecError
+from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.metrics import split_name, windows_judged
 from cfmkit.metrics.requirements import Bounds
@@ -414,13 +414,9 @@ def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShar
             return None, f"the specification as given has no curve: {result.message}"
         return judge(made, made.drawn(), result, run, "parts as given").share(), ""
     except SpecError as error:
-        return None, "; ".join(_told(one) for one in error.problems)
+        return None, "; ".join(f"{one.path}: {one.message}" for one in error.problems)
     except CfmError as error:
         return None, str(error)
-
-
-def _told(problem: Problem) -> str:
-    return f"{problem.path}: {problem.message}"
 
 
 __all__ = ["DesignTolerances", "Yields", "common", "judge", "tolerances_of", "yields_of"]

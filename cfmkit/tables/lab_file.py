@@ -434,7 +434,7 @@ def column_of(columns: Sequence[ColumnInfo], dimension: str, file: str) -> Colum
     """
     found = [column for column in columns if column.dimension == dimension]
     found = [column for column in found if column.told] or found
-    named = [column for column in found if _words(column.name) in _WORDS[dimension]]
+    named = [column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _WORDS[dimension]]
     chosen = found if len(found) < 2 else named
     if len(chosen) == 1 or not found:
         return chosen[0] if chosen else None
@@ -443,7 +443,3 @@ def column_of(columns: Sequence[ColumnInfo], dimension: str, file: str) -> Colum
         f"{file}: {len(found)} columns could be the {ROLES[dimension]}: "
         f"{', '.join(column.label for column in found)}; choose with {options}"
     )
-
-
-def _words(name: str) -> str:
-    return re.sub(r"[\W_\d]+", " ", name).strip().lower()

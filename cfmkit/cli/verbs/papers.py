@@ -65,7 +65,7 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
         f"{len(wrong)} verdicts do not hold" if wrong else "every verdict that was computed holds"
     )
     data = {"message": told, "papers": records, "counts": counts}
-    errors = tuple({"message": _complaint(one)} for one in wrong)
+    errors = tuple({"message": f"{one['paper']}, {one['place']}, {one['what']}: {one['trouble']}"} for one in wrong)
     return Answer(
         data,
         _page(records, counts, told, bool(terminal.verbose)),
@@ -77,10 +77,6 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
 
 def _outcome(done: Any) -> dict[str, Any]:
     return {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
-
-
-def _complaint(record: Record) -> str:
-    return f"{record['paper']}, {record['place']}, {record['what']}: {record['trouble']}"
 
 
 def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbose: bool) -> Iterator[Block]:

@@ -364,17 +364,13 @@ def stacked(network: Network, driven: str, count: int, pitch: float | None = Non
             if clamped:
                 links.append(Link(below, _named(name, stage)))
         for name, beam in network.beams.items():
-            beams[_named(name, stage)] = _moved_beam(beam, stage)
+            beams[_named(name, stage)] = replace(beam, start=_named(beam.start, stage), end=_named(beam.end, stage))
         links += [Link(_named(link.master, stage), _named(link.node, stage)) for link in network.links]
     return Network(nodes, beams, tuple(links)), _named(driven, count)
 
 
 def _named(name: str, stage: int) -> str:
     return name if stage == 1 else f"{name}.{stage}"
-
-
-def _moved_beam(beam: Beam, stage: int) -> Beam:
-    return replace(beam, start=_named(beam.start, stage), end=_named(beam.end, stage))
 
 
 def _step(network: Network, driven: str, pitch: float | None) -> tuple[float, float]:

@@ -124,7 +124,7 @@ def evaluated(
     if policy != "resample":
         return Blocks(points, outputs, failed)
     drawn, replaced = count, 0
-    while (bad := _incomplete(outputs)).any() and drawn < MOST_DRAWN * count:
+    while (bad := np.asarray(np.isnan(outputs).any(axis=(1, 2)))).any() and drawn < MOST_DRAWN * count:
         wanted = int(bad.sum())
         fresh = draw(drawn, wanted)
         drawn, replaced = drawn + wanted, replaced + wanted
@@ -133,10 +133,6 @@ def evaluated(
         points, outputs = points.copy(), outputs.copy()
         points[bad], outputs[bad] = fresh, new
     return Blocks(points, outputs, failed, replaced)
-
-
-def _incomplete(outputs: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return np.asarray(np.isnan(outputs).any(axis=(1, 2)))
 
 
 def _failures(outputs: FloatArray) -> int:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.roller_curves_and_motion import Machine
     from cfmkit.families.cam.dynamics.solution import MotionSolution
 
 SLOW = 1.0
@@ -93,7 +92,7 @@ def slow_force(moved: MotionSolution) -> FloatArray:
 def _angle_effect(moved: MotionSolution) -> float:
     """Return how much larger the force at the end is, at rest, than with flanks at the right angles."""
     machine, end = moved.build.machine, moved.history.moment.position[-1:]
-    right = _upright(machine)
+    right = replace(machine, right=replace(machine.right, angle=0.0), left=replace(machine.left, angle=0.0))
     if right == machine:
         return 0.0
     low, high = right.span
@@ -101,10 +100,6 @@ def _angle_effect(moved: MotionSolution) -> float:
         return np.nan
     upward = moved.build.motion.stroke > 0
     return float(statics(machine, end, upward).force[0] / statics(right, end, upward).force[0]) - 1.0
-
-
-def _upright(machine: Machine) -> Machine:
-    return replace(machine, right=replace(machine.right, angle=0.0), left=replace(machine.left, angle=0.0))
 
 
 def _largest(values: FloatArray) -> float:

@@ -207,7 +207,7 @@ class Chain:
         path = neighbouring(known, self.build(self.points), drive)
         first = _beginning(path, drive) if other else 0
         if other and 0 < first < len(drive.points):
-            path = _from_its_limit(_since(path, first), drive.points[:first])
+            path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
             return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
         return self._judged(path, wanted)
@@ -271,11 +271,6 @@ def _beginning(path: Path, drive: Displacement) -> int:
     found[path.requested] = True
     found &= drive.points != 0.0
     return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
-
-
-def _since(path: Path, first: int) -> Path:
-    """Return a path from the point with a number on."""
-    return part_of(path, path.requested >= first)
 
 
 def _from_its_limit(path: Path, missing: FloatArray) -> Path:

@@ -296,7 +296,7 @@ def _climb(start: StripStarts, steps: tuple[int, ...], factors: FloatArray | Non
         program = StripProgram(goal, now)
         bounds = _bounds(task, ranges, form, count)
         begin = np.append(x, last) if program.extra else x
-        effort = (20, 1e-3) if coarse else (100, _precise(task))
+        effort = (20, 1e-3) if coarse else (100, 1e-9 if task.goal == "rms" else 1e-6)
         descent = descend(program, begin, bounds, *effort, start.clock)
         x = descent.z[: now.size]
         last = descent.z[-1]
@@ -321,10 +321,6 @@ def _tightened(start: StripStarts) -> FoundStrip | None:
             return None
         x, last = descent.z[: form.size], descent.z[-1]
     return FoundStrip(task, form, ranges, program, descent, uniform)
-
-
-def _precise(task: StripTask) -> float:
-    return 1e-9 if task.goal == "rms" else 1e-6
 
 
 def _refined(values: FloatArray, count: int) -> FloatArray:

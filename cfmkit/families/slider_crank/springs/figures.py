@@ -271,13 +271,9 @@ def springs(result: Result) -> Figure:
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
     slope = [Series(solution.stiffness, "", INK)]
     upper = Diagram(solution.motion, over, Scale(f"{drive} of a spring", drive), series)
-    lower = Diagram(solution.motion, over, Scale("stiffness", rate), slope, _zero())
+    lower = Diagram(solution.motion, over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
     heading = Heading.of(result, f"what each spring adds to the {drive}, and the slope of all")
     return diagram_figure(heading, [upper, lower])
-
-
-def _zero() -> list[Limit]:
-    return [Limit(0.0, "zero stiffness")]
 
 
 @styled
