@@ -50,9 +50,9 @@ class Curve(ShortRepr):
     effort : (n,) array
         Force [N] or torque [N m] at those places.
     branch : (n,) array of str
-        Name of the branch each point belongs to ("load", "unload", ...).
+        Name of the branch each point belongs to ("load", "unload", ...); one name for all points is enough.
     stable : (n,) array of bool
-        Whether the equilibrium is stable under the drive.
+        Whether the equilibrium is stable under the drive; one value for all points is enough.
     extra : mapping
         Further columns by name, e.g. ``contact_force``.
     kind : {"force", "torque"}
@@ -65,8 +65,8 @@ class Curve(ShortRepr):
 
     motion: FloatArray
     effort: FloatArray
-    branch: NDArray[np.str_]
-    stable: NDArray[np.bool_]
+    branch: NDArray[np.str_] = "load"  # type: ignore[assignment]  # an array as soon as there is a curve
+    stable: NDArray[np.bool_] = True  # type: ignore[assignment]
     extra: Mapping[str, Column] = field(default_factory=dict)
     kind: Kind = "force"
     label: Mapping[str, tuple[float | str, str]] = field(default_factory=dict)
@@ -74,7 +74,9 @@ class Curve(ShortRepr):
     def __post_init__(self) -> None:
         """Freeze the arrays and check that they belong together."""
         for name, dtype in (("motion", float), ("effort", float), ("branch", np.str_), ("stable", bool)):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+            given = getattr(self, name)
+            value = np.full(len(self.motion), given) if isinstance(given, str | bool) else given
+            object.__setattr__(self, name, read_only(value, dtype))
         object.__setattr__(self, "extra", MappingProxyType(Named(self.extra)))
         object.__setattr__(self, "label", MappingProxyType(dict(self.label)))
         lengths = {self.motion.shape, self.effort.shape, self.branch.shape, self.stable.shape}

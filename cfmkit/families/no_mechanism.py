@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec
 
 from cfmkit.errors import SolutionError
 from cfmkit.results import Design, Finding, Result, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.specs.spec import Spec
+
+Given = ParamSpec("Given")
 
 
 class CannotBuild(SolutionError):
@@ -33,6 +36,21 @@ class Infeasible(Exception):
         """Keep the reason and the nearest feasible values by path."""
         self.finding, self.nearest = found, dict(nearest or {})
         super().__init__(found.message)
+
+
+def refusals_answered(design: Callable[Given, Design]) -> Callable[Given, Design]:
+    """Return a design function whose answer is the reason where it raises `Infeasible` or `CannotBuild`."""
+
+    @wraps(design)
+    def answered(*given: Given.args, **named: Given.kwargs) -> Design:
+        try:
+            return design(*given, **named)
+        except Infeasible as problem:
+            return no_design(problem.finding, problem.nearest)
+        except CannotBuild as problem:
+            return no_design(problem.finding)
+
+    return answered
 
 
 def no_result(spec: Spec, found: Finding) -> Result:

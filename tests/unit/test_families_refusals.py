@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
-from cfmkit.families.no_mechanism import CannotBuild, no_design, no_result
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, no_result, refusals_answered
 from cfmkit.results import Finding, Status
 from cfmkit.specs.spec import Spec
 
@@ -62,3 +62,17 @@ def test_targets_that_cannot_be_met_are_a_design_without_a_specification():
     assert (design.status, design.message, design.warnings) == (Status.INFEASIBLE, SHORT.message, (SHORT,))
     assert design.nearest_feasible == nearest
     assert no_design(SHORT).nearest_feasible == {}
+
+
+@pytest.mark.parametrize(
+    ("problem", "nearest"),
+    [(CannotBuild(SHORT), {}), (Infeasible(SHORT, {"design.force": "40 N"}), {"design.force": "40 N"})],
+)
+def test_what_a_design_raises_is_its_answer(problem, nearest):
+    @refusals_answered
+    def design():
+        raise problem
+
+    found = design()
+    assert found.status is Status.INFEASIBLE
+    assert (found.message, found.nearest_feasible) == (SHORT.message, nearest)

@@ -48,6 +48,14 @@ def test_a_curve_becomes_the_columns_of_the_contract_in_border_units():
     ]
 
 
+def test_a_curve_of_one_branch_that_is_stable_needs_no_columns_of_them():
+    steps = np.arange(3.0)
+    short, long = Curve(steps, steps), Curve(steps, steps, np.full(3, "load"), np.ones(3, dtype=bool))
+    assert to_csv(curve_table([short])) == to_csv(curve_table([long]))
+    assert short.branches == ("load",)
+    assert Curve(steps, steps, "unload", False).on("unload").stable.tolist() == [False] * 3
+
+
 def test_a_torque_curve_has_angle_and_torque():
     result = curve_table([curve(kind="torque")])
     assert result.headers == ("branch", "angle [deg]", "torque [N*mm]", "stable")

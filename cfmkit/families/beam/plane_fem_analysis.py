@@ -383,7 +383,7 @@ def _curve(solution: SolidSolution) -> Curve:
         "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
     } | _outputs(solution)
     kind: Kind = "torque" if _turns(solution.spec) else "force"
-    return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), solution.stable, extra, kind)
+    return Curve(motion, solution.effort, stable=solution.stable, extra=extra, kind=kind)
 
 
 def _outputs(solution: SolidSolution) -> dict[str, Column]:

@@ -38,7 +38,7 @@ from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
@@ -66,6 +66,7 @@ class Choice:
     """Elongation of the springs at the start [m]."""
 
 
+@refusals_answered
 def design(spec: CamSpec, run: Run) -> Design:
     """Return a complete specification whose cam meets the targets of the `design` block.
 
@@ -84,18 +85,13 @@ def design(spec: CamSpec, run: Run) -> Design:
     target = spec.design
     if target is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force' and 'stroke'")
-    try:
-        return _design(spec, target)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    return _design(spec, target)
 
 
+@refusals_answered
 def _with_next(spec: CamSpec, target: CamDesign, factor: float, choice: Choice) -> Design:
     """Return the design with springs that are not the best of the catalogue."""
-    try:
-        return _with_choice(spec, target, factor, choice)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    return _with_choice(spec, target, factor, choice)
 
 
 def _design(spec: CamSpec, target: CamDesign) -> Design:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import at_least, mm, mpa, newton
-from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design, refusals_answered
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, share_of
 from cfmkit.families.vcfm.leaf_sizing import (
@@ -85,6 +85,7 @@ def design(spec: VcfmSpec, run: Run) -> Design:
     return replace(found, nearest_feasible=nearest if last.status is Status.COMPLETE else {})
 
 
+@refusals_answered
 def _attempt(spec: VcfmSpec) -> Design:
     target, allowable = spec.design, spec.mechanism.allowable_stress
     if target is None:
@@ -97,15 +98,12 @@ def _attempt(spec: VcfmSpec) -> Design:
     if target.level <= 0:
         told = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"
         return no_design(finding("target_curve", f"{told}: it must be above 0 there ('design.target')"))
-    try:
-        sizes = closed_form(spec, target)
-        active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
-        if target.refine:
-            sizes = refined(spec, target, sizes)
-            check_width(spec, target, sizes.leaf)
-            check_room(target, sizes)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    sizes = closed_form(spec, target)
+    active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
+    if target.refine:
+        sizes = refined(spec, target, sizes)
+        check_width(spec, target, sizes.leaf)
+        check_room(target, sizes)
     made = completed(written(spec, sizes), target, sizes.linear, sizes.leaf.angle)
     return Design(made, Status.COMPLETE, active_bounds=tuple(active))
 

@@ -11,7 +11,7 @@ from math import hypot, sqrt
 
 from cfmkit.families.base import Run
 from cfmkit.families.findings import at_least, at_most, mm
-from cfmkit.families.no_mechanism import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, refusals_answered
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit_oblique.model import finding
@@ -21,18 +21,16 @@ LEAST, MOST = 0.01, 0.99
 """Of a over L0: springs of a hundred half spans, and springs compressed by a hundredth, which play would use up."""
 
 
+@refusals_answered
 def design(spec: ObliqueSpec, run: Run) -> Design:
     """Return the shortest springs that keep the force within the tolerance over the range; the half span stays."""
     wish, part = spec.design, spec.mechanism
     if wish is None:
         return Design(spec, Status.COMPLETE)
-    try:
-        free = part.half_span / _ratio(wish, part.half_span)
-        height = sqrt((free - part.half_span) * (free + part.half_span))
-        end = height + 0.5 * wish.range
-        _coils_stay_apart(part, end)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    free = part.half_span / _ratio(wish, part.half_span)
+    height = sqrt((free - part.half_span) * (free + part.half_span))
+    end = height + 0.5 * wish.range
+    _coils_stay_apart(part, end)
     vertical = wish.force / height
     changes: dict[str, object] = {
         "mechanism.oblique.stiffness": 0.5 * vertical * part.half_span / (free - part.half_span),

@@ -125,7 +125,7 @@ def analyze(force: Callable[[Solution, FloatArray], FloatArray], spec: ObliqueSp
         spec=solution.spec,
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=warnings[0].message if short else "",
-        curves=(Curve(x, force(solution, x), np.full(len(x), "load"), np.ones(len(x), dtype=bool), extra),),
+        curves=(Curve(x, force(solution, x), extra=extra),),
         values=quantities(DEFINITIONS, _numbers(solution)),
         warnings=warnings,
         travel=(0.0, solution.travel),

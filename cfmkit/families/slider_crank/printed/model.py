@@ -163,8 +163,7 @@ def _curve(solution: Solution) -> Curve:
         "guide_moment": Column(solution.guide_moment, "torque"),
         "energy": Column(solution.energy, "energy"),
     }
-    points = len(solution.travel)
-    return Curve(solution.travel, solution.force, np.repeat("load", points), solution.stable, extra)
+    return Curve(solution.travel, solution.force, stable=solution.stable, extra=extra)
 
 
 def _values(solution: Solution) -> Mapping[str, Quantity]:

@@ -236,7 +236,7 @@ def _curve(solution: SolidSolution) -> Curve:
         "max_stress": Column(solution.stress, "stress"),
         "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
     }
-    return Curve(travel, solution.force, np.repeat("load", len(travel)), stable[before], extra)
+    return Curve(travel, solution.force, stable=stable[before], extra=extra)
 
 
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:

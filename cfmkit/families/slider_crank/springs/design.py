@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design, refusals_answered
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.bought_springs import choose, least_deviation, next_sets
@@ -66,6 +66,7 @@ EFFORT = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
 
 
+@refusals_answered
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
 
@@ -84,18 +85,14 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     wanted = spec.design
     if wanted is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
-    try:
-        solved, search = _searched(spec, wanted, run)
-        solved = _compensated(solved)
-        found = _made(solved, search)
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
-    except CannotBuild as problem:
-        return no_design(problem.finding)
+    solved, search = _searched(spec, wanted, run)
+    solved = _compensated(solved)
+    found = _made(solved, search)
     others = range(NEXT if solved.bought else 0)
     return replace(found, next_best=tuple(partial(_with_next, solved, rank) for rank in others))
 
 
+@refusals_answered
 def _with_next(solved: Solved, rank: int) -> Design:
     """Return the design with springs that are not the best of the catalogue, with the same lengths."""
     goal = solved.task.goal(solved.window, _places(solved.task.wanted))
@@ -103,20 +100,9 @@ def _with_next(solved: Solved, rank: int) -> Design:
     if goal is None or rank >= len(sets):
         return no_design(finding("no_spring_fits", "no other springs of the catalogue hold the target"))
     one = sets[rank]
-    try:
-        return _made(
-            replace(
-                solved,
-                rates=one.rates,
-                deviation=one.deviation,
-                rms=goal.rms(one.rates),
-                bought=one.options,
-                exact=False,
-            ),
-            None,
-        )
-    except Infeasible as problem:
-        return no_design(problem.finding, problem.nearest)
+    rms = goal.rms(one.rates)
+    bought = replace(solved, rates=one.rates, deviation=one.deviation, rms=rms, bought=one.options, exact=False)
+    return _made(bought, None)
 
 
 def _made(solved: Solved, search: Lowest | None) -> Design:

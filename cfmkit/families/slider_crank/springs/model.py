@@ -243,10 +243,9 @@ def _curve(solution: Solution) -> Curve:
         "coupler_force": Column(solution.reactions[0], "force"),
         "guide_force": Column(solution.reactions[1], "force"),
     }
-    points = len(solution.motion)
     if solution.ways is not None:
         return _loop(solution, extra)
-    return Curve(solution.motion, solution.effort, np.repeat("load", points), np.ones(points, dtype=bool), extra, drive)
+    return Curve(solution.motion, solution.effort, extra=extra, kind=drive)
 
 
 def _loop(solution: Solution, extra: dict[str, Column]) -> Curve:
