@@ -290,12 +290,20 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
 
     Where its curve ends a little earlier they are those at its end; None where it does not get to what must be reached.
     """
+    found = _quickly(spec, places)
+    if found is not None:
+        return found
+    return _on_curves(family(spec.family).analyze(spec, replace(run, wanted=frozenset())), places, reached)
+
+
+def _quickly(spec: Spec, places: FloatArray) -> Sampled | None:
+    """Return effort and stress of a part at places by the family's quick way; None where it has none."""
     quick = family(spec.family).sampled
-    if quick is not None:
-        found: Sampled | None = function_named(quick)(spec, places)
-        if found is not None:
-            return found
-    result = family(spec.family).analyze(spec, run)
+    return None if quick is None else function_named(quick)(spec, places)
+
+
+def _on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
+    """Return effort and stress at places of the curves of a part, as `sampled_of` does."""
     if result.status is not Status.COMPLETE or not result.curves:
         return None
     curve, effort, stress = result.curve, {}, []
@@ -325,22 +333,30 @@ def numbers_in(seen: Sampled) -> FloatArray:
 
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
     """Return what rows look at of a part, (q,); None where it has no such numbers; `reached`: see `sampled_of`."""
-    found = sampled_of(spec, rows.places, run, reached)
+    found, result = _quickly(spec, rows.places), None
+    if found is None:
+        result = _looked_at(spec, rows, run)
+        found = _on_curves(result, rows.places, reached)
     if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
         return None
     numbers = [numbers_in(found)]
     if rows.metrics:
-        metrics = metrics_of_part(spec, rows, run)
+        metrics = metrics_of_part(spec, rows, run) if result is None else metrics_in(result, rows)
         if metrics is None:
             return None
         numbers.append(metrics)
     return np.concatenate(numbers)
 
 
+def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:
+    """Return the analysis of a part, without values and findings that its rows do not look at."""
+    study = Study(spec, (), rows.metrics, lean=True)
+    return family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
+
+
 def metrics_of_part(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
     """Return the last of these numbers alone, metrics of a whole analysis; None of a part without a curve."""
-    study = Study(spec, (), rows.metrics, lean=True)
-    result = family(spec.family).analyze(spec, replace(run, wanted=study.wanted))
+    result = _looked_at(spec, rows, run)
     return metrics_in(result, rows) if result.curves else None
 
 

@@ -14,10 +14,18 @@ from cfmkit.cli.main import main
 from cfmkit.designing.robust_design import RobustProblem, with_margins
 from cfmkit.families.base import Run
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
+from cfmkit.families.vcfm import model
+from cfmkit.families.vcfm.scalar_results import values_of
 from cfmkit.specs.units import Share
 from cfmkit.studies import redesign_for_yield
 from cfmkit.studies.redesign_for_yield import with_design_margins
-from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of, stated_places
+from cfmkit.studies.requirement_constraints import (
+    numbers_of,
+    places_of,
+    rows_of,
+    sampled_of,
+    stated_places,
+)
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
@@ -53,6 +61,22 @@ def test_a_part_that_ends_before_a_stated_window_is_bad_for_the_search_as_for_th
     sight = replace(sight, spec=design.replace({"requirements": inner}))
     assert stated_places(sight.spec) == (0.002, 0.002)
     assert all(sight.is_good(np.empty(0), one) for one in (larger, smaller))
+
+
+def test_a_part_is_analysed_once_for_its_forces_and_metrics_without_what_nobody_looks_at(monkeypatch):
+    """Every part was analysed twice, with all values and findings: 52 ms of processor time instead of 8."""
+    spec = cfmkit.load("configs/vcfm_titanium.yaml")
+    result, places = cfmkit.analyze(spec), places_of(cfmkit.analyze(spec))
+    seen = sampled_of(spec, places, Run())
+    rows = rows_of(result, seen, places)
+    assert [one.name for one in rows.metrics] == ["force_change_max"]
+    found = []
+    monkeypatch.setattr(model, "values_of", lambda *given: found.append(values_of(*given)) or found[-1])
+    numbers = numbers_of(spec, rows, Run())
+    assert len(found) == 1
+    assert not {"window_length", "least_force", "bistable_stress_max"} & set(found[0])
+    full = result.values["force_change_max"].value
+    assert numbers.tolist() == [*seen.effort["load"], *seen.stress.ravel(), full]
 
 
 def test_a_part_with_few_points_is_looked_at_on_its_closed_form():

@@ -233,4 +233,4 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     # the closed form says how far back the shuttle goes; the real one is within a few percent of it
     rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
     back = 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0])
-    return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)))
+    return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)), run)

@@ -54,7 +54,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     spec : VcfmSpec
         The mechanism.
     run : Run
-        Not needed here: nothing is random.
+        Which metrics are looked at: values and findings that none of them needs are left out.
 
     Returns
     -------
@@ -62,11 +62,11 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
     made = parts(spec)
-    return result_of(solve(spec, made, LawSampler(made)))
+    return result_of(solve(spec, made, LawSampler(made)), run)
 
 
-def result_of(solution: Solution) -> Result:
-    """Return the curves of a solved mechanism, with everything that is wrong with it.
+def result_of(solution: Solution, run: Run) -> Result:
+    """Return the curves of a solved mechanism, with everything that is wrong with it, if all of it is looked at.
 
     PARTIAL if the spring closes within the travel, or a beam cannot be followed to its end.
     """
@@ -82,8 +82,8 @@ def result_of(solution: Solution) -> Result:
         status=status,
         message=_shortfall(solution) if short else "",
         curves=curves,
-        values=values_of(solution),
-        warnings=findings_of(solution),
+        values=values_of(solution, run),
+        warnings=findings_of(solution) if run.wanted is None else (),
         travel=solution.course,
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,

@@ -238,7 +238,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
-    found = result_of(solution := solve(spec, made, sampler))
+    found = result_of(solution := solve(spec, made, sampler), run)
     warnings = (*found.warnings, *_findings(spec, sampler))
     if not found.curves:
         return replace(found, warnings=warnings)

@@ -18,9 +18,10 @@ from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, 
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
     from cfmkit.families.vcfm.solution import Push, Solution
 
 
@@ -69,18 +70,23 @@ DEFINITIONS = {
 }
 
 
-def values_of(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where a value does not exist."""
+def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
+    """Return the scalar results by name, those that nobody looks at left out; None where a value does not exist."""
+    numbers: dict[str, float | None] = {}
+    for names, values in _GROUPS.items():
+        if run.wants(names):
+            numbers |= values(solution)
+    error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
+    found = {name: _quantity(name, value) for name, value in numbers.items()} | unknown_to_beams() | _bought(solution)
+    if "constant_force" in numbers and numbers["constant_force"] is None:
+        found["constant_force"] = replace(found["constant_force"], reason=_why_not_constant(solution))
+    return found if error is None else found | {name: _quantity(name, value) for name, value in error.values().items()}
+
+
+def _of_parts(solution: Solution) -> dict[str, float | None]:
     one, strip = solution.character, solution.parts.strip
     low, high = one.linear
-    nominal, window = solution.nominal, solution.windows[0]
-    alone = solution.spring_alone
-    span = solution.window[1] - solution.window[0]
-    end = solution.window[1]
-    stresses = solution.largest_stresses(solution.pushes, (end, np.inf))
-    (leaves, spring), over_travel = stresses[:, 0].max(axis=0).tolist(), float(stresses[:, 1].max())
-    allowed = solution.spec.mechanism.allowable_stress
-    numbers: dict[str, float | None] = {
+    return {
         "positive_stiffness": one.positive_stiffness,
         "negative_stiffness": one.negative_stiffness,
         "first_stiffness": one.first_stiffness,
@@ -89,26 +95,50 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "linear_start": low,
         "linear_end": high,
         "linear_stroke": high - low if np.isfinite(high - low) else 0.0,
+    }
+
+
+def _of_windows(solution: Solution) -> dict[str, float | None]:
+    window = solution.windows[0]
+    return {
         "constant_force": solution.constant_force,
         "window_start": window[0] if window else None,
         "window_end": window[1] if window else None,
         "window_length": window[1] - window[0] if window else 0.0,
         "window_force": solution.window_force,
-        "rest_position": nominal.rest,
+    }
+
+
+def _of_rest(solution: Solution) -> dict[str, float | None]:
+    return {
+        "rest_position": solution.nominal.rest,
         "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
-        "least_force": solution.least[1] if solution.least else None,
-        "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / alone if alone else None,
-        "allowable_stress": allowed,
+    }
+
+
+def _least_force(solution: Solution) -> dict[str, float | None]:
+    return {"least_force": solution.least[1] if solution.least else None}
+
+
+def _mismatch(solution: Solution) -> dict[str, float | None]:
+    one, alone, span = solution.character, solution.spring_alone, solution.window[1] - solution.window[0]
+    difference = abs(one.positive_stiffness - one.negative_stiffness)
+    return {
+        "stiffness_mismatch": difference * span / alone if alone else None,
+        "allowable_stress": solution.spec.mechanism.allowable_stress,
+    }
+
+
+def _stresses(solution: Solution) -> dict[str, float | None]:
+    stresses = solution.largest_stresses(solution.pushes, (solution.window[1], np.inf))
+    (leaves, spring), over_travel = stresses[:, 0].max(axis=0).tolist(), float(stresses[:, 1].max())
+    allowed = solution.spec.mechanism.allowable_stress
+    return {
         "spring_stress_max": spring if solution.spec.mechanism.springs is None else None,
         "bistable_stress_max": leaves,
         "travel_stress_max": over_travel,
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
-    } | _adjustment(solution)
-    error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
-    found = {name: _quantity(name, value) for name, value in numbers.items()} | unknown_to_beams() | _bought(solution)
-    if solution.constant_force is None:
-        found["constant_force"] = replace(found["constant_force"], reason=_why_not_constant(solution))
-    return found if error is None else found | {name: _quantity(name, value) for name, value in error.values().items()}
+    }
 
 
 def _why_not_constant(solution: Solution) -> str:
@@ -158,6 +188,27 @@ def _adjustment(solution: Solution) -> dict[str, float | None]:
         return {"force_change_max": None, "force_per_preload": None}
     change, preload = max(changes, key=lambda pair: abs(pair[0]))
     return {"force_change_max": change, "force_per_preload": change / preload}
+
+
+_GROUPS: Mapping[tuple[str, ...], Callable[[Solution], dict[str, float | None]]] = {
+    (
+        "positive_stiffness",
+        "negative_stiffness",
+        "first_stiffness",
+        "rise",
+        "slenderness",
+        "linear_start",
+        "linear_end",
+        "linear_stroke",
+    ): _of_parts,
+    ("constant_force", "window_start", "window_end", "window_length", "window_force"): _of_windows,
+    ("rest_position", "rest_shift_max"): _of_rest,
+    ("least_force",): _least_force,
+    ("stiffness_mismatch", "allowable_stress"): _mismatch,
+    ("spring_stress_max", "bistable_stress_max", "travel_stress_max", "travel_safety_factor"): _stresses,
+    ("force_change_max", "force_per_preload"): _adjustment,
+}
+"""Values that are computed together, in the order of the page."""
 
 
 PLACES = 201
