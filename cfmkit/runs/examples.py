@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError, UsageError, visible
-from cfmkit.runs.shipped import shipped_folder
+from cfmkit.runs.find_shipped_folder import shipped_folder
 
 if TYPE_CHECKING:
     import os

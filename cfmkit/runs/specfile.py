@@ -277,7 +277,7 @@ def _similar(name: str) -> str:
 
 def _shipped(base: str) -> str:
     """Return how an example of that name is had: pages name it as it lies in the sources."""
-    from cfmkit.runs.shipped import shipped_folder
+    from cfmkit.runs.find_shipped_folder import shipped_folder
 
     try:
         there = next(shipped_folder("configs", "cam.yaml").rglob(glob.escape(base)), None) if base else None

@@ -23,10 +23,10 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.evaluation import plan_of
 from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL, clopper_pearson, wilson

@@ -18,7 +18,7 @@ from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
 from cfmkit.specs.units import Share
-from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family
+from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import Work
-from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.summary import Summary, main_columns

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cam_support import MM, at, cam
 
-from cfmkit.families.cam.geometry.cut import cut
+from cfmkit.families.cam.geometry.flank_from_roller_path import cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 

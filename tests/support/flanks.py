@@ -13,7 +13,7 @@ from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.numerics.rigid_point_registration import turned
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 
 MOVE = np.radians(0.3), np.array([1.5e-3, -0.8e-3])
 """The rigid motion of the reference note's case; its inverse is -0.3 deg, (-1.49579067, 0.80784298) mm."""

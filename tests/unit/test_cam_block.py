@@ -9,9 +9,9 @@ from cfmkit.families.cam.many_designs.measures import CYCLES, KNOWN, WINDOWED
 from cfmkit.families.cam.many_designs.model import VARIED, analyze_block
 from cfmkit.results import Status
 from cfmkit.studies import vectorised_blocks
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.row_blocks_for_journal import joined

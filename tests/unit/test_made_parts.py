@@ -14,8 +14,8 @@ from cfmkit.errors import SpecError
 from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.made_parts import common, judge, yields_of
-from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
 

@@ -10,8 +10,8 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import check, definitions, known_metrics, metrics_by_name, other_name, values_of_family
 from cfmkit.metrics.metric_definitions import Definition
+from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import run
-from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare

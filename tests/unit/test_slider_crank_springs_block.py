@@ -13,7 +13,7 @@ from cfmkit.families.slider_crank.springs.many_designs.requested_values_and_find
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.study_figure_data import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
-from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import grid, zipped
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.varied_axes import axes, wishes

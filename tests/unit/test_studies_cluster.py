@@ -12,8 +12,8 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import UsageError
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
-from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool

@@ -12,9 +12,9 @@ from cfmkit.families import family
 from cfmkit.families.base import BlockAnswer
 from cfmkit.results import Finding, Status
 from cfmkit.store import origin, safe_disk_changes
+from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
 from cfmkit.studies.engine import Work, compact, run
 from cfmkit.studies.journal import Journal
-from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool

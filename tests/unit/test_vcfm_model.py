@@ -27,8 +27,8 @@ from cfmkit.families.vcfm.solution import force_of
 from cfmkit.metrics import Window, evaluate
 from cfmkit.metrics.longest_interval_in_band import longest_window
 from cfmkit.results import Status
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
-from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.varied_axes import axes, wishes

@@ -10,7 +10,7 @@ from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_block_types import Paragraph, Verbatim, field, listed
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError, visible
-from cfmkit.runs.shipped import shipped_folder
+from cfmkit.runs.find_shipped_folder import shipped_folder
 
 if TYPE_CHECKING:
     from pathlib import Path

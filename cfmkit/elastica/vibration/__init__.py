@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
+from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
 if TYPE_CHECKING:
     from cfmkit.elastica.vibration.natural_frequencies import Frequencies, frequencies

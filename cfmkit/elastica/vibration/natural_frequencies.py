@@ -20,7 +20,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
-    from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
+    from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
     from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearised
 
 _AT_ONCE = 16  # points whose matrices are in memory together: some megabytes

@@ -21,7 +21,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
-    from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
+    from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
 _MOST = 4000  # unknowns: dense matrices of this size take 130 MB each, and half a minute per pose
 

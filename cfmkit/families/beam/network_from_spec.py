@@ -26,7 +26,7 @@ import numpy as np
 from cfmkit import elastica as engine
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.vibration.densities_and_node_masses import NetworkMasses
+from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 from cfmkit.families.beam.network_elements.spec import HELD
 from cfmkit.specs.units import between
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
-from cfmkit.families.cam.geometry.roller_track_on_cam import NoTrack, Track
+from cfmkit.families.cam.geometry.roller_centre_track import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import Assembly

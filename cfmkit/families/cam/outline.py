@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.spec import CamSpec, Plate
 
     Profiles = tuple[CamProfile, CamProfile]

@@ -14,7 +14,7 @@ from cfmkit.families.findings import at_most, mm, newton
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.families.cam.spec import CamDesign
     from cfmkit.numerics.monotone_interpolation import ThroughPoints
     from cfmkit.specs.evaluable_target_curve import TargetCurve

@@ -14,7 +14,7 @@ from cfmkit.metrics import check, values_of_family
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.units import Share, border_unit, format_short, to_border
-from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together

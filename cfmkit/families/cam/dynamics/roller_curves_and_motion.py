@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
-    from cfmkit.families.cam.geometry.roller_track_on_cam import Track
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
+    from cfmkit.families.cam.geometry.roller_centre_track import Track
 
     ComplexArray = NDArray[np.complex128]
 

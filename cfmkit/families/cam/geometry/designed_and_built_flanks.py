@@ -11,7 +11,7 @@ from cfmkit.numerics.rigid_point_registration import CurveFrame
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
     from cfmkit.numerics.smoothing_spline import SmoothedFunction
 
 

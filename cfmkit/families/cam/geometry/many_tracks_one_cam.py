@@ -1,6 +1,6 @@
 """Tracks of many rollers and braces on one cam, solved together.
 
-The formulas are those of `roller_track_on_cam.Track`, in the same order; whatever that finds by a root of one cam is
+The formulas are those of `roller_centre_track.Track`, in the same order; whatever that finds by a root of one cam is
 found here for all of them at once. Which of the parts cannot run on the cam is an array, no exception.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.roller_track_on_cam import KNOTS, Pivot, pivot_angle
+from cfmkit.families.cam.geometry.roller_centre_track import KNOTS, Pivot, pivot_angle
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.numerics.roots import invert_increasing
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 
 HALVINGS = 60
 """Bisections of a bracket between two knots: what is left of it is rounding."""

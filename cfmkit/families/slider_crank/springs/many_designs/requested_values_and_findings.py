@@ -18,7 +18,7 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     SNAPS,
 )
 from cfmkit.families.slider_crank.springs.findings import findings_of
-from cfmkit.families.slider_crank.springs.many_designs.same_linkage_other_springs import EACH, PLACES, Base, Slab
+from cfmkit.families.slider_crank.springs.many_designs.evaluate_many_spring_sets import EACH, PLACES, Base, Slab
 from cfmkit.families.slider_crank.springs.model import (
     RATES,
     asked_motion,

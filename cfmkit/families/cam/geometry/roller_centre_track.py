@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
 
 
 Reason = Literal["brace", "crossed", "dead"]
@@ -144,7 +144,7 @@ class Track:
         Of the brace built in [m].
     offset : float
         Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
-        material is not an offset: it is the cam cut for a larger roller (`cut.cut`).
+        material is not an offset: it is the cam cut for a larger roller (`flank_from_roller_path.cut`).
 
     Attributes
     ----------
