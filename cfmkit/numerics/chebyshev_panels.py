@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from cfmkit.arrays import ShortRepr
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -30,8 +32,8 @@ _UNIT = chebyshev.chebpts1(NODES)
 _TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
 
 
-@dataclass(frozen=True)
-class ChebyshevPanels:
+@dataclass(frozen=True, repr=False)
+class ChebyshevPanels(ShortRepr):
     """A function that is one polynomial on each panel.
 
     Attributes

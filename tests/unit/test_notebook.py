@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +117,12 @@ def texts_that_are_long(one, path="", depth=3):
             continue
         if len(repr(inside)) >= 2000:
             yield f"{path}.{name}"
-        if depth and isinstance(inside, (cfmkit.Spec, cfmkit.Curve, Table)):
+        of_the_solver = is_dataclass(inside) and (path, name) in {
+            ("", "state"),
+            ("", "closed"),
+            (".closed", "solution"),
+        }
+        if depth and (of_the_solver or isinstance(inside, (cfmkit.Spec, cfmkit.Curve, Table))):
             yield from texts_that_are_long(inside, f"{path}.{name}", depth - 1)
 
 

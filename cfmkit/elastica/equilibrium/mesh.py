@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.kernels.network_array_types import HALVES, TABLE_COLUMNS, DiscreteNetwork
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
@@ -48,8 +49,8 @@ class Mesh:
         return Mesh(times * self.segments, -(-self.steps // times))
 
 
-@dataclass(frozen=True)
-class Grid:
+@dataclass(frozen=True, repr=False)
+class Grid(ShortRepr):
     """Where the steps lie: per beam, the parameters at the step boundaries of its segments.
 
     Attributes

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.elastica.kernels import compiled
 from cfmkit.elastica.kernels.status_codes import DRIVE_RATE, REACHED, REQUESTED, SHORTNESS, SOLVED, UNSTABLE
@@ -72,8 +73,8 @@ class MarchOptions(NamedTuple):
         return np.array([*given, self.sense, self.landings])
 
 
-@dataclass(frozen=True)
-class Points:
+@dataclass(frozen=True, repr=False)
+class Points(ShortRepr):
     """Points of a path in dimensionless form: unknowns (n, size), drives (n,) and what a march stores with them."""
 
     y: FloatArray

@@ -103,5 +103,9 @@ class Packed:
     def _all(self) -> Iterable[Any]:
         return self  # type: ignore[return-value]
 
+    def __repr__(self) -> str:
+        """Return how many there are: their numbers are thousands."""
+        return f"<{type(self).__name__} of {len(list(self._all()))}>"
+
     def __getstate__(self) -> None:
         """Return nothing: in a copy, or in another process, the arrays are elsewhere."""

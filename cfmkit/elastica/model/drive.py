@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.model.network import LineLoad, LoadOn, PointLoad
 from cfmkit.errors import InputError
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Displacement:
+@dataclass(frozen=True, repr=False)
+class Displacement(ShortRepr):
     """A node is moved along a direction [rad] by `points` [m]; the effort is the force along it [N].
 
     `loads` grow with it, by so much for one metre.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -154,8 +155,8 @@ class LineLoad:
 LoadOn = PointLoad | LineLoad
 
 
-@dataclass(frozen=True)
-class Network:
+@dataclass(frozen=True, repr=False)
+class Network(ShortRepr):
     """A network: everything about it, by name, and nothing about what is done to it.
 
     Raises

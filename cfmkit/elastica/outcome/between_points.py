@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr, distinct, read_only
+from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
@@ -160,7 +160,7 @@ class BetweenPoints(ShortRepr):
         return found
 
     @cached_property
-    def knots(self) -> tuple[FloatArray, FloatArray]:
+    def knots(self) -> Several[FloatArray]:
         """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
         x, effort = self._points, self._efforts
         if len(self.corners):
@@ -173,7 +173,7 @@ class BetweenPoints(ShortRepr):
             if not len(more):
                 break
             x, effort = _inserted(x, effort, more, self.effort("", more))
-        return read_only(x), read_only(effort)
+        return Several((read_only(x), read_only(effort)))
 
     @cached_property
     def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import LineLoad
 from cfmkit.elastica.outcome.sections import Sampler, Sections, along_beam
@@ -61,8 +61,8 @@ class StressPeak:
     place: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
+@dataclass(frozen=True, eq=False, repr=False)
+class Path(ShortRepr):
     """Equilibria of a network under a drive.
 
     Attributes

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearisation
 from cfmkit.errors import InputError
 
@@ -33,8 +33,8 @@ _SPARE, _MOST_ROUNDS, _SETTLED = 16, 40, 1e-12  # modes beside those wanted; rou
 _RESOLVED = 3  # so many times the modes wanted are examined for flutter: higher ones of the basis are no modes of beams
 
 
-@dataclass(frozen=True)
-class Frequencies:
+@dataclass(frozen=True, repr=False)
+class Frequencies(ShortRepr):
     """Natural frequencies of a network about some equilibria.
 
     Attributes

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, assert_never
 import numpy as np
 
 from cfmkit import elastica as engine
+from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
 from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
@@ -52,8 +53,8 @@ _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
 _SMOOTH = 0.07  # the same where every step is a point of the curve
 
 
-@dataclass(frozen=True)
-class Assembly:
+@dataclass(frozen=True, repr=False)
+class Assembly(ShortRepr):
     """A mechanism as the engine takes it.
 
     Attributes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr, distinct, read_only
+from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.folding_path_between_points import along_the_way
 from cfmkit.elastica.outcome.path import most_stressed
@@ -118,7 +118,7 @@ class Solution(ShortRepr):
         """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
         axial, keep = self.spec.stress == "total", self.keep
         found = {name: self.path.beam_stress(name, axial) for name in self.path.layout.network.beams}
-        return {name: (value[keep], place[keep]) for name, (value, place) in found.items()}
+        return Named({name: Several((value[keep], place[keep])) for name, (value, place) in found.items()})
 
     @cached_property
     def stress(self) -> FloatArray:
@@ -127,11 +127,11 @@ class Solution(ShortRepr):
         return read_only(np.where(self.accurate, largest, np.nan))
 
     @cached_property
-    def stress_at(self) -> tuple[Any, FloatArray]:
+    def stress_at(self) -> Several[Any]:
         """The beam with the largest stress at every point of the curve, and the place on it."""
         values, places = (np.array(rows) for rows in zip(*self.stresses.values(), strict=True))
         best, pick = most_stressed(values, places), np.arange(len(self.keep))
-        return read_only(np.array(list(self.stresses))[best], np.str_), read_only(places[best, pick])
+        return Several((read_only(np.array(list(self.stresses))[best], np.str_), read_only(places[best, pick])))
 
     @cached_property
     def stable(self) -> Any:

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.numerics.roots import bracketed_root
 
@@ -114,8 +115,8 @@ class Loads:
         return self.losses is None and not any(self.sideways)
 
 
-@dataclass(frozen=True)
-class Forces:
+@dataclass(frozen=True, repr=False)
+class Forces(ShortRepr):
     """Forces on one branch, each (n,): on the slider, at a contact, in a brace [N].
 
     NaN where no finite force holds the mechanism (a jam, or a dead point under load). Where the sides are loaded

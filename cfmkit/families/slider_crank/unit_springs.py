@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -32,8 +34,8 @@ JOINTS = ("pivot", "crank_pin", "slider_pin", "slider")
 """Where the springs are: A, B, C, and the slider; rows of every (4, n) array here."""
 
 
-@dataclass(frozen=True)
-class UnitCurves:
+@dataclass(frozen=True, repr=False)
+class UnitCurves(ShortRepr):
     """What a spring of rate 1 at each joint gives along the motion, n places.
 
     Rows are those of `JOINTS`; the last row has a length [m] in the place of an angle [rad].

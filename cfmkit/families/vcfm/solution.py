@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
-@dataclass(frozen=True)
-class LeafSamples:
+@dataclass(frozen=True, repr=False)
+class LeafSamples(ShortRepr):
     """All leaves at some travels: force [N], largest stress [Pa], whether stable, whether buckled; (n,) each."""
 
     force: FloatArray
@@ -75,8 +75,8 @@ class PartSampler(Protocol):
         """Tell at which travels [m] leaves and spring were solved for, not interpolated; None where all are known."""
 
 
-@dataclass(frozen=True)
-class Push:
+@dataclass(frozen=True, repr=False)
+class Push(ShortRepr):
     """One curve: the mechanism at one preload.
 
     Attributes

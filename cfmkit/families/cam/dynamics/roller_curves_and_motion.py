@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from cfmkit.arrays import brief
 from cfmkit.numerics.roots import EPS, bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
@@ -106,6 +107,10 @@ class Moment(NamedTuple):
     position: Any
     speed: Any
     acceleration: Any
+
+    def __repr__(self) -> str:
+        """Return the three, each with a short text."""
+        return f"Moment{tuple(brief(one) for one in self)}"
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
 
 
-@dataclass(frozen=True)
-class History:
+@dataclass(frozen=True, repr=False)
+class History(ShortRepr):
     """Forces and speeds of a motion.
 
     Attributes
@@ -58,8 +58,8 @@ class History:
     on_corner: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Build:
+@dataclass(frozen=True, repr=False)
+class Build(ShortRepr):
     """A mechanism put together for a motion.
 
     Attributes

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.path import ideal_position
 from cfmkit.families.cam.geometry.slope_law import Real, brace_tangent
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
@@ -45,8 +46,8 @@ class NoTrack(ValueError):
         super().__init__(reason)
 
 
-@dataclass(frozen=True)
-class TrackStates:
+@dataclass(frozen=True, repr=False)
+class TrackStates(ShortRepr):
     """Where the right roller is, for each requested slider position.
 
     Attributes

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
 from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
@@ -75,8 +75,8 @@ class PressingEnd(Enum):
     STARTS_LATE = "this branch exists only beyond some travel"
 
 
-@dataclass(frozen=True)
-class Pressed:
+@dataclass(frozen=True, repr=False)
+class Pressed(ShortRepr):
     """The equilibria of a pressed chain.
 
     Attributes

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import Several, ShortRepr
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
@@ -285,13 +285,13 @@ class Solution(ShortRepr):
         return stiffness
 
     @cached_property
-    def reactions(self) -> tuple[FloatArray, FloatArray]:
+    def reactions(self) -> Several[FloatArray]:
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
         drive = self.effort if self.assembly.drive == "force" else np.zeros_like(self.effort)
         coupler, guide = reactions(self.assembly, self.units, drive)
         if self.assembly.rubbing.mirrored:
             guide = np.zeros_like(guide)
-        return coupler / self.legs, guide / self.legs
+        return Several((coupler / self.legs, guide / self.legs))
 
     @cached_property
     def extremes(self) -> MotionExtremes:
