@@ -111,7 +111,9 @@ UNNAMED = """() => [
   }),
   ...[...document.querySelectorAll("[tabindex]")].filter((one) => {
     const heading = document.getElementById(one.getAttribute("aria-labelledby"));
-    return !one.getAttribute("role") || !(one.getAttribute("aria-label") || (heading && heading.textContent.trim()));
+    const cell = ["TH", "TR"].includes(one.tagName);  // they have a role of their own, and are named by their text
+    const name = one.getAttribute("aria-label") || (heading || (cell ? one : null))?.textContent.trim();
+    return !(cell || one.getAttribute("role")) || !name;
   }),
   ...[...document.querySelectorAll("svg")].filter((one) => {
     return one.getAttribute("role") !== "img" || !one.getAttribute("aria-label");
