@@ -78,7 +78,6 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
         ("beam_lee_frame", "does not know drive.follows", {"mechanism.drive.follows": True}),
         ("beam_v_bifurcation", "does not know analysis.modes", {}),
         ("beam_lan2010", "does not know analysis.through_folds of a motion", {"analysis.through_folds": True}),
-        ("beam_two_layers", "does not know copies.layers: leave that out, or take the beams, 'reissner'", {}),
     ],
 )
 def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said, changes):
@@ -281,3 +280,28 @@ def test_turns_do_not_count_as_displacements_where_branches_are_told_apart():
 
     assert advanced(problem(1e-5, 2e-3), rest, 1e-6) is not None
     assert advanced(problem(1e-3, 0.0), rest, 1e-6) is None
+
+
+def test_the_moving_part_of_each_stage_in_series_is_a_piece_of_its_own():
+    spec = cfmkit.load("configs/beam_two_layers.yaml", ["analysis.fidelity=solid", "mechanism.copies.layers=3"])
+    (one,) = family("beam").driven_parts(spec)
+    heights = {place.name: np.concatenate(place.shapes)[:, 1] for place in one.part.places}
+    for below, stage in enumerate(("n5", "n5.2", "n5.3")):
+        assert 39e-3 + below * 46e-3 < heights[stage].min()
+        assert heights[stage].max() < 47e-3 + below * 46e-3
+    bars = [len(place.shapes) for place in one.part.places if place.name in heights and place.name[-1] != "'"]
+    assert max(bars) == 2  # a pad and the bar to the other half
+
+
+@pytest.mark.slow
+def test_stages_in_series_share_the_travel_and_carry_one_force():
+    spec = cfmkit.load("configs/beam_two_layers.yaml", ["analysis.fidelity=solid"])
+    (one,) = family("beam").driven_parts(spec)
+    solved = one.part.meshed(1.5e-3).followed([0.0, 1e-3])
+    last, supports = solved.course.poses[-1], solved.problem.supports
+    names = [group.name for group in supports.groups]
+    first = supports.motions(last.unknowns, 1e-3)[names.index("n5")]
+    assert 0.35e-3 < -first[1] < 0.5e-3  # the bars below the second stage give a little, too
+    held = supports.reactions(last.unknowns, 1e-3, solved.problem.elements.forces(solved.moved(last)))
+    ground = sum(held[k, 1] for k, name in enumerate(names) if name.rstrip("'") in ("n1", "n2"))
+    assert ground == pytest.approx(last.effort, rel=1e-6)

@@ -102,16 +102,16 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
 
 
 def _held_places(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> Iterator[HeldPlace]:
-    spec, network, axis = assembly.spec, assembly.network, mirror_axis(assembly)
-    moving = {assembly.driven, spec.mechanism.drive.node}
-    bars = _bars(assembly, beams, *axis) if axis is not None else []
+    network, axis = assembly.network, mirror_axis(assembly)
+    moving = _moving(assembly)
+    bars = _bars(assembly, beams, *axis) if axis is not None else {}
     for node, about in network.nodes.items():
         ends = _ends(assembly, beams, node)
         held = about.support.along or about.support.across or about.support.rotation
         if not ends or not (held or node in moving):
             continue
         region = _region(assembly, node, ends, SHARE * tolerance)
-        joined = tuple(bars) if node in moving else ()
+        joined = (bars[node],) if node in bars else ()
         yield replace(region, shapes=(*region.shapes, *joined))
         if axis is not None and not on_axis(assembly, node):
             yield HeldPlace(
@@ -160,7 +160,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for found in beams.values() for strip in found]
     if (axis := mirror_axis(assembly)) is not None:
-        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis)]
+        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis).values()]
         holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
         lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
     part = spec.mechanism.part or PartSpec()
@@ -168,7 +168,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
-    moving = {assembly.driven, spec.mechanism.drive.node}
+    moving = _moving(assembly)
     places = _held_places(assembly, beams, tolerance)
     marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
     marks += [mark(shape, False) for shape in frame]
@@ -197,7 +197,7 @@ def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: flo
     part = assembly.spec.mechanism.part or PartSpec()
     if part.frame is None or part.frame.ground is None:
         return ()
-    nodes, moving = assembly.network.nodes, {assembly.driven, assembly.spec.mechanism.drive.node}
+    nodes, moving = assembly.network.nodes, _moving(assembly)
     pads: dict[str, FloatArray] = {}
     covered: list[FloatArray] = []
     places = tuple(_held_places(assembly, beams, tolerance))
@@ -359,11 +359,16 @@ def on_axis(assembly: Assembly, node: str) -> bool:
     return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
 
 
+def _moving(assembly: Assembly) -> set[str]:
+    """Return the nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
+    first = assembly.spec.mechanism.drive.node
+    return {node for node in assembly.network.nodes if node.split(".")[0] == first}
+
+
 def _moves(assembly: Assembly, node: str) -> bool:
     """Tell whether a pad at a node moves: it is driven, guided or linked."""
     about = assembly.network.nodes[node].support
-    driven = node in {assembly.driven, assembly.spec.mechanism.drive.node}
-    return driven or not (about.along and about.across and about.rotation)
+    return node in _moving(assembly) or not (about.along and about.across and about.rotation)
 
 
 def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
@@ -419,12 +424,13 @@ def _bar(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
     return np.array([a - over - side, b + over - side, b + over + side, a - over + side])
 
 
-def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float) -> list[FloatArray]:
-    """Return the bars that join the moving parts of two halves, behind the pads."""
+def _bars(
+    assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float
+) -> dict[str, FloatArray]:
+    """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
-    found = []
-    moving = {assembly.driven, assembly.spec.mechanism.drive.node}
-    for node in sorted(moving):
+    found: dict[str, FloatArray] = {}
+    for node in sorted(_moving(assembly)):
         ends = _ends(assembly, beams, node)
         if not ends or on_axis(assembly, node):
             continue
@@ -432,7 +438,7 @@ def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, di
         middle = _pad(assembly, *ends[0], True)[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
         other = mirrored(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
-            found.append(_bar(middle, other, _shuttle(assembly) or PAD * thick))
+            found[node] = _bar(middle, other, _shuttle(assembly) or PAD * thick)
     return found
 
 

@@ -378,7 +378,6 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     things["analysis.outputs.cross_stiffness"] = analysis.outputs.cross_stiffness
     things["analysis.imperfection"] = analysis.imperfection
     things["analysis.through_folds of a motion"] = analysis.through_folds and not by_load
-    things["copies.layers"] = mechanism.copies is not None and mechanism.copies.layers > 1
     unknown = [name for name, thing in things.items() if thing]
     if unknown:
         yield f"does not know {', '.join(unknown)}: leave that out, or take the beams, 'reissner'"
