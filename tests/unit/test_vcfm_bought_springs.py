@@ -12,6 +12,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
+from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status
 from cfmkit.stock.springs.offer_type_and_generic_series import generic
@@ -154,6 +155,19 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
 def test_what_contradicts_itself_is_refused(spec, changes, told):
     with pytest.raises(SpecError, match=told):
         spec.replace(changes)
+
+
+def test_a_design_follows_leaves_back_only_as_far_as_a_long_preload_pushes_them(spec, monkeypatch):
+    """The springs are pressed by 58 mm, and push leaves with a rise of 4.3 mm back by a few of them."""
+
+    def asked(made, end, back):
+        raise RuntimeError(f"{back}")
+
+    monkeypatch.setattr(exact_model, "ExactSampler", asked)
+    listed = [{"name": "long", "kind": "compression", "stiffness": "1.302 N/mm", "counts": [2]}]
+    with pytest.raises(RuntimeError) as back:
+        family("vcfm").design(spec.replace({"design.catalogue": listed, "design.adjustment": "150 N"}), Run())
+    assert 1e-3 < float(str(back.value)) < 15e-3
 
 
 @pytest.mark.slow

@@ -230,7 +230,12 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     As `cfmkit.families.vcfm.model.analyze`; PARTIAL if a beam cannot be followed to the end of the travel.
     """
     made = parts(spec)
-    # the closed form says how far back the shuttle goes; the real one is within a few percent of it
-    rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
-    back = 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0])
+    # the real shuttle goes back as far as that of the closed form within a few percent
+    back = 1.2 * farthest_back(spec, spec.analysis.preloads)
     return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)), run)
+
+
+def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:
+    """Return how far preloads push the shuttle back by the closed form [m]."""
+    sampler, grid = LawSampler(parts(spec)), travel_grid(spec)
+    return max([-(rest_of(sampler, preload, grid) or 0.0) for preload in preloads] + [0.0])

@@ -47,6 +47,9 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import BoughtSprings, VcfmDesign, VcfmSpec
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
+BACK = 1.5
+"""How far back leaves are followed, over where the closed form has the shuttle at rest: their width is still open."""
+
 TRIED = 12
 """Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""
 
@@ -270,7 +273,7 @@ def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
 
 def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> LeavesAroundSprings | Miss:
     """Return the leaves with the width that makes the exact force flattest, long enough for their exact stress."""
-    from cfmkit.families.vcfm.exact_model import ExactSampler
+    from cfmkit.families.vcfm.exact_model import ExactSampler, farthest_back
 
     allowable, own = spec.mechanism.allowable_stress or 0.0, found.target
     first, last = found.linear
@@ -279,14 +282,15 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> L
     worst, sheet = np.inf, sheet_of(spec.mechanism.part)
     for _ in range(RESCALES if sheet is None else PASSES):
         made = _written(spec, found).replace({"analysis.preloads": (0.0,), "analysis.branch": "stable"})
-        back = own.preload_stroke
+        # leaves are followed as far as the spring can push them, not through all of a long preload
+        back = min(own.preload_stroke, BACK * farthest_back(made, (own.preload_stroke,)))
         sampler = ExactSampler(made, last, back)
         if sampler.problem:
             return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
         leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
         wide = float(leaves @ (target.level - spring) / (leaves @ leaves))
         fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
-        ends = np.linspace(-_rest(sampler, wide, back), last, 201)
+        ends = np.linspace(-_rest(sampler, wide, own.preload_stroke), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable
         if sheet is not None:
             if worst <= 1.0 + 1e-4 and abs(wide - 1.0) <= NEAR:
