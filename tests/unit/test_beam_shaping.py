@@ -15,6 +15,7 @@ from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
+from cfmkit.families.beam.shaping import search
 from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
@@ -334,6 +335,24 @@ def test_finished_starts_are_noted_and_used_again() -> None:
     for index in (0, 1):
         if first.found[index] is not None:
             np.testing.assert_array_equal(first.found[index].x, again.found[index].x)
+
+
+def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narrower(monkeypatch) -> None:
+    task = replace(lan("range"), orders=(1, 3, 4, 5))
+    assert (task.started.orders, lan().started.orders, replace(task, orders=(4, 5)).started.orders) == (
+        (1, 3),
+        (2,),
+        (4, 5),
+    )
+    monkeypatch.setattr(search, "_flattened", lambda _task, found, order, _plan, _steps: replace(found, order=order))
+    gain = {4: 0.5e-3, 5: -0.5e-3}
+    monkeypatch.setattr(
+        search, "widened", lambda _task, found, _plan: replace(found, start=found.start - gain[found.order])
+    )
+    begun = Found(np.zeros(17), 3, 4e-3, 0.02, 0.0, "", 0)
+    ended = search.refined(task, begun, StartBudget())
+    assert (ended.start, ended.order) == (3.5e-3, 4)
+    assert search.refined(task, replace(begun, objective=0.5), StartBudget()).start == 4e-3
 
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:

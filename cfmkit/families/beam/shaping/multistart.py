@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.designing.run_many_starts import OneStart, Stage, done, restored
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, searched, widened
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, refined, searched, widened
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.task import Task
+
+
+_REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little
 
 
 @dataclass(frozen=True)
@@ -60,17 +63,24 @@ def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: s
     starts, wide = counts
     widens = task.objective == "range"
     share = 0.75 if widens else 1.0
-    one = OneStart(partial(searched, task, run.seed, plan=plan), plan.clock)
+    one = OneStart(partial(searched, task.started, run.seed, plan=plan), plan.clock)
     first = Stage(one, tuple(range(starts)), identity)
     begun = done(first, run, plan.clock, partial(_tell, run, "starts", starts, (0.0, share)))
     found, lost = {index: _found(begun.records[index]["found"]) for index in sorted(begun.records)}, begun.lost
     if widens:
         best = dict(list(ranked(task, found))[:wide])
-        wider = OneStart(partial(_widened, task, best, plan), plan.clock)
+        wider = OneStart(partial(_widened, task.started, best, plan), plan.clock)
         second = Stage(wider, tuple(best), f"{identity} widened")
         more = done(second, run, plan.clock, partial(_tell, run, "widenings", len(best), (share, 1.0)))
         lost += more.lost
         found |= {index: _found(record["found"]) for index, record in more.records.items()}
+    if task.orders != task.started.orders:
+        widest = dict(list(ranked(task, found))[:_REFINED])
+        finer = OneStart(partial(_refined, task, widest, plan), plan.clock)
+        third = Stage(finer, tuple(widest), f"{identity} refined")
+        last = done(third, run, plan.clock, partial(_tell, run, "refinements", len(widest), (share, 1.0)))
+        lost += last.lost
+        found |= {index: _found(record["found"]) for index, record in last.records.items()}
     audits = {index: audited(Variables(task, one.order), one) for index, one in ranked(task, found)}
     return Explored(found, begun.reused, starts - len(found), lost, audits)
 
@@ -84,6 +94,10 @@ def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: 
 
 def _widened(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
     return widened(task, designs[index], plan)
+
+
+def _refined(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+    return refined(task, designs[index], plan)
 
 
 def _found(record: dict[str, Any]) -> Found | None:

@@ -386,6 +386,17 @@ def widened(task: Task, found: Found, plan: StartBudget) -> Found:
     return wide if kept else replace(good, evaluations=wide.evaluations)
 
 
+def refined(task: Task, found: Found, plan: StartBudget) -> Found:
+    """Return a widened design flattened and widened again in every finer order; never one with a narrower window."""
+    for order in task.orders:
+        if order > found.order and found.objective <= task.half_band and not plan.late():
+            flat = _flattened(task, found, order, plan, plan.flattening)
+            finer = widened(task, flat, plan)
+            wider = finer.feasible and finer.start < found.start
+            found = finer if wider else replace(found, evaluations=finer.evaluations)
+    return found
+
+
 def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
