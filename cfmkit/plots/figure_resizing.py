@@ -100,10 +100,19 @@ class FigureLayout:
     def narrowed(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
         """Return the layout for another width [mm]: stretched, or with boxes below each other where they do not fit."""
         across = _Stretch.of([(left, left + wide) for left, _, wide, _ in self.asked], self.size[0])
-        fits = across.factor(width) >= SIDE_BY_SIDE or len(across.parts) < 2
+        fits = across.factor(width) >= SIDE_BY_SIDE or not self._side_by_side()
         if fits or not all(wide > NARROW for _, _, wide, _ in self.asked) or len(self.asked) > MOST_STACKED:
             return self.stretched(width, titles, to_scale)
         return self._below_each_other(width, titles, to_scale)
+
+    def _side_by_side(self) -> bool:
+        """Return whether two boxes stand beside each other, whatever lies above or below them."""
+        pairs = ((one, other) for k, one in enumerate(self.asked) for other in self.asked[:k])
+        return any(
+            min(low + high, lower + higher) > max(low, lower)
+            and (left + wide <= other_left or other_left + wider <= left)
+            for (left, low, wide, high), (other_left, lower, wider, higher) in pairs
+        )
 
     def _below_each_other(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
         """Return the layout whose boxes stand in one column, in the order in which they are read."""
@@ -113,12 +122,12 @@ class FigureLayout:
         gap, heading = below + above, HEADING if titles else 0.0
         count = len(self.asked)
         heights = sum(box[3] for box in self.asked)
-        shares = [1.0, (TALLEST - heading - count * gap) / heights]
-        factor = max(min([*shares, *(room / box[2] for box in self.asked)] if to_scale else shares), 0.2)
-        top = heading + count * gap + factor * heights
+        share = min(1.0, (TALLEST - heading - count * gap) / heights)
+        factors = [max(min(share, room / box[2]) if to_scale else share, 0.2) for box in self.asked]
+        top = heading + count * gap + sum(factor * box[3] for factor, box in zip(factors, self.asked, strict=True))
         place, boxes = top - heading, [(0.0, 0.0, 0.0, 0.0)] * count
         for number in sorted(range(count), key=lambda at: (-round(self.asked[at][1]), self.asked[at][0])):
-            _, _, wide, high = self.asked[number]
+            (_, _, wide, high), factor = self.asked[number], factors[number]
             wide, high = factor * wide if to_scale else room, factor * high
             place -= above + high
             boxes[number] = (left + 0.5 * (room - wide), place, wide, high)

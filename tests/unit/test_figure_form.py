@@ -12,6 +12,7 @@ from cfmkit.errors import UsageError
 from cfmkit.plots import style
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.figure_options import PLAIN, FigureForm, form_of
+from cfmkit.plots.figure_resizing import FigureLayout
 from cfmkit.plots.parts import to_scale
 
 SIZE = style.MM
@@ -170,3 +171,15 @@ def test_the_unit_of_a_long_axis_name_goes_to_a_line_of_its_own():
         return figure
 
     assert form_of(width="84 mm").draw(low).axes[0].get_ylabel() == "a name that is long\n[mm]"
+
+
+def test_panels_side_by_side_below_a_wide_diagram_stand_below_each_other_in_a_column():
+    row = [(17.0 + 47.25 * k, 12.0, 43.5, 30.0) for k in range(3)]
+    found = FigureLayout((160.0, 100.0), [*row, (17.0, 62.0, 138.0, 30.0)]).narrowed(84.0, False, True)
+    assert found.stacked
+    lows, highs = ([box[1] + share * box[3] for box in found.boxes] for share in (0, 1))
+    order = sorted(range(4), key=lambda at: -lows[at])
+    assert order == [3, 0, 1, 2]
+    assert all(lows[above] > highs[below] for above, below in itertools.pairwise(order))
+    assert found.boxes[0][2:] == pytest.approx((43.5, 30.0))
+    assert max(left + wide for left, _, wide, _ in found.boxes) <= 84.0
