@@ -61,8 +61,8 @@ DEFINITIONS = {
     "cross_stiffness": (
         "stiffness",
         "smallest stiffness of the driven node across the drive, in the window: force over displacement with the drive "
-        "held and the rotation as supported, without what guides the node across; of all copies; none where it has no "
-        "bound, at a bifurcation",
+        "held and the rotation as supported, without what guides the node across; of all copies; none where it is "
+        "unbounded, at a bifurcation",
     ),
     "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
     "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),
