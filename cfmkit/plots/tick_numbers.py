@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
-LONGEST = 7
-"""Letters of a number at a tick: what the margins of the figures have room for."""
+WIDEST = 6.5
+"""Width of a number at a tick, in digits: what the margins of the figures have room for."""
 
 NARROWEST = 2e-5
 """Share of the size of its values that an axis shows at least: below it their ticks would need more than seven
@@ -32,8 +32,13 @@ class WholeNumbers(ScalarFormatter):
         """Return the texts of all ticks of an axis."""
         texts = super().format_ticks(values)
         short = [self.fix_minus(brief(value)) for value in values]
-        too_long = max(map(len, texts), default=0) > LONGEST
+        too_long = max(map(_width, texts), default=0.0) > WIDEST
         return short if too_long and len(set(short)) >= len(set(texts)) else texts
+
+
+def _width(text: str) -> float:
+    """Return how wide a number is, in digits: a point is half of one."""
+    return len(text) - 0.5 * text.count(".")
 
 
 def brief(value: float) -> str:
