@@ -23,7 +23,7 @@ import cfmkit
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, minimax
-from cfmkit.families.slider_crank.springs.many_designs.requested_values_and_findings import analyze_block
+from cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block import analyze_block
 from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"

@@ -7,7 +7,7 @@
     Numbers within bounds: rounded to what is written, and those that are at a bound.
 `run_many_starts`
     Many starts, in this process or several, each noted when it is finished, within a time budget.
-`measured_and_searched_values`
+`reported_values_of_finished_design`
     What is reported of a design is what the analysis of its written specification measures.
 `robust_design`
     Values for which made parts are good: margins from tolerances to first order, and drawn parts.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from cfmkit.errors import ExitCode
-from cfmkit.runs.run_page import ENDS, NAME, part, template
+from cfmkit.runs.html_report_of_run import ENDS, NAME, part, template
 from cfmkit.studies.batch_sources_and_outcomes import message, outcome
 from cfmkit.studies.changes_since_earlier_batch import changes_table
 

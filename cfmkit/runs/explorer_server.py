@@ -28,7 +28,7 @@ import numpy as np
 
 from cfmkit import api
 from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
-from cfmkit.runs.run_page import ENDS, escaped_json, part, template
+from cfmkit.runs.html_report_of_run import ENDS, escaped_json, part, template
 from cfmkit.runs.specfile import bind, changed, read_spec
 from cfmkit.specs.units.number_reading import NUMBER
 

@@ -79,9 +79,9 @@ def files(
 
         yield f"figures/motion.{animate}", animation(result, moving, animate)
     if page:
-        from cfmkit.runs import run_page
+        from cfmkit.runs import html_report_of_run
 
-        yield run_page.NAME, run_page.page(report, form.for_page(makers, drawn), command)
+        yield html_report_of_run.NAME, html_report_of_run.page(report, form.for_page(makers, drawn), command)
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:

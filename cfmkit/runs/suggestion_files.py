@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from cfmkit.errors import ExitCode
-from cfmkit.runs.run_page import NAME, identifier, part, template
+from cfmkit.runs.html_report_of_run import NAME, identifier, part, template
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.studies.pool import until
 from cfmkit.tables.json_writing import json_bytes

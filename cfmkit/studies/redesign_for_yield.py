@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.measured_and_searched_values import searched
+from cfmkit.designing.reported_values_of_finished_design import searched
 from cfmkit.designing.robust_design import (
     NoPart,
     PartSlopes,

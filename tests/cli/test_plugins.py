@@ -82,12 +82,14 @@ def test_names_are_completed():
 def test_a_family_has_its_article(monkeypatch):
     record = families.family("oblique")
     monkeypatch.setattr("cfmkit.api.family", lambda _name: replace(record, design=None, outline=None))
-    monkeypatch.setattr("cfmkit.studies.fidelity.family", lambda _name: replace(record, models={"exact": ""}))
+    monkeypatch.setattr(
+        "cfmkit.studies.comparison_of_fidelities.family", lambda _name: replace(record, models={"exact": ""})
+    )
     with pytest.raises(cfmkit.UsageError, match=r"^an oblique mechanism cannot be designed"):
         cfmkit.design(SPRINGS)
     with pytest.raises(cfmkit.UsageError, match=r"^an oblique mechanism has no part"):
         cfmkit.drawing(SPRINGS)
-    from cfmkit.studies.fidelity import choices_of
+    from cfmkit.studies.comparison_of_fidelities import choices_of
 
     with pytest.raises(cfmkit.UsageError, match=r": an oblique mechanism has one model only"):
         choices_of(cfmkit.load(SPRINGS))

@@ -16,7 +16,7 @@ from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Finding, Result, Status
-from cfmkit.studies.fidelity import (
+from cfmkit.studies.comparison_of_fidelities import (
     PATH,
     Choices,
     FidelityComparison,

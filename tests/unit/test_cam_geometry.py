@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.roller_centre_track import NoTrack, Track
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.families.no_mechanism import CannotBuild

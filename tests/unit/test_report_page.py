@@ -22,7 +22,7 @@ from cfmkit.plots.poses_in_one_svg import poses
 from cfmkit.plots.style import axes_mm, new_figure
 from cfmkit.plots.vector_formats import inline, svg
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_output_files, run_outcome, run_page, study_page, suggestion_files
+from cfmkit.runs import batch_output_files, html_report_of_run, html_report_of_study, run_outcome, suggestion_files
 from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -77,7 +77,7 @@ def reports():
 def made(found, command="cfmkit analyze x.yaml"):
     """Return the page of a report as text."""
     drawn = {name: draw() for name, draw in api.figures(found.result).items()}
-    return run_page.page(found, drawn, command).decode()
+    return html_report_of_run.page(found, drawn, command).decode()
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -87,7 +87,7 @@ def test_a_page_holds_verdict_requirements_metrics_figures_and_film_and_asks_for
     outline = Outline(text)
     assert outline.unbalanced == []
     assert outline.open == []
-    assert run_page.ENDS[int(found.exit_code)][1] in outline.text
+    assert html_report_of_run.ENDS[int(found.exit_code)][1] in outline.text
     assert all(one.sentence in outline.text for one in found.requirements)
     names = {name.partition("[")[0] for name in found.metrics}
     assert all(name in outline.text for name in names)
@@ -147,7 +147,7 @@ def test_hostile_names_messages_and_commands_are_text(reports):
 def test_the_cursor_stands_at_the_motion_of_each_pose(reports):
     found = reports["springs"]
     drawn = {name: draw() for name, draw in api.figures(found.result).items()}
-    text = run_page.page(found, drawn, {}).decode()
+    text = html_report_of_run.page(found, drawn, {}).decode()
     data = json.loads(re.search(r'id="film-data" type="application/json">(.*?)</script>', text)[1])
     cursors = np.array(data["cursors"][-1])
     assert len(data["texts"]) == len(cursors)
@@ -182,7 +182,7 @@ def test_curves_of_a_page_have_the_points_that_their_drawing_needs():
     own = "\n".join(f"5,load,{a},{b}" for a, b in zip(x, force, strict=True))
     back = "\n".join(f"5,unload,{a},{b}" for a, b in ((10, 3), (0, 3), (10, 3)))
     content = f"r [mm],branch,displacement [mm],force [N]\n{own}\n{back}\n".encode()
-    drawn = study_page._curves(content, ["r [mm]"], [["5"]])["points"][0]
+    drawn = html_report_of_study._curves(content, ["r [mm]"], [["5"]])["points"][0]
     assert 5 < len(drawn["load"][0]) < 60
     assert 1.0 in drawn["load"][0]
     apart = np.abs(np.interp(x, *drawn["load"]) - force)
@@ -214,7 +214,7 @@ def test_a_page_of_a_large_sweep_keeps_what_was_varied_and_says_what_is_left_out
         "results.csv": f"mechanism.roller_radius [mm],{metrics},status,message\n{rows}\n".encode(),
         "metrics.json": b'{"status": "complete", "message": "", "metrics": {}}',
     }
-    found = study_page.page(spec, ["mechanism.roller_radius"], files, "cfmkit sweep")
+    found = html_report_of_study.page(spec, ["mechanism.roller_radius"], files, "cfmkit sweep")
     assert len(found) < 5e6
     assert b"more columns are in results.csv" in found
     assert b'"mechanism.roller_radius [mm]"' in found

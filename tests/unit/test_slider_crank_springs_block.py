@@ -9,7 +9,7 @@ from slider_crank import config
 import cfmkit
 from cfmkit import api
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.slider_crank.springs.many_designs.requested_values_and_findings import analyze_block
+from cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block import analyze_block
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.study_figure_data import DrawnScale, StudyMarks
 from cfmkit.plots.style import png

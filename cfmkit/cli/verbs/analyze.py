@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.fidelity import FidelityComparison
+    from cfmkit.studies.comparison_of_fidelities import FidelityComparison
 
 PLACE = 20
 EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 --report"
@@ -99,7 +99,7 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
 def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside the curves of its other models."""
     from cfmkit.runs.run_outcome import Supplement
-    from cfmkit.studies.fidelity import choices_of, compare, data_of, lines_of
+    from cfmkit.studies.comparison_of_fidelities import choices_of, compare, data_of, lines_of
 
     choices = choices_of(spec)
     found = work(spec, run)

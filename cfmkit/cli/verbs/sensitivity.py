@@ -124,7 +124,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.run_spec_and_print_page import folder_of
-    from cfmkit.runs import study_page
+    from cfmkit.runs import html_report_of_study
     from cfmkit.runs.run import placing, read
     from cfmkit.studies.sensitivity.output import exit_code, outputs
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
@@ -163,8 +163,8 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
             shown = form.for_page(makers, drawn)
             study = found.setup.study
             point = run_study_in_folder.command_of_a_point(options, study.design)
-            page = study_page.page(study.spec, found.setup.paths, kept, command, shown, point)
-            place.folder.write(study_page.NAME, page)
+            page = html_report_of_study.page(study.spec, found.setup.paths, kept, command, shown, point)
+            place.folder.write(html_report_of_study.NAME, page)
         made = run_study_in_folder.Made(
             "sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count
         )

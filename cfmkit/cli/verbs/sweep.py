@@ -113,13 +113,15 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             for name, content in form.write(figure, stem):
                 place.folder.write(name, content)
         if options.report:
-            from cfmkit.runs import study_page
+            from cfmkit.runs import html_report_of_study
 
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
             shown = form.for_page(makers, drawn)
             point = run_study_in_folder.command_of_a_point(options, work.study.design)
-            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command, shown, point))
+            place.folder.write(
+                html_report_of_study.NAME, html_report_of_study.page(spec, varied, kept, command, shown, point)
+            )
         code = exit_code(records, summary)
         made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = run_study_in_folder.commit(place, made, terminal, code)

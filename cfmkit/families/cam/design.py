@@ -22,7 +22,7 @@ import numpy as np
 
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.roller_centre_track import TrackStates
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.mechanism_from_spec import (

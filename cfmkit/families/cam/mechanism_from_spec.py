@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
-from cfmkit.families.cam.geometry.roller_centre_track import NoTrack, Track
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Track
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import Assembly

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import flank_pressure
-from cfmkit.families.cam.geometry.roller_centre_track import TrackStates
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn

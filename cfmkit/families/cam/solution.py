@@ -18,7 +18,7 @@ from cfmkit.families.cam.statics import Forces, Loads, jams, levers
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
-    from cfmkit.families.cam.geometry.roller_centre_track import Track, TrackStates
+    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.numerics.rigid_point_registration import Registration
     from cfmkit.results import Finding

@@ -39,7 +39,7 @@ from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.roller_centre_track import Track, TrackStates, TrackStretch
+    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates, TrackStretch
     from cfmkit.families.cam.geometry.slope_law import Real
 
 GRAVITY = 9.81

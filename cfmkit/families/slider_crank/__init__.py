@@ -27,7 +27,7 @@ FAMILY = Family(
         "solid": SOLID,
     },
     analyze_block=when_called(
-        "cfmkit.families.slider_crank.springs.many_designs.requested_values_and_findings:analyze_block"
+        "cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block:analyze_block"
     ),
     design=when_called("cfmkit.families.slider_crank.design:design"),
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),

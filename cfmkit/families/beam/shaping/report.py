@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.designing.measured_and_searched_values import measured
+from cfmkit.designing.reported_values_of_finished_design import measured
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.flank_from_roller_path import CamProfile
-    from cfmkit.families.cam.geometry.roller_centre_track import Track
+    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track
 
     ComplexArray = NDArray[np.complex128]
 

@@ -1,7 +1,7 @@
 """Tracks of many rollers and braces on one cam, solved together.
 
-The formulas are those of `roller_centre_track.Track`, in the same order; whatever that finds by a root of one cam is
-found here for all of them at once. Which of the parts cannot run on the cam is an array, no exception.
+The formulas are those of `roller_track_on_cut_cam.Track`, in the same order; whatever that finds by a root of one cam
+is found here for all of them at once. Which of the parts cannot run on the cam is an array, no exception.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.roller_centre_track import KNOTS, Pivot, pivot_angle
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import KNOTS, Pivot, pivot_angle
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.numerics.roots import invert_increasing
 

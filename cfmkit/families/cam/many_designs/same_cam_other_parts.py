@@ -1,7 +1,7 @@
 """Many mechanisms at once around one cut cam: other braces, rollers, springs and weights than those it is cut for.
 
 The cam is put together once. Where a roller of another radius or a brace of another length runs on it is
-solved for all mechanisms and samples together; the formulas are those of `roller_centre_track.Track`, `statics` and
+solved for all mechanisms and samples together; the formulas are those of `roller_track_on_cut_cam.Track`, `statics` and
 `contact`. A mechanism whose curve is not complete, or whose force changes sign, is left to the model of one cam.
 """
 

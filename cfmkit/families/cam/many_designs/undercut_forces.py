@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.families.cam.geometry.flank_from_roller_path import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import reach
-from cfmkit.families.cam.geometry.roller_centre_track import NoTrack, Pivot, Track, pivot_angle
+from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.roller_centre_track import TrackStates
+    from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
     from cfmkit.families.cam.many_designs.forces import Designs
 
 SHAPE = ("constant", "x0", "brace", "radius", "stroke")

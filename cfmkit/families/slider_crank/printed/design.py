@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import rounded
-from cfmkit.designing.measured_and_searched_values import measured, searched
+from cfmkit.designing.reported_values_of_finished_design import measured, searched
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, mpa, newton, percent

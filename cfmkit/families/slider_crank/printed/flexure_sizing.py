@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.measured_and_searched_values import searched
+from cfmkit.designing.reported_values_of_finished_design import searched
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import no_design

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.designing.measured_and_searched_values import measured, searched
+from cfmkit.designing.reported_values_of_finished_design import measured, searched
 from cfmkit.families.base import Run
 from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible

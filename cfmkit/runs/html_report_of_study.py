@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.runs.run_page import NAME, escaped_json, identifier, part, references_of, template
+from cfmkit.runs.html_report_of_run import NAME, escaped_json, identifier, part, references_of, template
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
