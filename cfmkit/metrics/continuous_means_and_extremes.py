@@ -75,11 +75,11 @@ def extremes(
     sign = np.array([1.0, -1.0])
     if last < 2:
         return effort.max(axis=1), effort.min(axis=1)
-    middle = np.clip(np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1), 1, last - 1)
-    near = middle[..., None] + np.arange(-1, 2)
+    highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
+    near = np.clip(highest, 1, last - 1)[..., None] + np.arange(-1, 2)
     rows = np.arange(len(effort))[:, None, None]
     x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
-    best = np.stack([effort.max(axis=1), -effort.min(axis=1)], axis=1)
+    best = sign * effort[rows[..., 0], highest]
     rounds, beside = (ROUNDS, BESIDE) if uneven or last < FEW else (1, np.zeros(1))
     for _ in range(rounds):
         places = _next(x, y, beside)

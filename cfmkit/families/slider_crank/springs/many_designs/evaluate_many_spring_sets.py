@@ -9,7 +9,7 @@ one mechanism, which is laid once for all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -158,6 +158,30 @@ class Base:
         """Return the unit efforts in a window, (4, k), its ends included."""
         return efforts_inside(self.assembly, self.motion, self.units, window)
 
+    def motion_inside(self, window: tuple[float, float] | None) -> FloatArray:
+        """Return the points of the curve in a window, its ends included."""
+        if window is None:
+            return self.motion
+        return np.concatenate([window[:1], self.motion[between_ends(self.motion, *window)], window[1:]])
+
+    def samples_and_grid(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
+        """Return the points of the curve in a window and the grid's places between them, increasing; efforts (4, n).
+
+        They are the same for all designs: put in order here, they take a design one product.
+        """
+        if window not in self._dense:
+            samples, units = self.motion_inside(window), self.units.effort if window is None else self.inside(window)
+            places, there = self.grid
+            between = (places > samples[0]) & (places < samples[-1]) & np.isfinite(there.effort).all(axis=0)
+            both = np.concatenate([samples, places[between]])
+            order = np.argsort(both, kind="stable")
+            self._dense[window] = both[order], np.concatenate([units, there.effort[:, between]], axis=1)[:, order]
+        return self._dense[window]
+
+    @cached_property
+    def _dense(self) -> dict[tuple[float, float] | None, tuple[FloatArray, FloatArray]]:
+        return {}
+
 
 @dataclass(frozen=True)
 class Slab:
@@ -243,24 +267,18 @@ class Slab:
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the efforts in a window."""
         if window not in self.cut:
-            base = self.base
-            motion = base.motion
-            effort = self.effort if window is None else self.rates @ base.inside(window)
-            if window is not None:
-                motion = np.concatenate([window[:1], motion[between_ends(motion, *window)], window[1:]])
-            self.cut[window] = ManyWindows(motion[None, :], effort, self._extremes)
+            motion = self.base.motion_inside(window)
+            effort = self.effort if window is None else self.rates @ self.base.inside(window)
+            self.cut[window] = ManyWindows(motion[None, :], effort, partial(self._extremes, window))
             self.balance(self.cut[window].mean, effort)
         return self.cut[window]
 
-    def _extremes(self, motion: FloatArray, effort: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _extremes(
+        self, window: tuple[float, float] | None, _motion: FloatArray, _effort: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return largest and smallest efforts between the ends of samples, next to these and to the grid, (m,) each."""
-        places, units = self.base.grid
-        samples = motion[0]
-        between = (places > samples[0]) & (places < samples[-1]) & np.isfinite(units.effort).all(axis=0)
-        both = np.concatenate([samples, places[between]])
-        order = np.argsort(both, kind="stable")
-        known = np.concatenate([effort, self.rates @ units.effort[:, between]], axis=1)
-        return extremes(self._exact, both[order][None, :], known[:, order])
+        places, units = self.base.samples_and_grid(window)
+        return extremes(self._exact, places[None, :], self.rates @ units)
 
     @cached_property
     def balanced(self) -> NDArray[np.bool_]:
