@@ -13,9 +13,9 @@ from pathlib import Path
 import cfmkit
 from cfmkit.families.base import Run
 from cfmkit.results import Status
-from cfmkit.studies.made_parts import judge
 from cfmkit.studies.sensitivity.probability_confidence_intervals import clopper_pearson
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
+from cfmkit.studies.yield_of_drawn_parts import judge
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "studies" / "slider_crank_strip_yield.yaml"
 TRAVELS = (34.0, 35.0, 36.0, 37.0, 37.25, 37.5, 37.75, 38.0, 39.0)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.changes_since_earlier_batch import MetricChange
+    from cfmkit.studies.metric_changes_since_earlier_batch import MetricChange
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)
 """How the fault of a file begins."""

@@ -19,8 +19,8 @@ from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, jour
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_outcome import worst
 from cfmkit.studies.batch_sources_and_outcomes import LEFT, Entry
-from cfmkit.studies.changes_since_earlier_batch import TOLERANCE, BatchComparison, earlier, gone
-from cfmkit.studies.changes_since_earlier_batch import changes as changes_of
+from cfmkit.studies.metric_changes_since_earlier_batch import TOLERANCE, BatchComparison, earlier, gone
+from cfmkit.studies.metric_changes_since_earlier_batch import changes as changes_of
 from cfmkit.tables.html import first_rows
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.changes_since_earlier_batch import Known
     from cfmkit.studies.kept_batch_runs import KeptRuns
+    from cfmkit.studies.metric_changes_since_earlier_batch import Known
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
 

@@ -11,14 +11,14 @@ from urllib.parse import quote
 from cfmkit.errors import ExitCode
 from cfmkit.runs.html_report_of_run import ENDS, NAME, part, template
 from cfmkit.studies.batch_sources_and_outcomes import message, outcome
-from cfmkit.studies.changes_since_earlier_batch import changes_table
+from cfmkit.studies.metric_changes_since_earlier_batch import changes_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.changes_since_earlier_batch import BatchComparison
+    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
 
 
 def about(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitCode) -> dict[str, Any]:

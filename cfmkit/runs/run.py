@@ -16,7 +16,7 @@ from cfmkit.families.base import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import run_outcome
-from cfmkit.runs.run_file_contents import files
+from cfmkit.runs.files_a_run_writes import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
@@ -286,7 +286,7 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, where their tolerances are given."""
-    from cfmkit.studies.made_parts import yields_of
+    from cfmkit.studies.yield_of_drawn_parts import yields_of
 
     yields = yields_of(nominal, given, run)
     if yields is None:

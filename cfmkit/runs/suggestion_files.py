@@ -204,7 +204,7 @@ def _made(
     """Return the files of one proposal: its specification first, which `analyze` takes; alone where the time is up."""
     from cfmkit import api
     from cfmkit.results import Design, Status
-    from cfmkit.runs.run_file_contents import files
+    from cfmkit.runs.files_a_run_writes import files
     from cfmkit.runs.run_outcome import report_on
 
     proposal = proposals[index]

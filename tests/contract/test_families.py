@@ -20,7 +20,7 @@ from cfmkit.cli.verbs.new import template
 from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
 from cfmkit.runs import run_outcome
-from cfmkit.runs.run_file_contents import files
+from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.specs.units import DIMENSIONS
 

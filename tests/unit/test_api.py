@@ -14,7 +14,7 @@ from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.runs import run_outcome, specfile
-from cfmkit.runs.run_file_contents import files
+from cfmkit.runs.files_a_run_writes import files
 from cfmkit.specs import keys_and_schema as keys
 from cfmkit.specs.yamlio import read_document
 

@@ -17,7 +17,7 @@ from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs.batch_output_files import summary
 from cfmkit.studies.batch_sources_and_outcomes import Entry
-from cfmkit.studies.changes_since_earlier_batch import Earlier, changes
+from cfmkit.studies.metric_changes_since_earlier_batch import Earlier, changes
 
 ROOT = Path(__file__).parents[2]
 SPEC = (ROOT / "configs" / "vcfm_ding2022.yaml").read_text()

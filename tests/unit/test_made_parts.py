@@ -15,9 +15,9 @@ from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.made_parts import common, judge, yields_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
+from cfmkit.studies.yield_of_drawn_parts import common, judge, yields_of
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 

@@ -7,7 +7,7 @@ import pytest
 
 import cfmkit
 from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes
-from cfmkit.runs.run_file_contents import files, part_of
+from cfmkit.runs.files_a_run_writes import files, part_of
 from cfmkit.runs.run_outcome import report_on
 from cfmkit.specs.units import format_short
 
@@ -66,14 +66,14 @@ def test_a_design_writes_its_drawing_and_names_its_tolerances():
     report = report_on(cfmkit.analyze(design.spec), design)
     assert "figures/drawing.png" in dict(files(report))
     assert "figures/drawing.png" not in dict(files(report, plots=False))
-    from cfmkit.runs.run_file_contents import stated_tolerances
+    from cfmkit.runs.files_a_run_writes import stated_tolerances
 
     (line,) = stated_tolerances(design.spec)
     assert line == "mechanism.brace_length: normal 0.1 mm"
 
 
 def test_a_drawing_without_stated_tolerances_names_the_process_that_is_assumed():
-    from cfmkit.runs.run_file_contents import assumed_tolerances
+    from cfmkit.runs.files_a_run_writes import assumed_tolerances
 
     lines = assumed_tolerances(cfmkit.load(CONFIGS / "make_finger.yaml"))
     assert lines[:2] == ("process: fdm, assumed", "thickness +- 0.05 mm (standard deviation)")
@@ -105,7 +105,7 @@ def test_numbers_of_holes_stand_clear_of_every_line():
 
 
 def test_a_drawing_with_stated_tolerances_names_the_process_too():
-    from cfmkit.runs.run_file_contents import _drawn
+    from cfmkit.runs.files_a_run_writes import _drawn
 
     spec = cfmkit.load(CONFIGS / "studies" / "cam_bought_parts.yaml")
     found = texts(_drawn(part_of(spec), spec))

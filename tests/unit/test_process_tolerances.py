@@ -7,9 +7,9 @@ from cfmkit.families.base import Run
 from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.processes import PROCESSES
-from cfmkit.studies.made_parts import judge
 from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances_of
 from cfmkit.studies.yield_by_assumed_tolerances import expected, first_order_shares
+from cfmkit.studies.yield_of_drawn_parts import judge
 
 STRIP = "configs/slider_crank_strip.yaml"
 

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.page_block_types import Block
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_sources_and_outcomes import Entry
-    from cfmkit.studies.changes_since_earlier_batch import BatchComparison
+    from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison
 
 
 PLACE = 26

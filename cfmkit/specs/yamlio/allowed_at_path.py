@@ -18,7 +18,7 @@ from cfmkit.specs.units.fields import PLACE, MetricValue, Place, UnitField
 from cfmkit.specs.units.quantities import example, needed
 
 if TYPE_CHECKING:
-    from cfmkit.specs.yamlio.paths import Path
+    from cfmkit.specs.yamlio.path_notation import Path
 
 _PRIMITIVES = {int: "a whole number", float: "a number", str: "text", bool: "true or false", dict: "a block"}
 _OPEN = get_args(MetricValue)[1]

@@ -16,7 +16,7 @@ from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import described
 from cfmkit.specs.units.number_reading import shown
 from cfmkit.specs.yamlio.allowed_at_path import Slot, Trace, expected, trace
-from cfmkit.specs.yamlio.paths import Path, dotted
+from cfmkit.specs.yamlio.path_notation import Path, dotted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

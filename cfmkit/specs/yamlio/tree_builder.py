@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from yaml.error import Mark, YAMLError
 
-    from cfmkit.specs.yamlio.paths import Path
+    from cfmkit.specs.yamlio.path_notation import Path
 
 
 _LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Run
-from cfmkit.studies.made_parts import judge
 from cfmkit.studies.sensitivity.parameters import parameters_of
 from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, assumed, tolerances
 from cfmkit.studies.yield_by_assumed_tolerances import YieldUnknown, first_order_shares
+from cfmkit.studies.yield_of_drawn_parts import judge
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
