@@ -67,7 +67,7 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     ax.set_xlim(0.0, 1.08 * max([given, *areas]))
     ax.set_ylim(0.0, 1.12 * max([100.0 * wish.ripple, *ripples]))
     ax.set_xlabel("room needed in the plane [cm²]")
-    ax.set_ylabel("ripple over the travel [%]")
+    ax.set_ylabel(f"ripple over the {'travel' if wish.kind == 'force' else 'angle'} [%]")
     figure.text(0.02, 1.0 - 3.5 / height, "what the proposals need, and how flat they are", fontsize=NORMAL, color=INK)
     top = 10.0
     for text, kind in [*zip(names, (one.family for one in proposals), strict=False), (key, None)]:
@@ -110,7 +110,7 @@ def _within(width: float, text: str) -> str:
 
 def _scale_told(wish: Wish) -> str:
     sides = " x ".join(f"{1e3 * side:.4g}" for side in wish.room[:2])
-    return f"dashed: the room, {sides} mm across and along the travel"
+    return f"dashed: the room, {sides} mm" + (" across and along the travel" if wish.kind == "force" else "")
 
 
 def _drawn(proposal: Proposal) -> Any:
