@@ -1,8 +1,8 @@
-"""How results depend on parameters: five methods, and what becomes of samples that fail.
+"""How results depend on parameters: six methods, and what becomes of samples that fail.
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
-`oat`, `local`, `morris`, `sobol` and `monte_carlo_yield`, with `distributions` (of the
+`oat`, `local`, `morris`, `sobol`, `monte_carlo_yield` and `inverse`, with `distributions` (of the
 parameters), `probability_confidence_intervals` (confidence) and `failed_sample_policy` (what a sample without a value
 means for an index: never "no influence").
 

@@ -1,4 +1,4 @@
-"""The five methods over an evaluator: draw, evaluate, analyse, state."""
+"""The six methods over an evaluator: draw, evaluate, analyse, state."""
 
 from __future__ import annotations
 
