@@ -87,8 +87,8 @@ def main() -> None:
     errors = [slsqp(seed) for seed in range(5)]
     peer = best(lambda: slsqp(0), 2)
     print(f"crank, start and springs     {ours:7.3f} s    {found.message}")
-    told = ", ".join(f"{error:.1e}" for error in errors)
-    print(f"  SLSQP from one start       {peer:7.3f} s    errors of five starts [N]: {told}")
+    reported = ", ".join(f"{error:.1e}" for error in errors)
+    print(f"  SLSQP from one start       {peer:7.3f} s    errors of five starts [N]: {reported}")
 
     rng = np.random.default_rng(0)
     names = ("mechanism.springs.crank_pin", "mechanism.springs.slider_pin")

@@ -39,8 +39,8 @@ def vcfm(name: str) -> str:
         " and ".join(f"{1e3 * one[key]:.3f}" for key in ("linear_start", "linear_end")) if one["linear_start"] else ""
         for one in values
     ]
-    told = f"{ranges[0]} ({ranges[1]})" if ranges[0] else ""
-    return f"| `{name}` | {falls} | {told} | {stiff} | {leaves}, {spring} |"
+    reported = f"{ranges[0]} ({ranges[1]})" if ranges[0] else ""
+    return f"| `{name}` | {falls} | {reported} | {stiff} | {leaves}, {spring} |"
 
 
 def crank(name: str, beams: str) -> str:

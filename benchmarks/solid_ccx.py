@@ -44,8 +44,8 @@ def by_ccx(data: bytes) -> tuple[float, float]:
         begun = time.perf_counter()
         subprocess.run(["ccx", "-i", "part"], cwd=folder, check=True, capture_output=True)
         took = time.perf_counter() - begun
-        told = (Path(folder) / "part.dat").read_text()
-    ends = re.findall(r"for set \S+ and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+\S+", told)
+        reported = (Path(folder) / "part.dat").read_text()
+    ends = re.findall(r"for set \S+ and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+\S+", reported)
     return max(np.hypot(float(x), float(y)) for x, y in ends) / share, took
 
 
@@ -116,8 +116,8 @@ def in_three_dimensions(names: list[str]) -> None:
                 print(f"| {Path(name).stem} {one.name} | {str(error)[:60]} | | | | |")
                 continue
             wide = one.part.width / one.part.thinnest
-            told = f"{other:.4f} | {own:.4f} | {100 * (other / own - 1):+.1f} % | {took:.1f}"
-            print(f"| {Path(name).stem} {one.name} | {wide:.3g} | {told} |", flush=True)
+            reported = f"{other:.4f} | {own:.4f} | {100 * (other / own - 1):+.1f} % | {took:.1f}"
+            print(f"| {Path(name).stem} {one.name} | {wide:.3g} | {reported} |", flush=True)
 
 
 def reaction(one: DrivenPart, size: float) -> float:

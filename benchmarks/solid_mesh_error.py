@@ -79,8 +79,10 @@ def rows(name: str, changes: list[str]) -> list[Row]:
         meshes = [one.part.meshed(share * one.size).followed(stops) for share in (COARSER, 1.0, FINEST)]
         if min(len(solved.course.poses) for solved in meshes) < 3:
             continue
-        told = " ".join(change.partition("=")[2] for change in changes)
-        label = " ".join(filter(None, (config, one.name.removeprefix("vcfm-") if "vcfm-" in one.name else "", told)))
+        reported = " ".join(change.partition("=")[2] for change in changes)
+        label = " ".join(
+            filter(None, (config, one.name.removeprefix("vcfm-") if "vcfm-" in one.name else "", reported))
+        )
         coarse, fine, finest = meshes
         found.append(Row(label, fine.differences(coarse), finest.differences(fine)))
     return found
@@ -111,11 +113,11 @@ def table(found: list[Row]) -> str:
             cells += [f"{difference:.1e}", f"{error:.1e}", f"{ratio:.2f}"]
         lines.append(f"| `{row.name}` | {' | '.join(cells)} |")
     force, stress = factor(found, 0), factor(found, 1)
-    told = (
+    reported = (
         f"{len(found)} parts: 95 % of the ratios, times 4/3 for the reference's own error, are below {force} (force) "
         f"and {stress} (stress)."
     )
-    return head + "\n".join(lines) + f"\n\n{told}\n"
+    return head + "\n".join(lines) + f"\n\n{reported}\n"
 
 
 def main() -> None:

@@ -59,8 +59,8 @@ def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
 def child(python: str, name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return `measured` by a process of its own: the shorter of two runs, the first of which also imports."""
     request = json.dumps([name, str(configs), singly])
-    told = subprocess.run([python, HERE, "--one", request], capture_output=True, text=True, check=True).stdout
-    seconds, rows, blocks = json.loads(told)
+    reported = subprocess.run([python, HERE, "--one", request], capture_output=True, text=True, check=True).stdout
+    seconds, rows, blocks = json.loads(reported)
     return seconds, rows, blocks
 
 

@@ -112,8 +112,8 @@ def main() -> None:
             solid = deflection(length, width, force)
             kinds = ((False, 0.0), (True, 0.0), (True, FLAT))
             off = [100 * (beam(length, width, force, *kind) / solid - 1) for kind in kinds]
-            told = "".join(f"{one:+10.2f}" for one in off)
-            print(f"{ratio:3d} {slender:5d} {solid / length:12.4f} {told} %", flush=True)
+            reported = "".join(f"{one:+10.2f}" for one in off)
+            print(f"{ratio:3d} {slender:5d} {solid / length:12.4f} {reported} %", flush=True)
 
 
 if __name__ == "__main__":

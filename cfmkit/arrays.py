@@ -88,8 +88,8 @@ class ShortRepr:
 
     def __repr__(self) -> str:
         """Return the fields, each with a short text."""
-        told = [f"{item.name}={brief(getattr(self, item.name))}" for item in fields(self)]  # type: ignore[arg-type]
-        return f"<{type(self).__name__}: {_joined(told)}>"
+        reported = [f"{item.name}={brief(getattr(self, item.name))}" for item in fields(self)]  # type: ignore[arg-type]
+        return f"<{type(self).__name__}: {_joined(reported)}>"
 
 
 def named(values: Any) -> Any:

@@ -163,8 +163,8 @@ def sentence_of(error: BaseException) -> str:
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{(error.strerror or str(error)).lower()}"
-    told = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"this is a bug in cfmkit: {told}; -vv shows where"
+    reported = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"this is a bug in cfmkit: {reported}; -vv shows where"
 
 
 def lines_of(error: BaseException) -> tuple[str, ...]:

@@ -263,10 +263,10 @@ class Result:
     def __repr__(self) -> str:
         """Return the result in a line: what of, how it ended, how much there is."""
         about = f"{self.spec.family} {self.spec.name!r}, {self.status.key}"
-        told = [repr(curve) for curve in self.curves[:1]]
-        told += [f"{len(self.curves) - 1} more curves"] if len(self.curves) > 1 else []
-        told += [f"warnings: {', '.join(one.name for one in self.warnings[:10])}"] if self.warnings else []
-        return f"<{type(self).__name__} of {'; '.join([about, *told])}>"
+        reported = [repr(curve) for curve in self.curves[:1]]
+        reported += [f"{len(self.curves) - 1} more curves"] if len(self.curves) > 1 else []
+        reported += [f"warnings: {', '.join(one.name for one in self.warnings[:10])}"] if self.warnings else []
+        return f"<{type(self).__name__} of {'; '.join([about, *reported])}>"
 
     @property
     def curve(self) -> Curve:
@@ -357,10 +357,10 @@ class Design:
         """Return what a notebook shows: how the design ended, what the search found, warnings, and the new file."""
         from html import escape
 
-        told = [f"<p>{escape(self.explanation)}</p>"]
-        told += [f"<p>{escape(word)}: {escape(text)}</p>" for word, text in self.notes]
-        told += [f"<p>{escape(one.name)}: {escape(one.message)}</p>" for one in self.warnings]
-        return "<div>" + "".join(told) + ("" if self.spec is None else self.spec._repr_html_()) + "</div>"
+        reported = [f"<p>{escape(self.explanation)}</p>"]
+        reported += [f"<p>{escape(word)}: {escape(text)}</p>" for word, text in self.notes]
+        reported += [f"<p>{escape(one.name)}: {escape(one.message)}</p>" for one in self.warnings]
+        return "<div>" + "".join(reported) + ("" if self.spec is None else self.spec._repr_html_()) + "</div>"
 
     @property
     def explanation(self) -> str:

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def run_file(path: Path) -> tuple[int, list[str]]:
     """Run the examples of one file; return how many failed, and what is to be told of them."""
-    failures, told = 0, [str(path)]
+    failures, reported = 0, [str(path)]
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "configs", Path(folder, "configs"))
         for language, body in BLOCK.findall(path.read_text(encoding="utf-8")):
@@ -38,8 +38,8 @@ def run_file(path: Path) -> tuple[int, list[str]]:
             for command, shown, expected in commands:
                 good, lines = _run(command, shown, expected, folder)
                 failures += not good
-                told += lines
-    return failures, told
+                reported += lines
+    return failures, reported
 
 
 def _console(body: str) -> list[tuple[list[str], str, int]]:
@@ -65,10 +65,10 @@ def _run(command: list[str], shown: str, expected: int, folder: str) -> tuple[bo
         output.seek(0)
         said = output.read()
     good = code == expected
-    told = [f"  {'ok  ' if good else 'FAIL'} {shown.strip().splitlines()[0]}"]
+    reported = [f"  {'ok  ' if good else 'FAIL'} {shown.strip().splitlines()[0]}"]
     if not good:
-        told.append(f"       exit {code}, expected {expected}\n{said[-3000:]}")
-    return good, told
+        reported.append(f"       exit {code}, expected {expected}\n{said[-3000:]}")
+    return good, reported
 
 
 OF_A_SHELL = re.compile(r"[|&;<>$`*?~(){}\\]|\[")
@@ -129,9 +129,9 @@ def main() -> int:
     # before any process imports numpy
     os.environ.update(import_module("cfmkit.studies.serial_and_cluster_executors").ONE_THREAD)
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _import_ahead) as pool:
-        for failed, told in pool.map(run_file, longest_first):
+        for failed, reported in pool.map(run_file, longest_first):
             failures += failed
-            print(*told, sep="\n", flush=True)
+            print(*reported, sep="\n", flush=True)
     print(f"{failures} example(s) failed")
     return 1 if failures else 0
 

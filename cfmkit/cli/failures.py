@@ -37,20 +37,20 @@ class Stopped(BaseException):
     def __init__(self, number: int) -> None:
         """Keep the signal's number."""
         self.exit_code = ExitCode(128 + number)
-        self.told = "interrupted" if number == signal.SIGINT else "terminated"
-        super().__init__(self.told)
+        self.reported = "interrupted" if number == signal.SIGINT else "terminated"
+        super().__init__(self.reported)
 
     def goes_on(self, fresh: bool) -> None:
         """Add that what is finished is kept; a command that was to reuse nothing goes on without that option."""
-        self.told += f"; what is finished is kept: {go_on(fresh)}"
+        self.reported += f"; what is finished is kept: {go_on(fresh)}"
 
     def nothing_begun(self) -> None:
         """Add that there is nothing to go on with yet, neither computed nor cleared away by ``--fresh``."""
-        self.told += "; nothing was computed yet: run the same command again"
+        self.reported += "; nothing was computed yet: run the same command again"
 
     def starts_over(self) -> None:
         """Add that nothing was finished that could be kept: short searches and first points are computed again."""
-        self.told += "; nothing is finished that could be kept: the same command starts over"
+        self.reported += "; nothing is finished that could be kept: the same command starts over"
 
 
 def go_on(fresh: bool) -> str:
@@ -98,14 +98,14 @@ def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
     if isinstance(error, SpecError):
         yield from (asdict(problem) for problem in error.problems)
     else:
-        yield {"message": shortened(_told(error))}
+        yield {"message": shortened(_reported(error))}
 
 
-def _told(error: BaseException) -> str:
+def _reported(error: BaseException) -> str:
     if isinstance(error, ParserError):
         return _of_the_parser(error)
     if isinstance(error, Stopped):
-        return error.told
+        return error.reported
     return errors.sentence_of(error)
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.batch_sources_and_outcomes import Entry
     from cfmkit.studies.metric_changes_since_earlier_batch import MetricChange
 
-PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)
+PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<reported>.*)", re.DOTALL)
 """How the fault of a file begins."""
 
 
@@ -33,7 +33,7 @@ def workflow_commands(entries: Sequence[Entry], changes: Sequence[MetricChange] 
         for line in one.errors:
             found = PLACED.fullmatch(line)
             place = {"file": found["file"], "line": found["line"], "col": found["col"]} if found else {"file": one.spec}
-            yield command("error", place, found["told"] if found else line.removeprefix("error    "))
+            yield command("error", place, found["reported"] if found else line.removeprefix("error    "))
         if one.code and not one.errors and not one.missed:
             yield command("error", {"file": one.spec}, one.message)
         yield from _missed(one)
@@ -72,8 +72,8 @@ def command(kind: str, properties: Mapping[str, Any], message: str) -> str:
     >>> command("error", {"file": "a,b.yaml", "line": "3"}, "100 % wrong")
     '::error file=a%2Cb.yaml,line=3::100 %25 wrong'
     """
-    told = ",".join(f"{key}={_escaped(str(value), ':,')}" for key, value in properties.items())
-    return f"::{kind} {told}::{_escaped(message)}"
+    reported = ",".join(f"{key}={_escaped(str(value), ':,')}" for key, value in properties.items())
+    return f"::{kind} {reported}::{_escaped(message)}"
 
 
 def _escaped(text: str, more: str = "") -> str:

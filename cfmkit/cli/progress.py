@@ -49,7 +49,7 @@ class StudyProgress:
         self._bar = Bar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
         self.stopped = False
         self._all = self._done = self._failed = self._reused = 0
-        self._start = self._told = time.monotonic()
+        self._start = self._reported = time.monotonic()
         self._marks: list[tuple[float, int]] = [(self._start, 0)]
 
     def total(self, points: int) -> None:
@@ -62,8 +62,8 @@ class StudyProgress:
         self._failed += failed
         self._reused += points if reused else 0
         now = time.monotonic()
-        if self._tells and now - self._told >= (LINE_EVERY if self._bar is None else DRAW_EVERY):
-            self._told = now
+        if self._tells and now - self._reported >= (LINE_EVERY if self._bar is None else DRAW_EVERY):
+            self._reported = now
             self._tell(now)
 
     def stopping(self) -> bool:

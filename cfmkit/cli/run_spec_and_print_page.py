@@ -105,8 +105,8 @@ def _complaints(found: Report) -> list[str]:
     status = found.status
     if not status.usable:
         design = found.design
-        told = design.explanation if design is not None and design.spec is None else found.message
-        return [f"error    {spaced(status.key)}: {told}"]
+        reported = design.explanation if design is not None and design.spec is None else found.message
+        return [f"error    {spaced(status.key)}: {reported}"]
     partial = [] if status.exit_code == 0 else [f"partial  {found.message}"]
     return [*partial, *(f"missed   {outcome.sentence.removesuffix(': missed')}" for outcome in found.missed)]
 
@@ -218,7 +218,7 @@ def searched(found: Mapping[str, Searched]) -> list[str]:
         if one.quantity.value is not None:
             over = "" if one.window is None else f", {span(*one.window, one.motion)}"
             groups.setdefault(one.model + over, []).append(f"{words(name)} {_short(one.quantity)}")
-    return [f"{about}: {', '.join(told)}" for about, told in groups.items()]
+    return [f"{about}: {', '.join(reported)}" for about, reported in groups.items()]
 
 
 def words(name: str) -> str:
@@ -279,8 +279,8 @@ def _allowed(report: Report) -> str:
 def _overrated(report: Report, name: str) -> str:
     """Return why a safety factor below one is no finding: the model is known to overrate the stress by as much."""
     factor, share = report.metrics[name].value, report.result.stress_overrated
-    told = {one.name for one in report.result.warnings}
-    if factor is None or "overstressed" in told or not 1 / (1 + share) <= factor < 1:
+    reported = {one.name for one in report.result.warnings}
+    if factor is None or "overstressed" in reported or not 1 / (1 + share) <= factor < 1:
         return ""
     return f" (this model overrates the stress by up to {100 * share:.2g} %)"
 

@@ -358,9 +358,9 @@ def _spec_keys() -> Records:
 
     def named() -> Iterator[tuple[str, dict[str, Any]]]:
         for key, of in known.items():
-            told = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
+            reported = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
             for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
-                yield name, told
+                yield name, reported
 
     return _gathered(named())
 
@@ -399,14 +399,14 @@ def _references() -> Records:
 def _property(item: Mapping[str, Any]) -> str:
     """Return the numbers of a material in words."""
     scatter, strength = item["scatter"], item["yield_strength"]
-    told = [
+    reported = [
         f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_ends(scatter['youngs_modulus'], 1e9)})",
         f"nu = {item['poisson_ratio']:.4g}",
         f"density {item['density']:.4g} kg/m^3",
     ]
     if strength is not None:
-        told.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_ends(scatter['yield_strength'], 1e6)})")
-    return ", ".join(told)
+        reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_ends(scatter['yield_strength'], 1e6)})")
+    return ", ".join(reported)
 
 
 def _ends(ends: Sequence[float], size: float) -> str:

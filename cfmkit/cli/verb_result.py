@@ -41,7 +41,7 @@ class Answer:
     errors: tuple[Mapping[str, Any], ...] = ()
 
 
-def told_of(skipped: Sequence[str], answer: Answer) -> Answer:
+def reported_for(skipped: Sequence[str], answer: Answer) -> Answer:
     """Return an answer that also tells of the families that were skipped: one line each, and in the document."""
     if not skipped:
         return answer

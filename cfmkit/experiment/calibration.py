@@ -214,8 +214,8 @@ def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitPa
 def _undetermined(paths: Sequence[str]) -> str:
     if len(paths) == 1:
         return f"the measured curve does not determine {paths[0]}: changing it changes no force; leave it out of --fit"
-    told = f"{', '.join(paths[:-1])} and {paths[-1]}"
-    return f"the measured curve cannot distinguish {told}: one compensates for the other; fit only one of them"
+    reported = f"{', '.join(paths[:-1])} and {paths[-1]}"
+    return f"the measured curve cannot distinguish {reported}: one compensates for the other; fit only one of them"
 
 
 def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
@@ -232,8 +232,8 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
             )
         for other in range(k):
             if abs(fit.correlation[k, other]) > TIED:
-                told = f"{parameters[other].path} and {item.path} are poorly distinguished"
-                found.append(Finding("weakly_identified", f"{told} (correlation {fit.correlation[k, other]:.5f})"))
+                reported = f"{parameters[other].path} and {item.path} are poorly distinguished"
+                found.append(Finding("weakly_identified", f"{reported} (correlation {fit.correlation[k, other]:.5f})"))
     if not fit.converged:
         found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
     return found

@@ -204,11 +204,11 @@ def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branche
     ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.on, branches)]
     common = overlap([*ends, (measured.lo, measured.hi)], wanted)
     if common is None:
-        told = span_text(measured.lo, measured.hi, kind)
+        reported = span_text(measured.lo, measured.hi, kind)
         where = f", window {span_text(wanted.lo, wanted.hi, kind)}" if wanted else ""
         model = span_text(float(curve.motion.min()), float(curve.motion.max()), kind)
         raise DataError(
-            f"{source.recording.name}: measurement ({told}) and model ({model}{where}) have no travel in common; "
+            f"{source.recording.name}: measurement ({reported}) and model ({model}{where}) have no travel in common; "
             "is the zero of the displacement the same?"
         )
     return common

@@ -124,10 +124,10 @@ def measured(
     chosen = _default(recording) if isinstance(low_pass, str) else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
     if turned_loop(raw):
-        told = (
+        reported = (
             f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
         )
-        warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column reversed?"))
+        warnings = (*warnings, Finding("negative_loop", f"{reported}: is the sign of a column reversed?"))
     plain = MeasuredCurves(recording, strokes, raw, reached=reached, warnings=warnings)
     if chosen is None:
         return plain
@@ -172,11 +172,11 @@ def _strokes(recording: Recording, leave_out: Collection[str]) -> tuple[Strokes,
     """Return what counts of each stroke, what all branches reached, and what is said of the points left out."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
     strokes = _without(recording, spiky)
-    reached, told = _reached(recording, strokes), _spikes_left_out(recording, spiky)
+    reached, reported = _reached(recording, strokes), _spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
-        return strokes, reached, told
+        return strokes, reached, reported
     found = settled(recording, strokes)
-    return found.strokes, reached, (*told, *_passages_left_out(recording, found))
+    return found.strokes, reached, (*reported, *_passages_left_out(recording, found))
 
 
 def _spiky(recording: Recording) -> NDArray[np.bool_]:
@@ -242,8 +242,8 @@ def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, .
         return ()
     length = format_short(found.length, "length" if recording.kind == "force" else "angle", 3)
     points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
-    told = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
-    return (Finding("reversals", told),)
+    reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
+    return (Finding("reversals", reported),)
 
 
 def _default(recording: Recording) -> LowPass:
@@ -256,7 +256,7 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
     if chosen.per == "time" and recording.time is None:
         raise DataError("a cut-off in Hz needs a column with the time; give it in 1/mm or 1/deg instead")
     if chosen.per not in ("time", "length" if recording.kind == "force" else "angle"):
-        raise DataError(f"a cut-off of {chosen.told} does not fit a {recording.kind} curve")
+        raise DataError(f"a cut-off of {chosen.reported} does not fit a {recording.kind} curve")
     smooth = np.array(recording.effort)
     over = recording.time if chosen.per == "time" else recording.motion
     assert over is not None
@@ -305,18 +305,18 @@ def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
         found.append(Finding("one_branch", f"there is the branch {only!r} only: no loop, and no hysteresis"))
     left = len(strokes.strokes) - 2 * len(cycles)
     if cycles and covered(cycles[0]) < WHOLE:
-        told = f"the shorter way covers {100 * covered(cycles[0]):.0f} % of the longer one only"
-        found.append(Finding("unfinished_cycle", f"{told}: the loop is not closed"))
+        reported = f"the shorter way covers {100 * covered(cycles[0]):.0f} % of the longer one only"
+        found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
     if cycles and left:
         found.append(
             Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
         )
     if strokes.pauses:
-        told = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
-        found.append(Finding("pauses", told))
+        reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
+        found.append(Finding("pauses", reported))
     if float(recording.effort.mean()) < 0:
-        told = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
-        found.append(Finding("negative_force", told))
+        reported = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
+        found.append(Finding("negative_force", reported))
     return tuple(found)
 
 
@@ -387,9 +387,9 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
             f"{name}: the window {span_text(wanted.lo, wanted.hi, kind)} is not measured on every branch: "
             f"{span_text(common.lo, common.hi, kind)} is"
         )
-    told = f"the window {span_text(wanted.lo, wanted.hi, kind)} touches a reversal"
+    reported = f"the window {span_text(wanted.lo, wanted.hi, kind)} touches a reversal"
     taken = f"the numbers hold over {span_text(low, high, kind)}, which every branch covers"
-    return Window(low, high), (Finding("window_at_reversal", f"{told}: {taken}"),)
+    return Window(low, high), (Finding("window_at_reversal", f"{reported}: {taken}"),)
 
 
 def common_window(curves: Sequence[Curve]) -> Window:

@@ -71,7 +71,8 @@ class LowPass:
         """
         if self.cutoff * step >= 0.5:
             raise DataError(
-                f"the cut-off {self.told} is not below half the sampling rate; use one below {self._told(0.5 / step)}"
+                f"the cut-off {self.reported} is not below half the sampling rate; "
+                f"use one below {self._reported(0.5 / step)}"
             )
         tangent = math.tan(math.pi * self.cutoff * step)
         if self.corrected:
@@ -82,11 +83,11 @@ class LowPass:
         return found
 
     @property
-    def told(self) -> str:
+    def reported(self) -> str:
         """The cut-off with its unit."""
-        return self._told(self.cutoff)
+        return self._reported(self.cutoff)
 
-    def _told(self, cutoff: float) -> str:
+    def _reported(self, cutoff: float) -> str:
         if self.per == "time":
             return f"{cutoff:.4g} Hz"
         if self.per == "length":
@@ -97,7 +98,9 @@ class LowPass:
     def sentence(self) -> str:
         """What the filter is, for reports."""
         at = "-3 dB both passes together" if self.corrected else "-3 dB each pass"
-        return f"Butterworth of order {self.order} per pass, back and forth, cut-off {self.told} ({at}), each branch"
+        return (
+            f"Butterworth of order {self.order} per pass, back and forth, cut-off {self.reported} ({at}), each branch"
+        )
 
 
 def read_filter(text: str) -> LowPass | None:

@@ -173,20 +173,25 @@ def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tu
     for item in comparison.samples:
         suffix = f"[{item.branch}]" if several else ""
         values = [metrics[name + suffix].value for name in ("data_rmse", "data_offset", "data_error_max")]
-        told = ["no value" if value is None else format_short(value, kind) for value in values]
+        reported = ["no value" if value is None else format_short(value, kind) for value in values]
         where = f" on {item.branch}" if several else ""
-        lines.append(("data", f"model - measured{where}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"))
+        lines.append(
+            (
+                "data",
+                f"model - measured{where}: rms {reported[0]}, mean {reported[1]}, largest {reported[2]} over {over}",
+            )
+        )
     return tuple(lines)
 
 
 def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
     """Return the paragraph that a page shows about the causes of a departure: every number with its name."""
-    told = [
+    reported = [
         f"{name.removeprefix('data_').replace('_', ' ')} {_exact(item.value, item.dimension, 4)}"
         for name, item in causes.items()
         if item.value is not None
     ]
-    return (("causes", ", ".join(told)),) if told else ()
+    return (("causes", ", ".join(reported)),) if reported else ()
 
 
 def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
@@ -247,8 +252,8 @@ def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     lines = []
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
-        told = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
-        lines.append(("fitted", f"{item.path} = {told} (95 %), from {_exact(item.start, item.dimension)}"))
+        reported = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
+        lines.append(("fitted", f"{item.path} = {reported} (95 %), from {_exact(item.start, item.dimension)}"))
     zeros, kind = calibration.zeros, calibration.after.curve.kind
     known = {"--tare": (zeros.effort, kind), "--zero": (zeros.motion, calibration.after.curve.motion_dimension)}
     options = " ".join(f'{name} "{_exact(value, unit, 6)}"' for name, (value, unit) in known.items() if value)

@@ -45,7 +45,7 @@ HEADER_LINES = 5
 
 
 def columns_of(
-    lines: list[str], block: TextBlock, told: dict[str, str], name: str
+    lines: list[str], block: TextBlock, reported: dict[str, str], name: str
 ) -> tuple[list[ColumnInfo], int | None]:
     """Return the columns with what the lines above the numbers say of them, and the line with the names."""
     above = [index for index in range(block.first) if lines[index].strip()][-HEADER_LINES:]
@@ -67,7 +67,7 @@ def columns_of(
             f"{name}: line {block.first + 1} has {block.width} cells but the header {len(rows[0][1])}: comma seems to "
             "be both separator and decimal sign; export with another separator"
         )
-    return describe(names, unit_row, told, name), None if at is None else at + 1
+    return describe(names, unit_row, reported, name), None if at is None else at + 1
 
 
 def _halved(header: Sequence[str], width: int) -> bool:
@@ -81,8 +81,8 @@ def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     there = {item.dimension for item in numeric}
     complete = [pair for pair in pairs if set(pair) <= there]
     if len(complete) > 1:
-        told = {item.dimension for item in numeric if item.told}
-        complete = [pair for pair in pairs if set(pair) <= told] or complete
+        reported = {item.dimension for item in numeric if item.reported}
+        complete = [pair for pair in pairs if set(pair) <= reported] or complete
     if len(complete) > 1:
         raise DataError(
             f"{name}: there are displacement and force, and angle and torque; name the columns that are meant "
@@ -150,12 +150,12 @@ class Decisions:
         skipped = (
             f", {self.skipped_lines} other line{'s' * (self.skipped_lines > 1)} skipped" if self.skipped_lines else ""
         )
-        told = [
+        reported = [
             f"{self.encoding}, separator {self.separator}, decimal {self.decimal}",
             f"{header}numbers from line {self.first_line}{skipped}",
             ", ".join(f"{role} = {label}" for role, label in self.columns.items()),
         ]
-        return told + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
+        return reported + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
 
 @dataclass(frozen=True)
@@ -225,11 +225,11 @@ def read_recording(path: str | os.PathLike[str], units: str | None = None) -> Re
         If it holds no curve.
     """
     name = Path(path).name
-    told = read_units(units)
+    reported = read_units(units)
     text, encoding = decoded(_content(Path(path)), name)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     block = block_of(lines, name)
-    columns, header = columns_of(lines, block, told, name)
+    columns, header = columns_of(lines, block, reported, name)
     roles = roles_of([column for column in columns if column.index in block.numeric], columns, name)
     values = _values(lines, block, list(roles.values()), name)
     rows = [index + 1 for index in range(block.first, block.last) if lines[index].strip()]

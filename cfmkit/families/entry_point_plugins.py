@@ -144,8 +144,8 @@ def _imported(offer: InstalledFamily) -> Family | str:
         with redirect_stdout(sys.stderr):  # standard output is for results
             record = function_named(offer.target)
     except (Exception, SystemExit) as error:  # whatever the package does when it is imported
-        told = " ".join(str(error).split())
-        return f"it cannot be imported: {type(error).__name__}{': ' if told else ''}{visible(told)}"
+        reported = " ".join(str(error).split())
+        return f"it cannot be imported: {type(error).__name__}{': ' if reported else ''}{visible(reported)}"
     if not isinstance(record, Family):
         return f"{offer.target} is a {type(record).__name__}, not a Family"
     if record.name != offer.name:

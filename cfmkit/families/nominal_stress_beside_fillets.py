@@ -72,12 +72,12 @@ def nominal_stresses(
     for sense in (1.0, -1.0):
         own = np.flatnonzero(sense * travel > 0.0).tolist()
         solid = np.array([rows[k].stress for k in own])
-        told = [
+        reported = [
             np.array([beams.beside(placed(rows[k].arc.ends), float(travel[k])) for k in own])
             for beams in (map(SolvedBeams, images(travel[own])) if len(own) else ())
         ]
-        if told:
-            found[own] = max(told, key=lambda stress: float(np.nansum(stress * solid)))
+        if reported:
+            found[own] = max(reported, key=lambda stress: float(np.nansum(stress * solid)))
     return found
 
 

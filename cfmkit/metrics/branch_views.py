@@ -87,8 +87,8 @@ class MeasuringFrame:
             If there is none.
         """
         if not self.target:
-            told = "the target is zero" if self.target is not None else "there is no target to compare with"
-            raise Undefined(f"{told}; 'deviation_from_curve' compares with a curve" if self.curve else told)
+            reported = "the target is zero" if self.target is not None else "there is no target to compare with"
+            raise Undefined(f"{reported}; 'deviation_from_curve' compares with a curve" if self.curve else reported)
         return self.target
 
     def needed_curve(self, low: float, high: float, kind: Kind) -> TargetCurve:

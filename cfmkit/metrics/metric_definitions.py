@@ -366,8 +366,8 @@ def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence
     plain, branch = split_name(name)
     if plain not in known:
         raise UsageError(unknown_metric(plain, known))
-    if branch is not None and (told := branch_fault(known[plain], branch, branches)):
-        raise UsageError(told)
+    if branch is not None and (reported := branch_fault(known[plain], branch, branches)):
+        raise UsageError(reported)
     return known[plain]
 
 

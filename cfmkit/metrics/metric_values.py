@@ -330,7 +330,7 @@ def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
 
 def windows_judged(result: Result) -> Result:
     """Return a result that warns of windows that its nominal curve does not cover, and of keys by old names."""
-    found = tuple(Finding(WINDOW_OUTSIDE, _told(gap, result)) for gap in gaps(result))
+    found = tuple(Finding(WINDOW_OUTSIDE, _reported(gap, result)) for gap in gaps(result))
     found += tuple(
         Finding(OLD_KEY, f"'{old}' is the old name of '{new}', and read by this version only: write {written}")
         for old, new, written in result.spec.old_keys()
@@ -338,7 +338,7 @@ def windows_judged(result: Result) -> Result:
     return replace(result, warnings=(*result.warnings, *found)) if found else result
 
 
-def _told(gap: UncoveredWindow, result: Result) -> str:
+def _reported(gap: UncoveredWindow, result: Result) -> str:
     (low, high), window, kind = gap.common, gap.window, gap.kind
     text = f"{' and '.join(gap.paths)}: the window {span_text(window.lo, window.hi, kind)} is not within the curve, "
     text += span_text(low, high, kind)

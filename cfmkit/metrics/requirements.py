@@ -204,8 +204,8 @@ def _faults(
         yield "metric", unknown_metric(name, table)
         return
     meant = table[name]
-    if branch is not None and (told := branch_fault(meant[0], branch, branches)):
-        yield "metric", told
+    if branch is not None and (reported := branch_fault(meant[0], branch, branches)):
+        yield "metric", reported
     yield from _bound_faults(requirement, tuple(dict.fromkeys(item.dimension for item in meant)))
     if requirement.over is not None:
         yield from _window_faults(requirement.over, meant[0], kind)
@@ -267,10 +267,10 @@ def of_many(requirement: Requirement, found: Quantity) -> Outcome:
     """Return the outcome of a requirement on a metric of many parts, such as their yield."""
     limits = Bounds.of(requirement, found.dimension)
     value = Value(found.value, found.reason)
-    told = limits.sentence(requirement.metric, value, "")
+    reported = limits.sentence(requirement.metric, value, "")
     ends = limits.min, limits.max
     return Outcome(
-        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.met(found.value), told
+        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.met(found.value), reported
     )
 
 

@@ -62,7 +62,7 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
     diagram.set_ylabel(f"{curve.kind} [{border_unit(curve.kind)}]")
     figure.text(0.02, 0.97, result.spec.name, va="top", weight="bold", size=NORMAL + 2.0)
     cursor = diagram.axvline(0.0, color=TROUBLE, linewidth=1.0, linestyle="--")
-    told = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=GREY)
+    reported = diagram.text(0.98, 0.03, "", transform=diagram.transAxes, ha="right", color=GREY)
     places = to_border(moving.motion, curve.motion_dimension)
     found = []
     for number, place in enumerate(places):
@@ -70,7 +70,7 @@ def frames(result: Result, moving: Moving) -> list[NDArray[np.uint8]]:
         moving.draw(pose, number)
         pose.set_axis_off()
         cursor.set_xdata([place, place])
-        told.set_text(f"{place:.4g} {border_unit(curve.motion_dimension)}")
+        reported.set_text(f"{place:.4g} {border_unit(curve.motion_dimension)}")
         canvas: Any = figure.canvas
         canvas.draw()
         found.append(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
@@ -135,6 +135,6 @@ def _film(whole: Sequence[NDArray[np.uint8]]) -> bytes:
         ]
         done = subprocess.run(command, input=b"".join(map(bytes, whole)), capture_output=True, check=False)
         if done.returncode:
-            told = " ".join(done.stderr.decode(errors="replace").split())
-            raise UsageError(f"--animate mp4: ffmpeg could not write the film: {told[:200]}")
+            reported = " ".join(done.stderr.decode(errors="replace").split())
+            raise UsageError(f"--animate mp4: ffmpeg could not write the film: {reported[:200]}")
         return out.read_bytes()

@@ -172,9 +172,9 @@ def _read(path: str) -> dict[str, Any]:
 
     import matplotlib
 
-    told: list[str] = []
+    reported: list[str] = []
     teller = logging.Handler()
-    teller.emit = lambda record: told.append(record.getMessage())  # type: ignore[method-assign]
+    teller.emit = lambda record: reported.append(record.getMessage())  # type: ignore[method-assign]
     log = logging.getLogger("matplotlib")
     log.addHandler(teller)
     before, log.propagate = log.propagate, False
@@ -189,8 +189,10 @@ def _read(path: str) -> dict[str, Any]:
     finally:
         log.removeHandler(teller)
         log.propagate = before
-    if told:
-        first = " ".join(told[0].split()).partition(" You probably need")[0]  # then come addresses of the library's own
+    if reported:
+        first = " ".join(reported[0].split()).partition(" You probably need")[
+            0
+        ]  # then come addresses of the library's own
         raise UsageError(f"--figure-style: {visible(path)}: {visible(first)}")
     return dict(read)
 

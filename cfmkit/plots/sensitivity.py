@@ -135,15 +135,15 @@ def _limits(axes: Axes, each: tuple[Bounds, ...]) -> None:
 def _summary(drawn: FloatArray, known: FloatArray, limits: tuple[Bounds, ...]) -> str:
     """Return number, mean, deviation and the share inside the limits, in one line."""
     missing = len(drawn) - len(known)
-    told = [f"{len(drawn)} parts" + (f", {missing} without a result" if missing else "")]
+    reported = [f"{len(drawn)} parts" + (f", {missing} without a result" if missing else "")]
     if len(known) > 1:
-        told.append(f"mean {known.mean():.5g}, sd {known.std(ddof=1):.3g}")
+        reported.append(f"mean {known.mean():.5g}, sd {known.std(ddof=1):.3g}")
         low, high = np.percentile(known, (2.5, 97.5))
-        told.append(f"95 % in {low:.5g} ... {high:.5g}")
+        reported.append(f"95 % in {low:.5g} ... {high:.5g}")
     if limits and len(known):
         inside = sum(all(one.met(value) for one in limits) for value in drawn[np.isfinite(drawn)].tolist())
-        told.append(f"{100 * inside / len(drawn):.1f} % within limits")
-    return ";  ".join(told)
+        reported.append(f"{100 * inside / len(drawn):.1f} % within limits")
+    return ";  ".join(reported)
 
 
 MOST_SHOWN = 12
@@ -276,8 +276,8 @@ def draw_gains(found: Findings) -> Figure:
     order = _ranked(lines)
     share = found.all_met
     stated = share is not None and share.value == share.value
-    told = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
-    figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {told}; which tolerance to tighten first")
+    reported = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
+    figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {reported}; which tolerance to tighten first")
     _draw_bars(axes, lines, order, (BLUE, "", 0.0, 0.6))
     _rows(axes, [lines[k].parameter for k in order])
     from matplotlib.ticker import PercentFormatter

@@ -63,8 +63,8 @@ class DrawnScale:
         """The label with what it is, where an axis has room for it: ``positive.length: of one leaf, L1 [mm]``."""
         short, bracket, unit = self.label.partition(" [")
         path = self.name.removeprefix("mechanism.").replace("_", " ")
-        told = f"{path}: {self.about}{bracket}{unit}"
-        return told if self.about and len(told) <= LONGEST else f"{short}{bracket}{unit}"
+        reported = f"{path}: {self.about}{bracket}{unit}"
+        return reported if self.about and len(reported) <= LONGEST else f"{short}{bracket}{unit}"
 
     @property
     def plain(self) -> str:

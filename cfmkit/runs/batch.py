@@ -131,14 +131,14 @@ def _verb(name: str, fresh: bool) -> Verb:
 def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
     """Return what became of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
-    told = [one["sentence"] for one in data["requirements"] if not one["ok"]]
+    reported = [one["sentence"] for one in data["requirements"] if not one["ok"]]
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
-        told = [data["message"]]
+        reported = [data["message"]]
     return replace(
         entry,
         status=data["status"],
         code=code,
-        message="; ".join(told),
+        message="; ".join(reported),
         requirements=tuple(data["requirements"]),
         warnings=tuple(data["warnings"]),
         written=True,
@@ -148,8 +148,8 @@ def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
 def _failed(entry: Entry, error: Exception) -> Entry:
     code, complaints = code_of(error), tuple(_of_one(entry, error))
     first, *more = complaints
-    told = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
-    return replace(entry, status=code.name.lower(), code=code, message=told, errors=complaints)
+    reported = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
+    return replace(entry, status=code.name.lower(), code=code, message=reported, errors=complaints)
 
 
 def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
@@ -244,8 +244,8 @@ def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[En
         entry = outcome if isinstance(outcome, Entry) else lost(job, outcome)
         crew.kept.keep(entry)
         note(job, entry)
-    told = "not run: interrupted" if crew.progress.stopped else LEFT
-    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=told) for job in jobs)
+    reported = "not run: interrupted" if crew.progress.stopped else LEFT
+    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=reported) for job in jobs)
 
 
 def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executor:
@@ -444,7 +444,7 @@ def batch(
     todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepared(junit)
-    told = None if summary is None else prepared(summary, "--summary")
+    reported = None if summary is None else prepared(summary, "--summary")
     tolerance = TOLERANCE if compare_tolerance is None else compare_tolerance
     if not 0 <= tolerance < 1:
         raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1")
@@ -464,10 +464,10 @@ def batch(
         )
     if report is not None:
         report(junit_of(entries))
-    if told is not None:
+    if reported is not None:
         from cfmkit.runs.batch_output_files import summary as in_markdown
 
-        told(in_markdown(entries, compared))
+        reported(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared)
 
 

@@ -164,9 +164,9 @@ def _compared(compared: BatchComparison) -> Iterator[str]:
     if not compared.changes:
         yield "No metric has changed."
     else:
-        told = f"{count} value{'s' * (count != 1)} changed by more than {100 * compared.tolerance:.4g} %"
+        reported = f"{count} value{'s' * (count != 1)} changed by more than {100 * compared.tolerance:.4g} %"
         less = len(compared.changes) - count
-        yield plain(f"{told}, {less} by less." if less else f"{told}.")
+        yield plain(f"{reported}, {less} by less." if less else f"{reported}.")
         shown = (*compared.beyond, *(one for one in compared.changes if not one.beyond))[:MOST_CHANGES]
         yield from ("", "| specification | change |", "|---|---|")
         for one in shown:

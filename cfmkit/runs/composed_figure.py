@@ -69,8 +69,8 @@ def panels(name: str, found: ComposedFigure, executor: Executor) -> list[DrawnPa
             except (UsageError, SolutionError) as error:
                 raise SpecError([document.problem(f"panels.{number}.run", str(error))]) from None
         if panel.plot not in known[key]:
-            told = _no_such(panel.plot, known[key])
-            raise SpecError([document.problem(f"panels.{number}.plot", told)])
+            reported = _no_such(panel.plot, known[key])
+            raise SpecError([document.problem(f"panels.{number}.plot", reported)])
         drawn.append(DrawnPanel(known[key][panel.plot], panel.label))
     return drawn
 

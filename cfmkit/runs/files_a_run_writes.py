@@ -116,8 +116,8 @@ def _drawn(drawing: Drawing, spec: Spec) -> Figure:
     from cfmkit.plots.workshop_drawing import drawing_figure
 
     stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
-    told = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
-    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", told)
+    reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
+    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported)
 
 
 def stated_tolerances(spec: Spec) -> tuple[str, ...]:

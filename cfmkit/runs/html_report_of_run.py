@@ -191,13 +191,13 @@ def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, 
 def _moment(result: Result, place: float) -> str:
     """Return the motion and the effort of every branch at one pose, in words."""
     curve = result.curve
-    told = [f"{curve.motion_name} {format_short(place, curve.motion_dimension)}"]
+    reported = [f"{curve.motion_name} {format_short(place, curve.motion_dimension)}"]
     for name in dict.fromkeys(curve.branches):
         on = curve.branch == name
         effort = _nearest(curve.motion[on], curve.effort[on], place)
         label = f"{curve.kind} on {name}" if len(set(curve.branches)) > 1 else curve.kind
-        told.append(f"{label} {format_short(effort, curve.kind)}" if np.isfinite(effort) else f"{label}: none")
-    return ", ".join(told)
+        reported.append(f"{label} {format_short(effort, curve.kind)}" if np.isfinite(effort) else f"{label}: none")
+    return ", ".join(reported)
 
 
 def _nearest(motion: Any, effort: Any, place: float) -> float:

@@ -52,7 +52,7 @@ class AnalysisView(Result):
         if self.curves:
             lead = (*family(self.spec.family).headline, "force_mean", "torque_mean", "usable_stroke")
             known = {name: self.metrics[name] for name in dict.fromkeys(lead) if name in self.metrics}
-            rows = [(name, _told(one), one.definition) for name, one in known.items() if one.value is not None]
+            rows = [(name, _reported(one), one.definition) for name, one in known.items() if one.value is not None]
             parts.append(html_table(("metric", "value", "what it is"), rows))
         if self.requirements:
             met = [(one.sentence, "yes" if one.ok else "no") for one in self.requirements]
@@ -69,7 +69,7 @@ class AnalysisView(Result):
         return "" if draw is None else inline(svg(draw()), name)
 
 
-def _told(quantity: Quantity) -> str:
+def _reported(quantity: Quantity) -> str:
     if quantity.word is not None:
         return quantity.word
     return "" if quantity.value is None else format_short(quantity.value, quantity.dimension)

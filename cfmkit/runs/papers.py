@@ -187,7 +187,7 @@ def _checked(row: PrintedRow) -> ComputedRow:
         values = _values(row)
     except (CfmError, ValueError, KeyError) as error:
         return ComputedRow(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
-    shown = tuple(_told(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
+    shown = tuple(_reported(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
     return ComputedRow(row, shown, "; ".join(_faults(row, values)))
 
 
@@ -204,12 +204,12 @@ def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
     """Yield what speaks against the verdict of a row."""
     for value, printed in zip(values, row.printed, strict=True):
         if row.verdict in ("agrees", "given") and not _matches(value, printed, row.tolerance):
-            yield f"{_told(value, printed)} is not {printed}"
+            yield f"{_reported(value, printed)} is not {printed}"
         if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
-            yield f"{_told(value, printed)} is what is printed"
+            yield f"{_reported(value, printed)} is what is printed"
     for value, here in zip(values, row.here, strict=bool(row.here)):
         if not _matches(value, here):
-            yield f"{_told(value, here)} is not {here}"
+            yield f"{_reported(value, here)} is not {here}"
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,7 @@ def _matches(value: float, text: str, tolerance: str = "") -> bool:
     return abs(value - wanted.value) <= room * (1 + 1e-9) + 1e-12 * abs(wanted.value)
 
 
-def _told(value: float, text: str) -> str:
+def _reported(value: float, text: str) -> str:
     """Return a value in the unit of a printed text, with two digits more."""
     if not _is_quantity(text):
         return f"{value:.6g}"

@@ -39,7 +39,7 @@ def wish_of(name: str | None, keys: Mapping[str, str]) -> WishBlock:
     try:
         return document.bind(WishFile).wish
     except SpecError as error:
-        told = error
+        reported = error
     for key in keys:
-        told = renamed(told, f"--set wish.{key}", f"--{key}")
-    raise told
+        reported = renamed(reported, f"--set wish.{key}", f"--{key}")
+    raise reported

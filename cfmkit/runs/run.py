@@ -280,8 +280,8 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
     from cfmkit.studies.expected_forces_at_bench import bench
 
     found = _with_yield(found, nominal, given, run)
-    told = bench(nominal, run)
-    return found.beside({}, run_outcome.Supplement(lines=(("bench", told),))) if told else found
+    reported = bench(nominal, run)
+    return found.beside({}, run_outcome.Supplement(lines=(("bench", reported),))) if reported else found
 
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
@@ -292,8 +292,8 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
     if yields is None:
         from cfmkit.studies.yield_by_assumed_tolerances import expected
 
-        told = expected(nominal, run)
-        return found.beside({}, run_outcome.Supplement(lines=(("made", told),))) if told else found
+        reported = expected(nominal, run)
+        return found.beside({}, run_outcome.Supplement(lines=(("made", reported),))) if reported else found
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()
 

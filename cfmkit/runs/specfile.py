@@ -152,9 +152,9 @@ def bind(document: Document) -> Spec:
     try:
         spec = document.bind(family.spec_type)
     except SpecError as error:
-        told = {problem.path for problem in error.problems}
+        reported = {problem.path for problem in error.problems}
         raw = _entries(document.tree)
-        more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, told)]
+        more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, reported)]
         raise SpecError(_in_order([*error.problems, *more])) from None
     found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
     found += [*_sensitivity_faults(document, spec), *_design_faults(document, spec)]
@@ -251,8 +251,8 @@ def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
             yield index, requirement
 
 
-def _below(path: str, told: set[str]) -> bool:
-    return any(path == other or path.startswith(f"{other}.") for other in told if other)
+def _below(path: str, reported: set[str]) -> bool:
+    return any(path == other or path.startswith(f"{other}.") for other in reported if other)
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

@@ -57,7 +57,7 @@ class Deadlines:
     files: Clock
 
 
-def told(proposal: Proposal) -> dict[str, Any]:
+def reported(proposal: Proposal) -> dict[str, Any]:
     """Return a proposal's numbers in border units, by the name of its column."""
     found: dict[str, Any] = {}
     for name, value in proposal.numbers.items():
@@ -71,7 +71,7 @@ def told(proposal: Proposal) -> dict[str, Any]:
 def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
     """Return the same with the mean in N or N*mm."""
     mean = proposal.numbers.get("mean")
-    return told(proposal) | {"mean": None if mean is None else float(to_border(mean, found.wish.kind))}
+    return reported(proposal) | {"mean": None if mean is None else float(to_border(mean, found.wish.kind))}
 
 
 def exit_code(found: Suggestions) -> ExitCode:
@@ -273,7 +273,7 @@ def page(
         for one in record["proposals"]
     ]
     text: str = template("suggestions.html.j2").render(
-        told=record,
+        reported=record,
         tone=TONES.get(record["status"], "bad"),
         wish=_listed(record["wish"]),
         heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],

@@ -259,8 +259,8 @@ def _guided(group: Group, travel: float, center: int, carrier: int) -> Lines:
 
 def _equation(*terms: tuple[int, int, float]) -> list[str]:
     """Return that terms (node, axis, factor) add up to nothing."""
-    told = ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in terms)
-    return ["*EQUATION", str(len(terms)), told]
+    reported = ", ".join(f"{node}, {axis}, {factor:.12g}" for node, axis, factor in terms)
+    return ["*EQUATION", str(len(terms)), reported]
 
 
 def _turned(word: str, hub: Hub, angle: float, carrier: int, poses: int) -> Lines:

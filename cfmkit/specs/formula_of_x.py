@@ -139,9 +139,9 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
             return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
-    told = shown(ast.unparse(node))
+    reported = shown(ast.unparse(node))
     raise ValueError(
-        f"{told} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}"
+        f"{reported} is unknown here; a formula may hold numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}"
     )
 
 

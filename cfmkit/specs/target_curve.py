@@ -215,8 +215,8 @@ def _from_file(source: DataSource) -> tuple[tuple[Place, DimensionedFloat], ...]
             try:
                 numbers.append(read_quantity(f"{cells[column].strip()} {unit}", _COLUMNS[name]))
             except (QuantityError, IndexError) as problem:
-                told = str(problem) if isinstance(problem, QuantityError) else f"no {name}"
-                raise ValueError(f"{source}:{line}: {told}") from None
+                reported = str(problem) if isinstance(problem, QuantityError) else f"no {name}"
+                raise ValueError(f"{source}:{line}: {reported}") from None
         points.append((Place(numbers[0], _COLUMNS[pair[0]]), DimensionedFloat(numbers[1], _COLUMNS[pair[1]])))
     if not 2 <= len(points) <= MOST_POINTS:
         raise ValueError(f"{source}: a curve has 2 to {MOST_POINTS} points, not {len(points)}")

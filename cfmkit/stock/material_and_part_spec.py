@@ -68,8 +68,10 @@ class Fatigue(Model):
     def _within_points(self, points: tuple[tuple[float, float], ...]) -> None:
         """Raise if an amplitude is more than the material bears once, or more cycles are wanted than were shown."""
         if points[0][1] > self.ultimate_strength:
-            told = f"{format_short(points[0][1], 'stress')} is above {format_short(self.ultimate_strength, 'stress')}"
-            raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {told}")
+            reported = (
+                f"{format_short(points[0][1], 'stress')} is above {format_short(self.ultimate_strength, 'stress')}"
+            )
+            raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {reported}")
         if self.cycles is not None and self.cycles > points[-1][0] * (1 + 1e-12):
             raise ValueError(
                 f"'cycles' is {self.cycles:g}, more than the {points[-1][0]:g} at which 'points' end: add points, or "
@@ -164,8 +166,8 @@ class MaterialSpec(Model):
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
         if self.law == "neo-hookean" and self.poisson >= 0.5:
-            told = "'neo-hookean' needs a poisson_ratio below 0.5: at 0.5 it has no finite bulk modulus"
-            refuse("Material", {("law",): told})
+            reported = "'neo-hookean' needs a poisson_ratio below 0.5: at 0.5 it has no finite bulk modulus"
+            refuse("Material", {("law",): reported})
         return self
 
     @property

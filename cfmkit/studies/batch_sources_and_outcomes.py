@@ -288,8 +288,8 @@ def message(entries: Sequence[Entry]) -> str:
     '2 specs: 1 ok, 1 skipped'
     """
     counts = Counter(outcome(one) for one in entries)
-    told = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), TIMED_OUT, SKIPPED) if counts[word])
-    return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {told}"
+    reported = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), TIMED_OUT, SKIPPED) if counts[word])
+    return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {reported}"
 
 
 OUTCOMES = {

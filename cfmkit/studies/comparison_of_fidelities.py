@@ -113,13 +113,13 @@ class FidelityComparison:
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """What is left out, and what the others warn of and the nominal one does not."""
-        told = {item.name for item in self.variants[0].result.warnings}
+        reported = {item.name for item in self.variants[0].result.warnings}
         gone = [Finding("fidelity_left_out", f"{name!r} cannot run here: {why}") for name, why in self.left_out.items()]
         more = [
             replace(found, message=f"with fidelity {item.name}: {found.message}")
             for item in self.variants[1:]
             for found in item.result.warnings
-            if found.name not in told and found.message != item.result.message
+            if found.name not in reported and found.message != item.result.message
         ]
         return (*gone, *more)
 
@@ -219,8 +219,8 @@ def choices_of(spec: Spec) -> Choices:
         except SpecError as error:
             obstacles[name] = "; ".join(problem.message for problem in error.problems)
     if len(specs) < 2:
-        told = "; ".join(f"{name!r} cannot run here: {why}" for name, why in obstacles.items())
-        raise SpecError([Problem(OPTION, 0, 0, "", f"needs two models; {told}")])
+        reported = "; ".join(f"{name!r} cannot run here: {why}" for name, why in obstacles.items())
+        raise SpecError([Problem(OPTION, 0, 0, "", f"needs two models; {reported}")])
     return Choices(names, specs, obstacles)
 
 
@@ -288,6 +288,6 @@ def _lines(found: FidelityComparison, item: Variant) -> Iterator[str]:
         if window is None or values[0].value is None:
             yield f"{title}: undefined: {values[0].reason}"
             continue
-        told = [format_short(one.value or 0.0, one.dimension) for one in values]
+        reported = [format_short(one.value or 0.0, one.dimension) for one in values]
         over = span_text(window.lo, window.hi, found.kind)
-        yield f"{title}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"
+        yield f"{title}: rms {reported[0]}, mean {reported[1]}, largest {reported[2]} over {over}"

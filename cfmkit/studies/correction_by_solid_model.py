@@ -59,15 +59,15 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     try:
         as_solid = design.spec.replace({FIDELITY: "solid"})
     except SpecError as error:
-        told = "; ".join(problem.message for problem in error.problems)
-        return Design(None, Status.INVALID, f"design.verify: this design cannot be a solid: {told}")
+        reported = "; ".join(problem.message for problem in error.problems)
+        return Design(None, Status.INVALID, f"design.verify: this design cannot be a solid: {reported}")
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
     own, mean, where = _means(beams, solid)
     wanted = next((level for path in record.levels if (level := _level(given, path))), None) or own
     if solid.status is not Status.COMPLETE or not wanted or not mean or not own or wanted / mean <= 0:
-        told = f"the part as a solid has no force to be corrected: {solid.message}"
-        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", told)))
+        reported = f"the part as a solid has no force to be corrected: {solid.message}"
+        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
     factor = wanted / mean
     kind = solid.curve.kind
     begun = (
@@ -80,22 +80,22 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     outside = _outside(given, design.spec, corrected)
     if outside is not None:
         return outside
-    told = "; ".join(
+    reported = "; ".join(
         f"{path} {format_short(width, 'length')} -> {format_short(corrected[path], 'length', 6)}"
         for path, width in _widths(as_solid).items()
     )
     made = as_solid.replace(corrected)
     aim = format_short(wanted, kind)
-    note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {told}"
-    return _told(design, made, note, _numbers(wanted, own, mean, factor, kind), solid)
+    note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {reported}"
+    return _reported(design, made, note, _numbers(wanted, own, mean, factor, kind), solid)
 
 
 def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begun: str, run: Run) -> Design:
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
     path = next((path for path in family(given.family).levels if _level(given, path)), None)
     if path is None:
-        told = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
-        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", told)))
+        reported = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
+        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
     wanted = _level(given, path)
     record = family(given.family)
     assert record.design is not None
@@ -116,8 +116,8 @@ def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, st
     far = min(abs(float(one.curve.motion[-1])) for one in (beams, solid))
     window = window_of(beams)
     low, high = sorted((abs(window.lo), abs(window.hi))) if window is not None else (0.0, far)
-    told = format_short(min(high, far), solid.spec.motion or "length")
-    over = f" over the travel up to {told}, which both reach"
+    reported = format_short(min(high, far), solid.spec.motion or "length")
+    over = f" over the travel up to {reported}, which both reach"
     return _over_travel(beams, low, min(high, far)), _over_travel(solid, low, min(high, far)), over
 
 
@@ -162,12 +162,12 @@ def _outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Des
     ranges = function_named(record.free)(given, designed) if record.free is not None else {}
     for path, (low, high) in ranges.items():
         if path in corrected and not low * (1 - 1e-9) <= corrected[path] <= high * (1 + 1e-9):
-            told = (
+            reported = (
                 f"design.verify: for the requested force of the solid {path} would be "
                 f"{format_short(corrected[path], 'length')}, outside its range of {format_short(low, 'length')} to "
                 f"{format_short(high, 'length')}"
             )
-            return Design(None, Status.INFEASIBLE, told)
+            return Design(None, Status.INFEASIBLE, reported)
     return None
 
 
@@ -182,7 +182,7 @@ def _numbers(
     }
 
 
-def _told(
+def _reported(
     design: Design, made: Spec, note: str, numbers: dict[str, tuple[float | None, str, str]], solid: Result
 ) -> Design:
     window = solid.travel or (0.0, 0.0)

@@ -114,9 +114,9 @@ class Work:
         """Return single rows as the rows of this study."""
         return gathered(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
 
-    def recall(self, told: Any) -> ResultRows:
+    def recall(self, reported: Any) -> ResultRows:
         """Return the rows that a record of the journal is."""
-        return recalled(told, len(self.study.metrics), len(self.study.spec.part_requirements))
+        return recalled(reported, len(self.study.metrics), len(self.study.spec.part_requirements))
 
 
 class Monitor(Protocol):
@@ -260,13 +260,13 @@ class Records:
             if self._places[at] < 0:
                 at += 1
                 continue
-            key, told = self._key(at), self._told(at)
-            if "n" in told and "keys" not in told:
+            key, reported = self._key(at), self._reported(at)
+            if "n" in reported and "keys" not in reported:
                 yield self._journal.line(int(self._places[at]), key)
-                at += int(told["n"])
+                at += int(reported["n"])
                 continue
             keys.append(key)
-            rows.append(self._rows(told))
+            rows.append(self._rows(reported))
             at += 1
             if len(keys) == MOST_TOGETHER:
                 yield _together(keys, rows)
@@ -278,22 +278,22 @@ class Records:
         key: bytes = self._keys[index].tobytes()
         return key.hex()
 
-    def _told(self, index: int) -> Any:
+    def _reported(self, index: int) -> Any:
         return self._journal.read(int(self._places[index]), self._key(index))
 
     def _read(self, index: int) -> ResultRows | Row:
-        told = self._told(index)
-        return self._rows(told) if "n" in told else recalled_row(told)
+        reported = self._reported(index)
+        return self._rows(reported) if "n" in reported else recalled_row(reported)
 
-    def _rows(self, told: Any) -> ResultRows:
+    def _rows(self, reported: Any) -> ResultRows:
         """Return the rows that a record is; of one among others its own, the line being read once for all of them."""
-        if "at" not in told:
-            return self.work.recall(told)
+        if "at" not in reported:
+            return self.work.recall(reported)
         keys, whole = self._line
-        if whole is None or keys is not told["keys"]:
-            whole = self.work.recall(told)
-            self._line = told["keys"], whole
-        return cut(whole, told["at"], told["at"] + 1)
+        if whole is None or keys is not reported["keys"]:
+            whole = self.work.recall(reported)
+            self._line = reported["keys"], whole
+        return cut(whole, reported["at"], reported["at"] + 1)
 
     def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
@@ -301,7 +301,7 @@ class Records:
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
             return cut(self._held[start], index - start, index - start + 1)
-        rows = self._rows(self._told(index))
+        rows = self._rows(self._reported(index))
         return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
 
 

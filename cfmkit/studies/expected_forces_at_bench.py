@@ -84,10 +84,10 @@ def _to_measure(made: DesignTolerances, weight: FloatArray) -> str:
     order = [int(k) for k in np.argsort(-weight) if weight[k] > 0]
     sizes = [k for k in order if made.parameters[k].dimension in SIZES][:DIMENSIONS]
     others = [k for k in order[:DIMENSIONS] if made.parameters[k].dimension not in SIZES]
-    told = [f"measure {_listed([_dimension(made, k) for k in sizes])}"] if sizes else []
+    reported = [f"measure {_listed([_dimension(made, k) for k in sizes])}"] if sizes else []
     if others:
-        told.append(f"determine {_listed([_named(made, k) + ' in the design)' for k in others])}")
-    return ", ".join(told)
+        reported.append(f"determine {_listed([_named(made, k) + ' in the design)' for k in others])}")
+    return ", ".join(reported)
 
 
 def _dimension(made: DesignTolerances, k: int) -> str:
@@ -98,8 +98,8 @@ def _dimension(made: DesignTolerances, k: int) -> str:
         return f"{_named(made, k)} as drawn)"
     # an error of all thicknesses is nothing that is drawn
     ends = (min(thickness), max(thickness)) if isinstance(thickness, tuple) else (thickness,)
-    told = " to ".join(format_short(end, "length") for end in ends)
-    return f"{parent.removeprefix('mechanism.')}.thickness ({told} as drawn)"
+    reported = " to ".join(format_short(end, "length") for end in ends)
+    return f"{parent.removeprefix('mechanism.')}.thickness ({reported} as drawn)"
 
 
 def _named(made: DesignTolerances, k: int) -> str:

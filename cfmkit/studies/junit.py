@@ -72,8 +72,8 @@ def _solution(entry: Entry) -> Element:
         case.append(Element("skipped", message=clean(entry.message)))
     elif entry.code not in FINE:
         tag = "failure" if entry.code in FAILURES else "error"
-        told = "\n".join((*entry.errors, entry.bug)).strip() or entry.message
-        case.append(_problem(tag, entry.status, entry.message, told))
+        reported = "\n".join((*entry.errors, entry.bug)).strip() or entry.message
+        case.append(_problem(tag, entry.status, entry.message, reported))
     if entry.warnings:
         said = Element("system-out")
         said.text = clean("\n".join(f"warning {one['name']}: {one['message']}" for one in entry.warnings))

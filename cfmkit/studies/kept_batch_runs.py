@@ -64,15 +64,15 @@ class KeptRuns:
         place = -1 if key is None else self._notes.find(key)
         if key is None or place < 0:
             return None
-        told = self._notes.read(place, key)
-        entry = _entry(told["entry"])
+        reported = self._notes.read(place, key)
+        entry = _entry(reported["entry"])
         if not entry.verb:
             return entry
-        data_there = all(_hash_beside(spec, name) == digest for name, digest in told["data"])
-        if not data_there or not self._untouched(folder, told["manifest"]):
+        data_there = all(_hash_beside(spec, name) == digest for name, digest in reported["data"])
+        if not data_there or not self._untouched(folder, reported["manifest"]):
             return None
         # pages link to its folder, and comparisons read it, as if it had been written now
-        return replace(entry, written=told["manifest"] is not None)
+        return replace(entry, written=reported["manifest"] is not None)
 
     def keep(self, entry: Entry) -> None:
         """Note how a specification ended, unless that may be different tomorrow."""
@@ -117,18 +117,18 @@ def _hash_beside(spec: str, name: str) -> str | None:
         return None
 
 
-def _entry(told: dict[str, Any]) -> Entry:
+def _entry(reported: dict[str, Any]) -> Entry:
     return Entry(
-        told["spec"],
-        told["folder"],
-        told["verb"] or "",
-        told["family"] or "",
-        told["name"] or "",
-        told["status"],
-        ExitCode(told["exit_code"]),
-        told["message"],
-        tuple(told["requirements"]),
-        tuple(told["warnings"]),
-        tuple(told["errors"]),
+        reported["spec"],
+        reported["folder"],
+        reported["verb"] or "",
+        reported["family"] or "",
+        reported["name"] or "",
+        reported["status"],
+        ExitCode(reported["exit_code"]),
+        reported["message"],
+        tuple(reported["requirements"]),
+        tuple(reported["warnings"]),
+        tuple(reported["errors"]),
         reused=True,
     )

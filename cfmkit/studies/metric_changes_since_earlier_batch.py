@@ -65,7 +65,7 @@ class MetricChange:
         """The change in words."""
         share = "" if self.relative is None else f" ({100 * self.relative:+.3g} %)"
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
-        return f"{self.name}: {_told(self.before)} -> {_told(self.after)}{unit}{share}"
+        return f"{self.name}: {_reported(self.before)} -> {_reported(self.after)}{unit}{share}"
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class BatchComparison:
         return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
 
 
-def _told(value: float | str | None) -> str:
+def _reported(value: float | str | None) -> str:
     return "no value" if value is None else value if isinstance(value, str) else f"{value:.8g}"
 
 

@@ -101,9 +101,9 @@ def _place(path: str) -> str:
     return re.sub(r"\.\d+", "[]", path)
 
 
-def _scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], told: tuple[str, str]) -> DrawnScale:
+def _scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], reported: tuple[str, str]) -> DrawnScale:
     path, dimension = kind
-    name, about = told
+    name, about = reported
     if dimension != "text":
         return DrawnScale(path, dimension, np.asarray(shown, dtype=np.float64), short=name, about=about)
     return DrawnScale(path, dimension, np.array([float(words.index(str(one))) for one in shown]), words, name, about)
@@ -221,13 +221,13 @@ def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
     )
 
 
-def _metric(told: Mapping[str, Any], column: TableColumn) -> DrawnScale:
+def _metric(reported: Mapping[str, Any], column: TableColumn) -> DrawnScale:
     cells = column.cells()
-    if not told["words"]:
-        return measured_scale(told["name"], told["dimension"], _numbers(cells))
-    words = tuple(told["words"])
+    if not reported["words"]:
+        return measured_scale(reported["name"], reported["dimension"], _numbers(cells))
+    words = tuple(reported["words"])
     places = [np.nan if cell is None else float(words.index(str(cell))) for cell in cells]
-    return DrawnScale(told["name"], told["dimension"], np.array(places), words)
+    return DrawnScale(reported["name"], reported["dimension"], np.array(places), words)
 
 
 def _numbers(cells: Sequence[Cell]) -> FloatArray:

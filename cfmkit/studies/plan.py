@@ -160,8 +160,8 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     """
     counts = {item.leaf.path: item.count or 0 for item in axes}
     if len(set(counts.values())) > 1:
-        told = ", ".join(f"{path} has {count}" for path, count in counts.items())
-        raise UsageError(f"values side by side must be equally many: {told}")
+        reported = ", ".join(f"{path} has {count}" for path, count in counts.items())
+        raise UsageError(f"values side by side must be equally many: {reported}")
     size = next(iter(counts.values()))
     refuse_too_many(size, most)
     plan = Plan(tuple(map(stepped, axes)), size, joint=True)

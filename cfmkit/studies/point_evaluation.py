@@ -150,7 +150,7 @@ class Study:
         names = {split_name(one)[0] for one in (*self.names, *(one.metric for one in self.spec.part_requirements))}
         return frozenset({*names, *map(other_name, names)})
 
-    def told(self, column: int, value: float) -> float | str | None:
+    def reported(self, column: int, value: float) -> float | str | None:
         """Return a metric's value as files say it: in the border unit, or a word; None where there is none."""
         one = self.metrics[column]
         if not isfinite(value):
@@ -192,7 +192,7 @@ class Study:
         except CfmError as error:
             if _STATUS_OF.get(error.exit_code) is Status.CRASHED:
                 return _bug(error)
-            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_told(error))
+            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_reported(error))
         except Exception as error:
             return _bug(error)
 
@@ -250,7 +250,7 @@ def _curve(result: Result) -> bytes:
     return to_csv(curve_table(result.curves))
 
 
-def _told(error: CfmError) -> str:
+def _reported(error: CfmError) -> str:
     """Return an error in one line; of a specification, paths and messages without the empty source."""
     if isinstance(error, SpecError):
         return "; ".join(": ".join(filter(None, (one.path, one.message))) for one in error.problems)
@@ -258,6 +258,6 @@ def _told(error: CfmError) -> str:
 
 
 def _bug(error: Exception) -> Row:
-    told = " ".join(f"{type(error).__name__}: {error}".split())
+    reported = " ".join(f"{type(error).__name__}: {error}".split())
     trace = "".join(traceback.format_exception(error))
-    return Row(Status.CRASHED, message=f"a bug in cfmkit: {told}", bug=trace)
+    return Row(Status.CRASHED, message=f"a bug in cfmkit: {reported}", bug=trace)

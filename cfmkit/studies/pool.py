@@ -192,8 +192,10 @@ class _Crew:
             if self.deaths[job] < DEATHS:
                 self.again.appendleft(job)
             else:
-                told = f"the process that worked on this point died {DEATHS} times ({_cause(one.process.returncode)})"
-                yield job, Lost(Status.CRASHED, told)
+                reported = (
+                    f"the process that worked on this point died {DEATHS} times ({_cause(one.process.returncode)})"
+                )
+                yield job, Lost(Status.CRASHED, reported)
         self.again.extend(one.given)
 
     def _count_stillborn(self, one: _Worker) -> None:

@@ -269,12 +269,12 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
             continue
         good, found = _moved(given, other, run, False)
         if found.spec is not None and good:  # without a part that was solved nothing is known of its yield
-            told = f"{len(tried)} with a smaller deviation miss the yield that is requested"
-            return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {told}")))
+            reported = f"{len(tried)} with a smaller deviation miss the yield that is requested"
+            return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {reported}")))
         tried.append((good, other))
     _, found = _moved(given, max(tried, key=lambda one: one[0])[1], run, True)
-    told = f"the best {len(tried)} choices of the catalogue's springs were tried"
-    return replace(found, message=f"{found.message}; {told}") if len(tried) > 1 else found
+    reported = f"the best {len(tried)} choices of the catalogue's springs were tried"
+    return replace(found, message=f"{found.message}; {reported}") if len(tried) > 1 else found
 
 
 def _moved(given: Spec, design: Design, run: Run, largest: bool) -> tuple[int, Design]:
@@ -416,7 +416,7 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
     if _misses(good, problem):
         return _impossible(design, sight, good, worst, problem)
     solved = f"of {CHECKED} parts that were solved {good} are good; the tolerance that costs most is that of {worst}"
-    told = (
+    reported = (
         f"{len(x)} values moved in {found.steps} steps: to first order about {100 * found.began:.3g} % of parts were "
         f"good before and {100 * found.share:.3g} % are now; {solved}"
         if len(x)
@@ -430,24 +430,26 @@ def _designed(design: Design, sight: Sight, found: RobustResult, good: int, prob
     places = sight.rows.places
     motion = sight.spec.motion
     about = searched(numbers, sight.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
-    return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", told)))
+    return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", reported)))
 
 
 def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
     value = 100.0 * good / CHECKED
     wanted = f"{100 * problem.share:.4g} % of parts are good"
-    told, cure = f"no values in the ranges were found with which {wanted}", "widen the ranges (design.free)"
+    reported, cure = f"no values in the ranges were found with which {wanted}", "widen the ranges (design.free)"
     if not len(problem.bounds):
-        told, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
-    told += (
+        reported, cure = f"{NOTHING_FREE} until {wanted}", "name such values"
+    reported += (
         f": {value:.3g} % at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: "
         f"make it tighter, {cure} or require less"
     )
     if short := _ends_early(sight, np.array([float(sight.spec.at(path)) for path in sight.free])):
-        told += (
+        reported += (
             f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
             "the travel, such as [1 %, 100 %], which are those of each part"
         )
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
-    return Design(None, Status.INFEASIBLE, told, nearest_feasible=nearest, search=design.search, tables=design.tables)
+    return Design(
+        None, Status.INFEASIBLE, reported, nearest_feasible=nearest, search=design.search, tables=design.tables
+    )

@@ -98,44 +98,45 @@ def record(rows: ResultRows) -> Any:
     """
     if len(rows) != 1:
         odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
-        told = {"n": len(rows), "v": squeezed(rows.values), "q": _packed(np.packbits(rows.met)), "o": odd}
+        reported = {"n": len(rows), "v": squeezed(rows.values), "q": _packed(np.packbits(rows.met)), "o": odd}
         if rows.warned:
-            told["w"] = {name: _packed(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
-        return told | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
+            reported["w"] = {name: _packed(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
+        return reported | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
     status, message = rows.status(0)
-    told = {"s": status.key}
+    reported = {"s": status.key}
     if message:
-        told["m"] = message
+        reported["m"] = message
     if status.usable:
-        told["v"] = _packed(rows.values)
-        told["q"] = "".join("01"[met] for met in rows.met[0].tolist())
+        reported["v"] = _packed(rows.values)
+        reported["q"] = "".join("01"[met] for met in rows.met[0].tolist())
     if names := [name for name, mask in sorted(rows.warned.items()) if mask[0]]:
-        told["w"] = names
+        reported["w"] = names
     if rows.curves:
-        told["u"] = _text(rows.curves[0])
-    return told
+        reported["u"] = _text(rows.curves[0])
+    return reported
 
 
-def recalled(told: Any, metrics: int, requirements: int) -> ResultRows:
+def recalled(reported: Any, metrics: int, requirements: int) -> ResultRows:
     """Return the rows that a record is."""
-    if "n" not in told:
-        return gathered([recalled_row(told)], metrics, requirements)
-    values = unsqueezed(told["v"], told["n"], metrics)
-    met = _mask(told["q"], told["n"] * requirements).reshape(told["n"], requirements)
-    curves = {int(k): _bytes(text) for k, text in told.get("u", {}).items()}
-    odd = {int(k): (_STATUS[s], m) for k, (s, m) in told["o"].items()}
+    if "n" not in reported:
+        return gathered([recalled_row(reported)], metrics, requirements)
+    values = unsqueezed(reported["v"], reported["n"], metrics)
+    met = _mask(reported["q"], reported["n"] * requirements).reshape(reported["n"], requirements)
+    curves = {int(k): _bytes(text) for k, text in reported.get("u", {}).items()}
+    odd = {int(k): (_STATUS[s], m) for k, (s, m) in reported["o"].items()}
     masks = {
-        name: np.unpackbits(_unpacked(bits, np.uint8), count=told["n"]) for name, bits in told.get("w", {}).items()
+        name: np.unpackbits(_unpacked(bits, np.uint8), count=reported["n"])
+        for name, bits in reported.get("w", {}).items()
     }
     return ResultRows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
 
 
-def recalled_row(told: Any) -> Row:
+def recalled_row(reported: Any) -> Row:
     """Return the single row that a record is."""
-    curve = _bytes(told["u"]) if "u" in told else b""
-    noted = tuple(_unpacked(told["v"], np.float64).tolist()) if "v" in told else ()
-    met = tuple(map("1".__eq__, told.get("q", "")))
-    return Row(_STATUS[told["s"]], noted, met, told.get("m", ""), curve, warnings=tuple(told.get("w", ())))
+    curve = _bytes(reported["u"]) if "u" in reported else b""
+    noted = tuple(_unpacked(reported["v"], np.float64).tolist()) if "v" in reported else ()
+    met = tuple(map("1".__eq__, reported.get("q", "")))
+    return Row(_STATUS[reported["s"]], noted, met, reported.get("m", ""), curve, warnings=tuple(reported.get("w", ())))
 
 
 def joined(parts: Sequence[ResultRows]) -> ResultRows:

@@ -151,8 +151,8 @@ def _client(address: str, workers: int) -> Iterator[Any]:
         try:
             client = stack.enter_context(library.Client(place, timeout=CONNECT_WITHIN, set_as_default=False))
         except (OSError, ValueError) as error:
-            told = " ".join(str(error).split()) or type(error).__name__
-            raise UsageError(f"--cluster {address}: no Dask scheduler answers there ({told})") from None
+            reported = " ".join(str(error).split()) or type(error).__name__
+            raise UsageError(f"--cluster {address}: no Dask scheduler answers there ({reported})") from None
         yield client
 
 
@@ -198,8 +198,8 @@ def _outcome(future: Any) -> Any:
     if future.status == "finished":
         return future.result()
     error = future.exception() if future.status == "error" else None
-    told = " ".join(f"{type(error).__name__}: {error}".split()) if error else "the cluster gave it up"
+    reported = " ".join(f"{type(error).__name__}: {error}".split()) if error else "the cluster gave it up"
     if type(error).__name__ == "KilledWorker":
-        told = f"the workers that worked on this point died {RETRIES + 1} times"
-        return Lost(Status.CRASHED, told)
-    return Lost(Status.CRASHED, f"a bug in cfmkit: {told}")
+        reported = f"the workers that worked on this point died {RETRIES + 1} times"
+        return Lost(Status.CRASHED, reported)
+    return Lost(Status.CRASHED, f"a bug in cfmkit: {reported}")

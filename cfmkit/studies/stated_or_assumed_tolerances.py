@@ -143,8 +143,8 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
     if getattr(design, "yield") is not None and not is_made(spec, design):
         yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
     if design.tolerances and not spec.part_requirements:
-        told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
-        yield ("design", "tolerances"), told
+        reported = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
+        yield ("design", "tolerances"), reported
 
 
 OF_PLATES = "laser"

@@ -62,9 +62,9 @@ class StudyResult:
 
         parts = [f"<p>{escape(str(self.summary.get('message', '')))}</p>"]
         if best := self.summary.get("best"):
-            told = ", ".join(f"{path} {value}" for path, value in best["values"].items())
-            parts.append(f"<p>{escape(told)}: {escape(best['sense'])} {escape(best['by'].replace('_', ' '))}</p>")
-            rows = [(name, _told(one), one["definition"]) for name, one in self.summary["metrics"].items()]
+            reported = ", ".join(f"{path} {value}" for path, value in best["values"].items())
+            parts.append(f"<p>{escape(reported)}: {escape(best['sense'])} {escape(best['by'].replace('_', ' '))}</p>")
+            rows = [(name, _reported(one), one["definition"]) for name, one in self.summary["metrics"].items()]
             parts.append(html_table(("metric of the best point", "value", "what it is"), rows[:MOST_TOLD]))
         required = [one for one in self.summary.get("requirements", ()) if "of" in one]
         if required:
@@ -121,7 +121,7 @@ MOST_TOLD = 8
 """Metrics of the best point that a notebook shows: more are in `StudyResult.summary`."""
 
 
-def _told(metric: Mapping[str, Any]) -> str:
+def _reported(metric: Mapping[str, Any]) -> str:
     value, unit = metric["value"], metric["unit"]
     if not isinstance(value, float | int):
         return "" if value is None else str(value)

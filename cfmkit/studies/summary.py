@@ -226,7 +226,7 @@ class Summary:
         values = [] if self.best_values is None else self.best_values.tolist()
         return {
             one.name: {
-                "value": self.study.told(k, value),
+                "value": self.study.reported(k, value),
                 "unit": border_unit(one.dimension),
                 "definition": one.definition,
             }
@@ -246,9 +246,9 @@ class Summary:
     def _warnings(self) -> list[dict[str, str]]:
         if not self.gapped:
             return []
-        told = f"{self.gapped} of {self.total} points have no value over a window that their curve does not cover"
+        reported = f"{self.gapped} of {self.total} points have no value over a window that their curve does not cover"
         cure = "windows in shares of the travel follow it: [1 %, 100 %]"
-        return [{"name": WINDOW_OUTSIDE, "message": f"{told} ({self.first_gap}); {cure}"}]
+        return [{"name": WINDOW_OUTSIDE, "message": f"{reported} ({self.first_gap}); {cure}"}]
 
     def _requirements(self) -> list[dict[str, Any]]:
         listed = zip(self.study.spec.part_requirements, self.met.tolist(), strict=True)

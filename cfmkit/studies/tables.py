@@ -49,9 +49,9 @@ def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows
     study = records.work.study
     metrics = (_noted(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
     met = [TableColumn("requirements_met", _met(rows))] if study.spec.part_requirements else []
-    told = [rows.status(k) for k in range(len(rows))] if rows.odd else None
-    status = tuple(one.key for one, _ in told) if told else ("complete",) * len(rows)
-    message = tuple(text or None for _, text in told) if told else (None,) * len(rows)
+    reported = [rows.status(k) for k in range(len(rows))] if rows.odd else None
+    status = tuple(one.key for one, _ in reported) if reported else ("complete",) * len(rows)
+    message = tuple(text or None for _, text in reported) if reported else (None,) * len(rows)
     ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), TableColumn("message", message)
     return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
 

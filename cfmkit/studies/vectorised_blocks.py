@@ -65,9 +65,9 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> ResultRow
 def _warned(answer: BlockAnswer, singly: list[int], rest: ResultRows) -> dict[str, NDArray[np.bool_]]:
     """Return which rows have which warnings: those of the block model, of the rows analysed one by one their own."""
     warned = {}
-    told = {NOT_JUDGED: answer.done} if answer.warnings is None else answer.warnings
-    for name in sorted({*told, *rest.warned}):
-        mask = np.array(told.get(name, np.zeros(len(answer.done))), dtype=bool)
+    reported = {NOT_JUDGED: answer.done} if answer.warnings is None else answer.warnings
+    for name in sorted({*reported, *rest.warned}):
+        mask = np.array(reported.get(name, np.zeros(len(answer.done))), dtype=bool)
         mask[singly] = rest.warned.get(name, False)
         if mask.any():
             warned[name] = mask

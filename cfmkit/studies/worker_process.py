@@ -65,8 +65,8 @@ def _outcome(work: Any, job: Any) -> bytes:
     try:
         return DONE + pickle.dumps(work(job), pickle.HIGHEST_PROTOCOL)
     except Exception as error:
-        told = " ".join(f"{type(error).__name__}: {error}".split())
-        return BROKEN + pickle.dumps((told, "".join(traceback.format_exception(error))))
+        reported = " ".join(f"{type(error).__name__}: {error}".split())
+        return BROKEN + pickle.dumps((reported, "".join(traceback.format_exception(error))))
 
 
 def _end_with_parent(life: int) -> None:

@@ -64,24 +64,24 @@ def expected(result: Result, run: Run) -> str:
         return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
     chosen = family(spec.family).free
     if chosen is None or not function_named(chosen)(spec, spec):
-        return f"{_told(found, shares)}; margins need 'design.free' to name values that may change"
-    return f"{_told(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
+        return f"{_reported(found, shares)}; margins need 'design.free' to name values that may change"
+    return f"{_reported(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
 
 
 class YieldUnknown(Exception):
     """Why nothing is said of a yield."""
 
 
-def _told(found: Assumed, shares: tuple[float, float]) -> str:
+def _reported(found: Assumed, shares: tuple[float, float]) -> str:
     process = found.process
     used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
-    told = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
+    reported = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
     if found.modulus is not None:
         low, high = (format_short(end, "stress") for end in found.modulus)
-        told.append(f"modulus {low} to {high}")
+        reported.append(f"modulus {low} to {high}")
     reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
     text = f"{_share(shares[0])} parts would meet the requirements if made by {process.name} "
-    text += f"({', '.join(told)}; assumed{reason}; to first order)"
+    text += f"({', '.join(reported)}; assumed{reason}; to first order)"
     return text if found.modulus is None else f"{text}, {_share(shares[1])} parts once the modulus is measured"
 
 

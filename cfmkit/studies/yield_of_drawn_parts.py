@@ -342,24 +342,26 @@ class Yields:
     def sentence(self) -> str:
         """Return the yield in a sentence, and what would raise it."""
         low, high = clopper_pearson(self.after.good, self.after.count)
-        told = f"{_percent(self.after.value)} of {self.after.count} parts drawn from design.tolerances are good "
-        told += f"({_percent(low)} to {_percent(high)} with 95 % confidence)"
+        reported = f"{_percent(self.after.value)} of {self.after.count} parts drawn from design.tolerances are good "
+        reported += f"({_percent(low)} to {_percent(high)} with 95 % confidence)"
         if self.before is not None:
-            told += f"; {_percent(self.before.value)} of the specification as given"
+            reported += f"; {_percent(self.before.value)} of the specification as given"
         if self.after.failed:
-            told += f"; {self.after.failed} have no complete result and count as bad (the first: {self.after.why})"
+            reported += f"; {self.after.failed} have no complete result and count as bad (the first: {self.after.why})"
         count, reason = self.lacking
         if count:
             first = f" (the first: {reason})" if reason else ""
-            told += f"; {count} have no value for a requirement and count as bad{first}"
+            reported += f"; {count} have no value for a requirement and count as bad{first}"
         if self.frozen is not None:
-            told += f"; {_percent(self.frozen.value)} without the errors of the whole part ({', '.join(self.common)})"
-        told += f"; {_percent(self.trimmed.value)} after a trim of the force"
+            reported += (
+                f"; {_percent(self.frozen.value)} without the errors of the whole part ({', '.join(self.common)})"
+            )
+        reported += f"; {_percent(self.trimmed.value)} after a trim of the force"
         worst = min(range(len(self.each)), key=lambda k: self.each[k].value)
         if self.each[worst].value < 1.0:
             metric = self.made.spec.part_requirements[worst].metric
-            told += f"; most are lost by {metric}, which {_percent(1.0 - self.each[worst].value)} miss"
-        return told
+            reported += f"; most are lost by {metric}, which {_percent(1.0 - self.each[worst].value)} miss"
+        return reported
 
 
 def _percent(value: float) -> str:

@@ -107,7 +107,7 @@ def decoded(data: bytes, name: str) -> tuple[str, str]:
     cfmkit.errors.DataError
         If it is not a text.
     """
-    encoding = next((told for mark, told in _MARKS if data.startswith(mark)), "")
+    encoding = next((reported for mark, reported in _MARKS if data.startswith(mark)), "")
     if not encoding and b"\0" in data[:4096]:
         even, odd = data[:4096:2].count(0), data[1:4096:2].count(0)
         encoding = "utf-16-le" if odd > 8 * even else "utf-16-be" if even > 8 * odd else "ascii"
@@ -268,7 +268,7 @@ class ColumnInfo:
         As cfmkit spells it; None if nobody says.
     dimension : str or None
         Of the unit; None if that is of no use here.
-    told : bool
+    reported : bool
         Whether ``--units`` names the column.
     """
 
@@ -276,7 +276,7 @@ class ColumnInfo:
     name: str
     unit: str | None = None
     dimension: str | None = None
-    told: bool = False
+    reported: bool = False
 
     @property
     def label(self) -> str:
@@ -327,7 +327,7 @@ def describe(names: Sequence[str], unit_row: Sequence[str], units: Mapping[str, 
     pairs = zip(names, unit_row, strict=True)
     found = [_described(index, name, unit) for index, (name, unit) in enumerate(pairs)]
     left = dict(units)
-    chosen = [_told(column, left, file) for column in found]
+    chosen = [_reported(column, left, file) for column in found]
     if left:
         there = ", ".join(shown(column.name) for column in found)
         wrong = next(iter(left))
@@ -380,7 +380,7 @@ def _bare_unit(cell: str) -> str | None:
     return (cell[1:-1].strip() if _bracketed(cell) else cell) or None
 
 
-def _told(column: ColumnInfo, left: dict[str, str], file: str) -> ColumnInfo:
+def _reported(column: ColumnInfo, left: dict[str, str], file: str) -> ColumnInfo:
     """Return a column with what ``--units`` says of it; taken from `left`."""
     for key in (column.name, str(column.index + 1)):
         if key in left:
@@ -390,7 +390,7 @@ def _told(column: ColumnInfo, left: dict[str, str], file: str) -> ColumnInfo:
                     f"{file}: the header gives {shown(column.name)} in {column.unit}, --units in {unit}; "
                     "correct the one that is wrong"
                 )
-            return ColumnInfo(column.index, column.name, unit, _dimension(unit), told=True)
+            return ColumnInfo(column.index, column.name, unit, _dimension(unit), reported=True)
     return column
 
 
@@ -433,7 +433,7 @@ def column_of(columns: Sequence[ColumnInfo], dimension: str, file: str) -> Colum
         If several qualify; the message names them.
     """
     found = [column for column in columns if column.dimension == dimension]
-    found = [column for column in found if column.told] or found
+    found = [column for column in found if column.reported] or found
     named = [column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _WORDS[dimension]]
     chosen = found if len(found) < 2 else named
     if len(chosen) == 1 or not found:

@@ -127,12 +127,12 @@ class Cli:
         given = stdin.encode() if isinstance(stdin, str) else stdin
         with as_the_process(self.folder, self.environment(**environment), given) as (out, err):
             code = main(arguments)
-            told = []
+            reported = []
             for stream, file in ((sys.stdout, out), (sys.stderr, err)):
                 stream.flush()
                 file.seek(0)
-                told.append(file.read().decode())
-        return Outcome(int(code), *told)
+                reported.append(file.read().decode())
+        return Outcome(int(code), *reported)
 
     def program(self, *arguments: str, stdin: str | bytes = "", timeout: float = 300, **environment: str) -> Outcome:
         """Run the installed program."""

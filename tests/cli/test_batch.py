@@ -108,12 +108,12 @@ def test_faults_are_told_with_file_line_and_column(cli):
 def test_one_json_document_says_everything(cli):
     write(cli, "good", "missed")
     done = batch(cli, "specs", "--json")
-    told = done.document
-    assert (told["exit_code"], told["message"]) == (5, "2 specs: 1 ok, 1 missed")
-    assert [one["verb"] for one in told["specs"]] == ["design", "design"]
-    assert [one["ok"] for one in told["requirements"]] == [True, False]
-    assert told["requirements"][1]["spec"] == "specs/missed.yaml"
-    assert json.loads((cli.folder / "out" / "metrics.json").read_text())["specs"] == told["specs"]
+    reported = done.document
+    assert (reported["exit_code"], reported["message"]) == (5, "2 specs: 1 ok, 1 missed")
+    assert [one["verb"] for one in reported["specs"]] == ["design", "design"]
+    assert [one["ok"] for one in reported["requirements"]] == [True, False]
+    assert reported["requirements"][1]["spec"] == "specs/missed.yaml"
+    assert json.loads((cli.folder / "out" / "metrics.json").read_text())["specs"] == reported["specs"]
 
 
 def test_each_specification_gives_what_a_run_of_its_own_gives(cli):

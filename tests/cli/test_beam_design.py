@@ -34,10 +34,10 @@ def test_a_design_is_repeated_from_the_journal_with_the_same_bytes(cli, arch):
 
 def test_what_only_the_search_knows_is_a_block_of_its_own_with_model_and_window(cli, arch):
     done = cli("design", arch, "-o", "out", "--no-plots", "--json")
-    told = json.loads((cli.folder / "out/metrics.json").read_text())
-    assert json.loads(done.out)["search"] == told["search"]
-    assert not any(name.startswith(("audit", "tolerance", "starts")) for name in told["metrics"])
-    starts = told["search"]["starts"]
+    reported = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert json.loads(done.out)["search"] == reported["search"]
+    assert not any(name.startswith(("audit", "tolerance", "starts")) for name in reported["metrics"])
+    starts = reported["search"]["starts"]
     assert (starts["value"], starts["unit"], starts["model"]) == (2.0, "1", "reissner")
     assert (starts["window"], starts["window_unit"]) == ([6.0, 12.0], "mm")
     page = " ".join(cli("design", arch, "-o", "bends", "--no-plots", "--fidelity", "inextensible").out.split())

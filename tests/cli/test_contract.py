@@ -55,18 +55,18 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
 
 def same_but_for(search, design, analysis):
     """Check that a design's folder holds all of the analysis's, to the letter, and nothing more than is declared."""
-    (files, told), (same_files, same) = contents(design), contents(analysis)
+    (files, reported), (same_files, same) = contents(design), contents(analysis)
     more = {name for name in set(files) - set(same_files) if not name.startswith(EVERY_DESIGN)}
     assert {name: files.get(name) for name in same_files} == same_files
     assert more <= ({*search.tables, JOURNAL} if search else set())
 
-    assert {name: told["metrics"].get(name) for name in same["metrics"]} == same["metrics"]
-    assert set(told["metrics"]) == set(same["metrics"])
-    known = told.pop("search", {})
+    assert {name: reported["metrics"].get(name) for name in same["metrics"]} == same["metrics"]
+    assert set(reported["metrics"]) == set(same["metrics"])
+    known = reported.pop("search", {})
     assert search or not known
-    assert not set(known) & set(told["metrics"]), "what only the search knows is in the words of a metric"
+    assert not set(known) & set(reported["metrics"]), "what only the search knows is in the words of a metric"
     assert all(one["model"] for one in known.values())
-    beside = [item for item in told["warnings"] if item not in same["warnings"]]
-    assert [item for item in told["warnings"] if item not in beside] == same["warnings"]
+    beside = [item for item in reported["warnings"] if item not in same["warnings"]]
+    assert [item for item in reported["warnings"] if item not in beside] == same["warnings"]
     assert {item["name"] for item in beside} <= set(search.findings if search else ())
-    assert {**told, "metrics": 0, "warnings": 0} == {**same, "metrics": 0, "warnings": 0}
+    assert {**reported, "metrics": 0, "warnings": 0} == {**same, "metrics": 0, "warnings": 0}

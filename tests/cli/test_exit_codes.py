@@ -185,7 +185,7 @@ def test_a_fault_in_an_option_names_the_option(cli, cam):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "code", "told"),
+    ("name", "content", "code", "reported"),
     [
         ("empty.yaml", b"", 3, "the file is empty"),
         ("binary.yaml", bytes(range(256)), 3, "not UTF-8"),
@@ -194,11 +194,11 @@ def test_a_fault_in_an_option_names_the_option(cli, cam):
         ("none.yaml", b"name: x\n", 3, "'family' is missing"),
     ],
 )
-def test_a_file_that_is_no_spec_gets_one_clear_line(cli, name, content, code, told):
+def test_a_file_that_is_no_spec_gets_one_clear_line(cli, name, content, code, reported):
     (cli.folder / name).write_bytes(content)
     done = cli("analyze", name)
     assert done.code == code
-    assert told in done.err
+    assert reported in done.err
     assert len(done.err.splitlines()) == 1
 
 
@@ -241,10 +241,10 @@ def test_a_folder_without_write_permission_is_exit_7(cli, cam):
 def test_a_full_disk_behind_standard_output_is_exit_7(cli, cam, arguments):
     with open("/dev/full", "wb") as full:
         process = cli.start(*arguments, stdout=full)
-        _, told = process.communicate(timeout=60)
+        _, reported = process.communicate(timeout=60)
     assert process.returncode == ExitCode.IO
-    assert b"no space left" in told
-    assert b"Exception ignored" not in told
+    assert b"no space left" in reported
+    assert b"Exception ignored" not in reported
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes differ")
@@ -254,8 +254,8 @@ def test_a_reader_that_leaves_early_is_no_error(cli, cam, arguments):
     os.close(reading)
     process = cli.start(*arguments, stdout=writing)
     os.close(writing)
-    _, told = process.communicate(timeout=60)
-    assert (process.returncode, told) == (0, b"")
+    _, reported = process.communicate(timeout=60)
+    assert (process.returncode, reported) == (0, b"")
 
 
 def test_closed_streams_are_no_error(cli, cam):
@@ -267,21 +267,21 @@ def test_closed_streams_are_no_error(cli, cam):
 
 def test_a_missing_file_that_is_shipped_says_how_to_have_it(cli):
     for name in ("configs/cam.yaml", "cam.yaml", "configs/studies/cam_tolerance.yaml"):
-        told = cli("analyze", name)
-        assert told.code == 2
-        assert f"`cfmkit examples {name.rpartition('/')[2].removesuffix('.yaml')}`" in told.err
+        reported = cli("analyze", name)
+        assert reported.code == 2
+        assert f"`cfmkit examples {name.rpartition('/')[2].removesuffix('.yaml')}`" in reported.err
     assert "cfmkit examples" not in cli("analyze", "mine.yaml").err
 
 
 @pytest.mark.parametrize("name", ["cam", "vcfm", "slider-crank", "beam"])
 def test_the_hint_for_a_sweep_of_nothing_varies_a_value_of_that_mechanism(cli, name):
     assert cli("new", name, "-o", "mine.yaml").code == 0
-    told = cli("sweep", "mine.yaml")
-    assert told.code == 2
-    hint = re.search(r"--vary '([^']+)'", told.err)[1]
+    reported = cli("sweep", "mine.yaml")
+    assert reported.code == 2
+    hint = re.search(r"--vary '([^']+)'", reported.err)[1]
     assert cli("sweep", "mine.yaml", "--vary", hint, "--max-points", "4").err.count("5 points") == 1
-    told = cli("sensitivity", "mine.yaml").err
-    assert f"--vary '{hint.partition('=')[0]}=normal" in told
+    reported = cli("sensitivity", "mine.yaml").err
+    assert f"--vary '{hint.partition('=')[0]}=normal" in reported
 
 
 def test_what_a_model_refuses_is_told_with_its_place_in_the_file(cli, cam):
@@ -293,15 +293,15 @@ def test_what_a_model_refuses_is_told_with_its_place_in_the_file(cli, cam):
     line = text[: text.index("  left: ")].count("\n") + 1
     run = cli(*RUN)
     assert run.code == ExitCode.INVALID
-    told = f"cam.yaml:{line}:9: mechanism.left: the quasi-static model is symmetric"
-    assert run.err.startswith(told)
+    reported = f"cam.yaml:{line}:9: mechanism.left: the quasi-static model is symmetric"
+    assert run.err.startswith(reported)
     for command in (
         ("sweep", "--vary", "mechanism.brace_length=[200 mm, 201 mm]", "-j", "1"),
         ("sensitivity", "--vary", "mechanism.brace_length=normal:0.1 mm", "--samples", "4"),
     ):
         run = cli(command[0], "cam.yaml", "-o", command[0], "--no-plots", "-q", *command[1:])
         assert (run.code, run.err.count("\n")) == (ExitCode.INVALID, 1)
-        assert run.err.startswith(told)
+        assert run.err.startswith(reported)
 
 
 def test_what_an_option_of_sensitivity_says_has_no_place_in_the_file(cli, cam):
@@ -353,13 +353,13 @@ def test_a_row_of_a_kept_requirement_measures_nothing_but_what_it_shows(cli, cam
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (("sweep", "cam.yaml", "-j", "x"), "'-j' / '--jobs': a whole number is needed; see"),
         (("sensitivity", "cam.yaml", "--method", "nosuch"), "'--method': 'nosuch' is not one of 'oat'"),
     ],
 )
-def test_what_a_library_says_of_an_option_is_put_in_plain_words(cli, cam, arguments, told):
+def test_what_a_library_says_of_an_option_is_put_in_plain_words(cli, cam, arguments, reported):
     done = cli(*arguments)
     assert done.code in (ExitCode.USAGE, ExitCode.INVALID)
-    assert told in done.err
+    assert reported in done.err

@@ -33,14 +33,14 @@ def test_all_models_stand_in_one_table_one_figure_and_in_numbers(cli, moving):
     table = read_csv((cli.folder / "out/curve.csv").read_bytes())
     assert table.headers[:4] == ("fidelity", "branch", "displacement [mm]", "force [N]")
     assert list(dict.fromkeys(table["fidelity"])) == ["dynamic", "quasi-static"]  # the nominal one first
-    told = document(cli)
-    assert told["fidelity"]["reference"] == "dynamic"
-    assert [(item["fidelity"], item["status"]) for item in told["fidelity"]["curves"]] == [
+    reported = document(cli)
+    assert reported["fidelity"]["reference"] == "dynamic"
+    assert [(item["fidelity"], item["status"]) for item in reported["fidelity"]["curves"]] == [
         ("dynamic", "complete"),
         ("quasi-static", "complete"),
     ]
-    assert told["metrics"]["fidelity_rms[quasi-static]"]["unit"] == "N"
-    assert "(quasi-static - dynamic) force" in told["metrics"]["fidelity_rms[quasi-static]"]["definition"]
+    assert reported["metrics"]["fidelity_rms[quasi-static]"]["unit"] == "N"
+    assert "(quasi-static - dynamic) force" in reported["metrics"]["fidelity_rms[quasi-static]"]["definition"]
 
 
 def test_the_numbers_are_those_of_the_curves_in_the_table(cli, moving):
@@ -94,9 +94,9 @@ def test_a_second_curve_that_ends_early_or_fails_makes_the_run_partial(cli, movi
     done = cli("analyze", moving, *wanted, "-o", "out", "-q")
     assert done.code == 6
     assert done.err.startswith("partial  fidelity dynamic: the requested motion of the slider is from ")
-    told = document(cli)
-    assert (told["status"], told["message"].split(":")[0]) == ("partial", "fidelity dynamic")
-    assert (told["metrics"]["fidelity_rms[quasi-static]"]["value"] is None) == (start == "700 mm")
+    reported = document(cli)
+    assert (reported["status"], reported["message"].split(":")[0]) == ("partial", "fidelity dynamic")
+    assert (reported["metrics"]["fidelity_rms[quasi-static]"]["value"] is None) == (start == "700 mm")
     assert (cli.folder / "out/figures/fidelity.png").exists()
     assert json.loads((cli.folder / "out/manifest.json").read_text())["exit_code"] == 6
 

@@ -133,15 +133,15 @@ def check_mutants(folder: Path, count: int, seed: int, capsys: pytest.CaptureFix
             if verb == "design":  # in this process, where its time is measured and an alarm ends it
                 extra = [*extra, "-j", "1"]
             code, seconds = run([verb, str(spec), "-q", *extra])
-            told = capsys.readouterr()
-            case = f"case {number} of seed {seed}: {verb}\n{text}\n{told.err}"
+            reported = capsys.readouterr()
+            case = f"case {number} of seed {seed}: {verb}\n{text}\n{reported.err}"
             assert code in ALLOWED, case
             if seconds >= LONGEST:
                 spec.write_text(shortened(source.read_text()))
                 _, usual = run([verb, str(spec), "-q", *anew(verb, extra)])
                 capsys.readouterr()
                 assert seconds < LONGEST + usual, f"{seconds:.1f} s, unchanged {usual:.1f} s: {case}"
-            assert told.out == "", case
+            assert reported.out == "", case
             assert set(os.listdir(folder)) <= {"spec.yaml", "out"}, case
             if code in (0, 5) and extra:
                 hidden = {name for name in os.listdir(folder / "out") if name.startswith(".")}
@@ -187,5 +187,5 @@ def test_leaves_of_any_size_end_with_an_exit_code_of_the_contract(tmp_path, caps
     source = str(CONFIGS[0].parent / f"{config}.yaml")
     option = f"mechanism.bistable.{change}"
     found = main(["analyze", source, "--set", option, "-o", str(tmp_path / "out"), "--no-plots", "-q"])
-    told = capsys.readouterr().err
-    assert (found, words in told) == (code, True), told
+    reported = capsys.readouterr().err
+    assert (found, words in reported) == (code, True), reported

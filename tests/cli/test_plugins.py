@@ -109,8 +109,8 @@ def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site
     assert "doctor" in err
     assert "broken" not in out
     assert main([*arguments, "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)["warnings"]
-    assert told["name"] == "family_skipped"
+    (reported,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert reported["name"] == "family_skipped"
 
 
 @pytest.mark.parametrize(

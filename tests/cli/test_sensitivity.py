@@ -54,10 +54,10 @@ def test_every_method_writes_its_tables_and_pictures(cli, study, method):
     assert {row["index"] for row in rows} == INDICES[method]
     samples = table(cli.folder / "out" / "results.csv")
     assert all(row["status"] == "complete" for row in samples)
-    told = report(cli, "out")
-    assert told["method"] == method
-    assert told["samples"]["evaluated"] == len(samples)
-    assert told["samples"]["on_failure"] == "fail"
+    reported = report(cli, "out")
+    assert reported["method"] == method
+    assert reported["samples"]["evaluated"] == len(samples)
+    assert reported["samples"]["on_failure"] == "fail"
     assert list((cli.folder / "out" / "figures").glob("*.png"))
     listed = json.loads((cli.folder / "out" / "manifest.json").read_text())["files"]
     assert "indices.csv" in str(listed)
@@ -102,10 +102,10 @@ def test_two_springs_of_one_batch_scatter_more_than_two_of_any(cli, study):
 def test_the_yield_stands_in_the_report_with_its_interval_and_decides_the_exit_code(cli, study):
     options = ("--samples", "40", *QUICK)
     done = cli("sensitivity", study, "-o", "out", *options)
-    told = report(cli, "out")["yield"]
-    assert done.code == (0 if told["value"] >= 0.8 else 5)
-    assert told["parts"] == 40
-    assert told["wilson"][0] < told["value"] < told["wilson"][1]
+    reported = report(cli, "out")["yield"]
+    assert done.code == (0 if reported["value"] >= 0.8 else 5)
+    assert reported["parts"] == 40
+    assert reported["wilson"][0] < reported["value"] < reported["wilson"][1]
     missed = cli("sensitivity", study, "-o", "out", *options, "--set", "sensitivity.min_yield=100 %")
     assert missed.code == 5
     assert "required >= 100 %" in missed.err
@@ -121,22 +121,22 @@ def test_samples_that_fail_leave_the_indices_out_and_exit_with_6(cli, study, met
     options = ("--method", method, "--samples", "8", "-j", "1", *QUICK)
     done = cli("sensitivity", study, "-o", "out", *FAILING, *options)
     assert done.code == 6, done.err
-    told = report(cli, "out")
+    reported = report(cli, "out")
     failed = [row for row in table(cli.folder / "out" / "results.csv") if row["status"] == "invalid"]
-    assert told["samples"]["failed"] == len(failed) > 0
+    assert reported["samples"]["failed"] == len(failed) > 0
     assert all(not row["force_mean_load over 5 ... 235 mm [N]"] for row in failed)
     name = {"oat": "swing", "morris": "mu_star", "sobol": "total_order", "tolerance": "variance_drop_when_halved"}
     value = lines(cli, "out", name[method])["mechanism.rolling_friction"]["value"]
     assert value == ""
-    assert "failed_samples" in [one["name"] for one in told["warnings"]]
+    assert "failed_samples" in [one["name"] for one in reported["warnings"]]
 
 
 def test_resampling_and_bounds_are_told_with_their_counts(cli, study):
     options = ("--method", "sobol", "--samples", "8", "-j", "1", *QUICK)
     assert cli("sensitivity", study, "-o", "again", *FAILING, *options, "--on-failure", "resample").code == 6
-    told = report(cli, "again")["samples"]
-    assert told["replaced_blocks"] > 0
-    assert told["failed"] >= told["replaced_blocks"]
+    reported = report(cli, "again")["samples"]
+    assert reported["replaced_blocks"] > 0
+    assert reported["failed"] >= reported["replaced_blocks"]
     assert lines(cli, "again", "total_order")["mechanism.rolling_friction"]["value"] != ""
     assert cli("sensitivity", study, "-o", "bound", *FAILING, *options, "--on-failure", "bound").code == 6
     bounded = lines(cli, "bound", "total_order")["mechanism.rolling_friction"]
@@ -268,9 +268,11 @@ def test_a_seed_of_zero_goes_before_that_of_the_spec(cli, study):
 
 
 def test_a_metric_that_does_not_vary_is_told_and_changes_no_exit_code(cli, study):
-    told = cli("sensitivity", study, "--method", "sobol", "--samples", "4", "--no-plots", "--metrics", "force_constant")
-    assert told.code == 0
-    assert "force_constant does not vary" in " ".join(told.out.split())
+    reported = cli(
+        "sensitivity", study, "--method", "sobol", "--samples", "4", "--no-plots", "--metrics", "force_constant"
+    )
+    assert reported.code == 0
+    assert "force_constant does not vary" in " ".join(reported.out.split())
 
 
 def test_a_sensitivity_without_any_value_names_the_window_that_is_outside(cli, tmp_path):

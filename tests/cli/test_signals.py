@@ -32,14 +32,14 @@ def started(cli, *extra: str) -> subprocess.Popen[bytes]:
 
 
 @pytest.mark.parametrize(
-    ("number", "code", "told"),
+    ("number", "code", "reported"),
     [(signal.SIGINT, 130, b"error    interrupted\n"), (signal.SIGTERM, 143, b"error    terminated\n")],
 )
-def test_a_signal_ends_the_run_with_its_exit_code_and_no_trace(cli, cam, number, code, told):
+def test_a_signal_ends_the_run_with_its_exit_code_and_no_trace(cli, cam, number, code, reported):
     process = started(cli)
     process.send_signal(number)
     out, err = process.communicate(timeout=60)
-    assert (process.returncode, out, err) == (code, b"", told)
+    assert (process.returncode, out, err) == (code, b"", reported)
     assert sorted(os.listdir(cli.folder)) == ["cam.yaml"]
 
 
@@ -78,7 +78,7 @@ def test_an_interrupted_run_is_a_json_document_too(cli, cam):
 @pytest.mark.parametrize("finished", [True, False])
 def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finished):
     """It does where a start is noted; a design that keeps nothing begins anew, and says so."""
-    told = []
+    reported = []
     with RunFolder(tmp_path / "out") as folder:
         try:
             with long_run(1, False, folder, Run()) as run:
@@ -86,10 +86,10 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
                     run.notes.add("0" * 32, {"found": {}})
                 raise Stopped(signal.SIGTERM)
         except Stopped as stop:
-            told.append(stop.told)
+            reported.append(stop.reported)
     more = "what is finished is kept: run the same command again to go on"
     anew = "nothing is finished that could be kept: the same command starts over"
-    assert told == [f"terminated; {more if finished else anew}"]
+    assert reported == [f"terminated; {more if finished else anew}"]
 
 
 EARLY = """
@@ -111,8 +111,8 @@ def test_a_signal_before_anything_is_computed_says_that_nothing_is(tmp_path, ver
     """With --fresh, too: what an earlier run has kept is not cleared away yet, and is not what was asked for."""
     command = [sys.executable, "-c", EARLY, verb, "cam.yaml", *fresh]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
-    told = "error    terminated; nothing was computed yet: run the same command again\n"
-    assert (done.stdout, done.stderr) == ("143\n", told)
+    reported = "error    terminated; nothing was computed yet: run the same command again\n"
+    assert (done.stdout, done.stderr) == ("143\n", reported)
 
 
 LOST = """
@@ -130,7 +130,7 @@ try:
     print("went on", flush=True)
     time.sleep(20.0)
 except Stopped as stop:
-    print(stop.told)
+    print(stop.reported)
 """
 
 

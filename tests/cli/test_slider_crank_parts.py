@@ -24,9 +24,9 @@ def test_a_designed_strip_comes_with_its_drawing_its_limits_and_a_second_opinion
         "slider-crank.svg",
         "strip.csv",
     }
-    told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
-    assert abs(told["recheck_force"]["value"]) < 1e-4
-    assert abs(told["recheck_stress"]["value"]) < 2e-3
+    reported = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
+    assert abs(reported["recheck_force"]["value"]) < 1e-4
+    assert abs(reported["recheck_stress"]["value"]) < 2e-3
     again = cli("analyze", "out/design.yaml", "-o", "again", "--no-plots", "-q")
     assert again.code == 0
 
@@ -44,8 +44,8 @@ def test_springs_flexures_and_strip_stand_side_by_side_with_their_differences(cl
     assert abs(force["prb"] / force["lumped"] - 1) < 5e-3
     assert 0.27 < force["beam"] - force["lumped"] < 0.31
     assert abs(force["solid"] / force["beam"] - 1) < 0.02
-    told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
-    assert told["fidelity_mean[lumped]"]["value"] < -0.28
+    reported = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
+    assert reported["fidelity_mean[lumped]"]["value"] < -0.28
 
 
 DESIGNS = "slider_crank_li2019_widest", "slider_crank_bilancia2019_optimum", "slider_crank_lumped"

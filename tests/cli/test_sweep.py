@@ -196,9 +196,9 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("options", "told"), [((), b"again to go on"), (("--fresh",), b"again without --fresh to go on")]
+    ("options", "reported"), [((), b"again to go on"), (("--fresh",), b"again without --fresh to go on")]
 )
-def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, told):
+def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, reported):
     command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2", *options)
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
@@ -206,7 +206,7 @@ def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, 
     process.send_signal(signal.SIGTERM)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 143
-    assert b"terminated; what is finished is kept: run the same command " + told in complaints
+    assert b"terminated; what is finished is kept: run the same command " + reported in complaints
 
 
 def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
@@ -288,16 +288,16 @@ def test_of_two_runs_into_one_folder_exactly_one_works(cli, tmp_path, races):
 
 def test_json_says_what_was_found(cli, tmp_path):
     done = cli("sweep", str(CAM), "--vary", RADII, "-o", "out", *FEW, "--json")
-    told = done.document
-    assert told["points"] == {"total": 5, "complete": 5}
-    assert told["best"]["by"] == "force_ripple"
-    assert told["exit_code"] == 0
+    reported = done.document
+    assert reported["points"] == {"total": 5, "complete": 5}
+    assert reported["best"]["by"] == "force_ripple"
+    assert reported["exit_code"] == 0
     written = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    assert written["best"] == told["best"]
+    assert written["best"] == reported["best"]
     ripples = [float(row["force_ripple [1]"]) for row in rows(tmp_path / "out")]
-    assert told["metrics"]["force_ripple"]["value"] == min(ripples)
-    assert told["best"]["point"] == ripples.index(min(ripples)) + 1
-    assert told["range"]["force_ripple"]["max"] == max(ripples)
+    assert reported["metrics"]["force_ripple"]["value"] == min(ripples)
+    assert reported["best"]["point"] == ripples.index(min(ripples)) + 1
+    assert reported["range"]["force_ripple"]["max"] == max(ripples)
 
 
 def until(condition, seconds=30):
@@ -324,8 +324,12 @@ def test_pictures_fit_the_number_of_parameters(cli, tmp_path, options, names):
 
 def test_of_numbers_without_a_unit_only_shares_are_percentages(cli):
     config = CAM.with_name("slider_crank_li2019_bistable.yaml")
-    told = cli("sweep", str(config), "--vary", "mechanism.offset=[20 mm, 30 mm]", "-o", "out", "--no-plots", "-v").out
-    lines = {words[0]: words[1] for line in told.splitlines() if len(words := re.split(r"\s{2,}", line.strip())) == 2}
+    reported = cli(
+        "sweep", str(config), "--vary", "mechanism.offset=[20 mm, 30 mm]", "-o", "out", "--no-plots", "-v"
+    ).out
+    lines = {
+        words[0]: words[1] for line in reported.splitlines() if len(words := re.split(r"\s{2,}", line.strip())) == 2
+    }
     assert lines["stable positions"] == "2"
     assert lines["torque ripple"].endswith(" %")
 
@@ -345,9 +349,9 @@ def test_a_table_says_why_cells_are_empty_where_a_window_does_not_follow_a_swept
         f"no value over 5 ... 240 mm (requirements.1.over): the curve covers 0 ... {end} mm only"
         for end in (150, 200)
     ] + [""]
-    (told,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"]
-    assert told["name"] == "window_outside"
-    assert told["message"].startswith("2 of 3 points have no value over a window")
+    (reported,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"]
+    assert reported["name"] == "window_outside"
+    assert reported["message"].startswith("2 of 3 points have no value over a window")
     assert "window_outside" in done.out
 
 

@@ -39,7 +39,7 @@ def test_every_verb_explains_itself_and_every_option(cli, verb):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (("analyze", "cam.yaml", "--seed", "-1"), "'--seed': -1 is not allowed: must be >= 0"),
         (("sensitivity", "cam.yaml", "--samples", "1"), "'--samples': 1 is not allowed: must be >= 2"),
@@ -47,14 +47,14 @@ def test_every_verb_explains_itself_and_every_option(cli, verb):
         (("design", "cam.yaml", "--seed", str(2**63)), f"{2**63} is not allowed: must be <= {2**63 - 1}"),
     ],
 )
-def test_a_number_out_of_its_limits_is_refused_with_them(cli, arguments, told):
+def test_a_number_out_of_its_limits_is_refused_with_them(cli, arguments, reported):
     done = cli(*arguments)
     assert done.code == 2
-    assert told in done.err
+    assert reported in done.err
 
 
 @pytest.mark.parametrize(
-    ("verb", "told"),
+    ("verb", "reported"),
     [
         ("batch", "What to do with every spec; default: design where there is a block design, else analyze."),
         ("batch", "Output folder; default: cfm-out/batch/."),
@@ -62,9 +62,9 @@ def test_a_number_out_of_its_limits_is_refused_with_them(cli, arguments, told):
         ("sensitivity", "or Monte Carlo over tolerances; default: the spec's, else oat."),
     ],
 )
-def test_the_help_names_the_defaults(cli, verb, told):
+def test_the_help_names_the_defaults(cli, verb, reported):
     page = cli(verb, "--help", COLUMNS="200").out
-    assert told in " ".join(page.replace("│", " ").split())
+    assert reported in " ".join(page.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("verb", ["check", "new", "show", "schema", "export"])
@@ -312,7 +312,7 @@ def test_export_writes_the_geometry_of_a_spec(cli, cam):
 
 
 @pytest.mark.parametrize(
-    ("config", "change", "told"),
+    ("config", "change", "reported"),
     [
         ("slider_crank_tapered", "mechanism.legs=8", "one of 8 equal legs is drawn"),
         ("slider_crank_bilancia2019", "mechanism.legs=3", "one of 3 equal legs is drawn"),
@@ -320,10 +320,10 @@ def test_export_writes_the_geometry_of_a_spec(cli, cam):
         ("vcfm_ding2022", "mechanism.bistable.half_beams=3", "4 instead of 3"),
     ],
 )
-def test_export_says_how_often_a_part_is_to_be_made(cli, config, change, told):
+def test_export_says_how_often_a_part_is_to_be_made(cli, config, change, reported):
     spec = str(CONFIGS[0].parent / f"{config}.yaml")
-    assert told in cli("export", spec, "--set", change).out
-    assert told in cli("export", spec, "--set", change, "--json").document["notes"][0]
+    assert reported in cli("export", spec, "--set", change).out
+    assert reported in cli("export", spec, "--set", change, "--json").document["notes"][0]
 
 
 def test_export_gives_the_same_geometry_as_design(cli, cam):

@@ -35,8 +35,8 @@ def test_lee_frame_snaps_at_its_published_load():
     """18.55 EI/L^2, Lee, Manuel, Rossow, J. Eng. Mech. 94 (1968) 521."""
     result = solved("beam_lee_frame")
     assert value(result, "limit_force") / 0.1 == pytest.approx(18.55, abs=0.02)
-    told = next(item.message for item in result.warnings if item.name == "limit_point")
-    assert told == "limit points at 1.856 N, -0.9421 N"
+    reported = next(item.message for item in result.warnings if item.name == "limit_point")
+    assert reported == "limit points at 1.856 N, -0.9421 N"
     assert not result.curve.stable.all()
 
 

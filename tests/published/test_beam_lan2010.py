@@ -97,9 +97,9 @@ def test_raw_closure_is_prestressed_and_says_so():
     result = solved("beam_lan2010", "mechanism.closure=raw")
     assert value(result, "prestress_force") == pytest.approx(0.0360, abs=6e-5)
     assert value(result, "nominal_force") == pytest.approx(9.734157, abs=2e-6)
-    told = {item.name: item.message for item in result.warnings}
-    assert "carries 0.03597 N" in told["closure_prestress"]
-    assert "closure_adjusted" not in told
+    reported = {item.name: item.message for item in result.warnings}
+    assert "carries 0.03597 N" in reported["closure_prestress"]
+    assert "closure_adjusted" not in reported
 
 
 def test_closure_residuals_of_both_tables_are_reported():
@@ -108,8 +108,8 @@ def test_closure_residuals_of_both_tables_are_reported():
         ("beam_lan2010_subcfm", (0.058, 0.078, 0.061)),
     ):
         result = solved(name)
-        told = next(item.message for item in result.warnings if item.name == "closure_adjusted")
-        assert told.count("it missed by") == len(gaps)
+        reported = next(item.message for item in result.warnings if item.name == "closure_adjusted")
+        assert reported.count("it missed by") == len(gaps)
         assert value(result, "closure_gap_max") / MM == pytest.approx(max(gaps), rel=0.02)
 
 

@@ -133,8 +133,8 @@ def test_a_column_of_pieces_is_loaded_with_multiples_of_its_critical_load_at_ran
     path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
-    told = [event.kind for event in path.events]
-    assert told == ["bifurcation"] or (not told and ratios.max() <= 1 + 1e-5)
+    reported = [event.kind for event in path.events]
+    assert reported == ["bifurcation"] or (not reported and ratios.max() <= 1 + 1e-5)
     found = -path.motion("b")[path.at_requested, 0] / LENGTH
     sure = np.abs(ratios - 1) > 1e-5
     expected = np.array([approach_under(one) for one in ratios])

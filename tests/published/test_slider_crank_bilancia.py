@@ -129,8 +129,8 @@ def test_the_optimum_in_the_papers_ranges():
     assert 0.00925912 / error == pytest.approx(52, abs=0.5)
     inside = result.curve.force[result.curve.displacement >= 0.35e-3]
     assert (inside.min(), inside.max()) == (pytest.approx(1.49917, abs=2e-5), pytest.approx(1.50052, abs=2e-5))
-    told = next(item.message for item in found.warnings if item.name == "near_optima")
-    assert "crank length 32.71 mm to 54 mm" in told, "the valley: 0.04 % for every crank from 33 mm on"
+    reported = next(item.message for item in found.warnings if item.name == "near_optima")
+    assert "crank length 32.71 mm to 54 mm" in reported, "the valley: 0.04 % for every crank from 33 mm on"
 
 
 def test_the_optimum_on_points_even_in_the_crank_angle():

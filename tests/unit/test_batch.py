@@ -175,8 +175,8 @@ def test_the_tables_have_a_row_for_each_specification_and_each_requirement():
 
 
 def test_the_message_counts_every_end():
-    told = "7 specs: 1 ok, 1 missed, 1 partial, 1 no solution, 1 invalid, 1 bug, 1 skipped"
-    assert message(ENTRIES) == told
+    reported = "7 specs: 1 ok, 1 missed, 1 partial, 1 no solution, 1 invalid, 1 bug, 1 skipped"
+    assert message(ENTRIES) == reported
 
 
 def test_two_specifications_of_one_name_in_two_folders_are_told_apart():

@@ -46,9 +46,9 @@ def test_a_batch_compared_with_itself_has_no_changes_and_one_that_changed_return
     rows = list(csv.DictReader((folder / "out" / "changes.csv").read_text().splitlines()))
     assert "force_mean" in {row["metric"] for row in rows}
     assert all(row["beyond_tolerance"] == "true" for row in rows if abs(float(row["relative_change"])) > 1e-6)
-    told = json.loads((folder / "out" / "metrics.json").read_text())
-    assert told["status"] == "requirement_missed"
-    assert len(told["compared"]["changes"]) == len(rows)
+    reported = json.loads((folder / "out" / "metrics.json").read_text())
+    assert reported["status"] == "requirement_missed"
+    assert len(reported["compared"]["changes"]) == len(rows)
     assert "### Compared with out" in (folder / "reports" / "summary.md").read_text()
     wide = batch(compare="out", compare_tolerance=0.2, changes=thicker[1:])
     assert wide.exit_code is ExitCode.OK

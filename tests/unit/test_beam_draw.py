@@ -77,8 +77,8 @@ def test_a_link_keeps_its_length_and_turns_with_its_node():
 def test_diagrams_say_that_beams_are_left_out():
     spec = config("beam_two_layers", "analysis.travel=4 mm", "analysis.window=[1 mm, 4 mm]", "analysis.points=9")
     for name in ("reactions", "stress"):
-        told = [text.get_text() for text in drawn(spec, name).findobj() if hasattr(text, "get_text")]
-        assert any("the 6 largest of 8" in text for text in told)
+        reported = [text.get_text() for text in drawn(spec, name).findobj() if hasattr(text, "get_text")]
+        assert any("the 6 largest of 8" in text for text in reported)
 
 
 def test_forces_under_a_torque_are_those_along_x_and_y():

@@ -257,8 +257,8 @@ def test_shallow_beams_without_stretching_have_no_path_and_no_number_is_invented
 
 
 def test_stress_above_the_allowable_one_is_told_with_its_place():
-    told = warned(solved("beam_lan2010"))["overstressed"]
-    assert told == (
+    reported = warned(solved("beam_lan2010"))["overstressed"]
+    assert reported == (
         "the largest stress in the window is 48.22 MPa, at 0.260 of beam b4; the allowable stress is 48.1 MPa"
     )
 
@@ -299,8 +299,8 @@ def test_slenderness_is_that_of_the_thickest_place_of_a_taper():
 
 def test_what_cannot_be_cut_is_told():
     changes = ("mechanism.part.min_gap=5 mm", "mechanism.part.min_feature=1.2 mm")
-    told = warned(solved("beam_lan2010", *changes))
-    assert {"gap_small", "feature_small"} <= set(told)
+    reported = warned(solved("beam_lan2010", *changes))
+    assert {"gap_small", "feature_small"} <= set(reported)
     assert not {"gap_small", "feature_small"} & set(warned(solved("beam_lan2010")))
 
 
@@ -421,10 +421,10 @@ def test_a_surface_that_rises_too_far_is_partial():
 
 
 def test_a_steep_surface_jams():
-    told = warned(
+    reported = warned(
         solved("beam_end_effector", "analysis.surface.friction=1.99", "analysis.surface.profile.length=12.3 mm")
     )
-    assert "tip_jams" not in told
+    assert "tip_jams" not in reported
     changes = (
         "analysis.surface.friction=1.99",
         "analysis.surface.profile.length=3 mm",
@@ -482,9 +482,9 @@ def test_equation_6_is_not_blamed_for_a_width_and_is_for_a_size():
     error = 100 * (1 + (soft / stiff - 1) / 4) / (soft / stiff) - 100
     for change in ("design.rescale.force=12 N", "design.rescale.free=width"):
         design = cfmkit.design(config("beam_lan2010", "mechanism.axial=true", change, "design.rescale.size=64 mm"))
-        told = {item.name: item.message for item in design.warnings}["rescale_approximate"]
-        assert float(told.split("off by ")[1].split(" %")[0]) == pytest.approx(error, rel=0.1)
-        assert told.endswith("; corrected") == ("force" in change)
+        reported = {item.name: item.message for item in design.warnings}["rescale_approximate"]
+        assert float(reported.split("off by ")[1].split(" %")[0]) == pytest.approx(error, rel=0.1)
+        assert reported.endswith("; corrected") == ("force" in change)
 
 
 def test_a_size_scales_every_length_in_the_plane():
@@ -715,17 +715,17 @@ def test_nodes_and_reactions_are_reported_where_they_are_requested():
 
 
 @pytest.mark.parametrize(
-    ("outputs", "place", "told"),
+    ("outputs", "place", "reported"),
     [
         ("{nodes: [n9]}", "analysis.outputs.nodes.0", "there is no node 'n9'"),
         ("{reactions: [n1, n3]}", "analysis.outputs.reactions.1", "nothing holds 'n3'"),
     ],
 )
-def test_what_cannot_be_reported_is_refused_at_its_place(outputs, place, told):
+def test_what_cannot_be_reported_is_refused_at_its_place(outputs, place, reported):
     with pytest.raises(SpecError) as caught:
         solved("beam_lan2010", f"analysis.outputs={outputs}")
     assert place in str(caught.value)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def test_where_it_snaps_is_told_as_a_factor_and_as_a_force(rise):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("factor: 1", "force: 1 N", "give 'factor'"),
         ("  factor: 1\n", "", "the key 'factor' is missing"),
@@ -131,10 +131,10 @@ def test_where_it_snaps_is_told_as_a_factor_and_as_a_force(rise):
         ("kind: loads, node: tip", "kind: loads, node: root", "cannot move"),
     ],
 )
-def test_what_is_wrong_is_said_at_its_place(old, new, told):
+def test_what_is_wrong_is_said_at_its_place(old, new, reported):
     with pytest.raises(SpecError) as caught:
         loaded(FORCE, factor=1, more=[(old, new)])
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 PLACES = (

@@ -214,8 +214,8 @@ def test_a_design_says_of_itself_what_its_analysis_says(change: str) -> None:
     start, end = written_again.analysis.window
     assert band <= 0.015
     assert start < 6e-3
-    told = f"force within ± {percent(band)} over {percent(1 - start / end)} of the travel"
-    assert told in design.message
+    reported = f"force within ± {percent(band)} over {percent(1 - start / end)} of the travel"
+    assert reported in design.message
     other = evaluate(analyze(written_again.replace({"analysis.fidelity": "reissner"})), ["half_band"])["half_band"]
     known = design.search.get("audit_half_band_reissner")
     assert known is None if "reissner" in change else known.quantity.value == other.value

@@ -159,9 +159,9 @@ def test_a_part_that_touches_itself_is_a_partial_curve_with_the_place(tmp_path):
     path.write_text(HAIRPIN, encoding="utf-8")
     result = cfmkit.analyze(cfmkit.load(path))
     assert result.status is Status.PARTIAL
-    (told,) = (found.message for found in result.warnings if found.name == "self_contact")
-    assert told == result.message
-    assert told.startswith("the part touches itself at (")
+    (reported,) = (found.message for found in result.warnings if found.name == "self_contact")
+    assert reported == result.message
+    assert reported.startswith("the part touches itself at (")
     assert 1.7e-3 < float(result.curve.motion[-1]) <= 2.0e-3
 
 

@@ -21,10 +21,10 @@ def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_
     spec = cfmkit.load("configs/beam_rescaled.yaml").replace({"requirements": asked})
     spec = spec.replace({"design.tolerances": {MODULUS: {"normal": "3 %"}, "mechanism.width": {"normal": "0.1 %"}}})
     result = cfmkit.analyze(spec)
-    told = bench(result, Run())
-    assert "measure width (10 mm as drawn), determine material.youngs_modulus (2000 MPa in the design)" in told
+    reported = bench(result, Run())
+    assert "measure width (10 mm as drawn), determine material.youngs_modulus (2000 MPa in the design)" in reported
     force, low, high = (
-        float(text) for text in re.search(r"expect ([\d.]+) N \(([\d.]+) N to ([\d.]+) N\)", told).groups()
+        float(text) for text in re.search(r"expect ([\d.]+) N \(([\d.]+) N to ([\d.]+) N\)", reported).groups()
     )
     window = spec.analysis.window or (0.5 * result.curve.motion.max(), 0.0)
     assert force == pytest.approx(np.interp(window[0], result.curve.motion, result.curve.effort), rel=5e-3)
@@ -44,9 +44,12 @@ def measured(name, **changes):
 
 
 def test_a_modulus_is_no_dimension_and_takes_no_place_of_one():
-    told = {"mechanism.material.youngs_modulus": {"normal": "5 %"}, "mechanism.springs.stiffness": {"normal": "2 %"}}
-    told |= {f"mechanism.bistable.{name}": {"normal": "1 %"} for name in ("width", "length", "thickness")}
-    found = measured("vcfm_bought_springs", **{"design.tolerances": told})
+    reported = {
+        "mechanism.material.youngs_modulus": {"normal": "5 %"},
+        "mechanism.springs.stiffness": {"normal": "2 %"},
+    }
+    reported |= {f"mechanism.bistable.{name}": {"normal": "1 %"} for name in ("width", "length", "thickness")}
+    found = measured("vcfm_bought_springs", **{"design.tolerances": reported})
     assert re.fullmatch(r"measure (\S+ \([^)]*\)(, | and )?){3}, determine .*youngs_modulus.*", found)
     assert "springs" not in found.split("determine")[0]
 
@@ -75,5 +78,5 @@ def test_ranges_by_the_engines_derivatives_are_those_by_neighbouring_parts(monke
 def test_many_errors_need_no_part_more_where_the_engine_has_the_derivatives():
     spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
     assert 2 * len(spec.design.tolerances) > 24  # more parts than are solved for a sentence
-    told = bench(cfmkit.analyze(spec), Run())
-    assert re.search(r"measure (beams|nodes)\..* expect [\d.]+ N \(", told)
+    reported = bench(cfmkit.analyze(spec), Run())
+    assert re.search(r"measure (beams|nodes)\..* expect [\d.]+ N \(", reported)

@@ -36,9 +36,9 @@ def test_the_safety_factor_is_the_yield_pressure_over_the_pressure_of_two_cylind
 def test_a_contact_that_yields_is_told_with_the_width_that_does_not():
     thin = analyze(cam(**PRESSED, springs={"stiffness": "6 N/mm", "count": 2}))
     assert names(thin) == ["overstressed"]
-    told = message(thin, "overstressed")
-    assert "above 75.15 MPa" in told
-    width = told.split("at least ")[1].split(" (")[0]
+    reported = message(thin, "overstressed")
+    assert "above 75.15 MPa" in reported
+    width = reported.split("at least ")[1].split(" (")[0]
     for share, fine in ((1.001, True), (0.99, False)):
         wide = {"width": float(width.split()[0]) * MM * share, "material": "pla"}
         again = analyze(cam(roller_radius="10 mm", springs={"stiffness": "6 N/mm", "count": 2}, contact=wide))

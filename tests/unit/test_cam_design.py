@@ -284,14 +284,14 @@ def test_an_undercut_design_is_made_and_its_analysis_warns():
 
 
 def test_a_design_says_which_values_of_the_profile_it_replaces():
-    def told(**profile):
+    def reported(**profile):
         found = design(targets({f"profile__{key}": value for key, value in profile.items()}))
         return [item.message for item in found.warnings if item.name == "overwritten"]
 
-    assert told() == []
-    assert told(rest_half_width="68 mm", force_constant="7 mm", stroke="100 mm") == []
-    (one,) = told(rest_half_width="70 mm")
+    assert reported() == []
+    assert reported(rest_half_width="68 mm", force_constant="7 mm", stroke="100 mm") == []
+    (one,) = reported(rest_half_width="70 mm")
     assert "'mechanism.profile.rest_half_width' (70 mm) is replaced by 68 mm" in one
-    assert len(told(roller_radius="10 mm", brace_length="190 mm", friction=0.002)) == 3
-    (cutting,) = told(offset="0.1 mm")
+    assert len(reported(roller_radius="10 mm", brace_length="190 mm", friction=0.002)) == 3
+    (cutting,) = reported(offset="0.1 mm")
     assert "without errors of cutting" in cutting

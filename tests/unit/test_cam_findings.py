@@ -435,9 +435,9 @@ def test_a_travel_beyond_the_profile_ends_the_curve_at_its_end():
 
 
 def test_material_missing_beyond_the_radius_of_curvature_asks_for_no_negative_roller():
-    told = message(run(profile__offset="-20 mm"), "undercut")
-    assert "Use less missing material or A >= " in told
-    assert "roller <= " not in told
+    reported = message(run(profile__offset="-20 mm"), "undercut")
+    assert "Use less missing material or A >= " in reported
+    assert "roller <= " not in reported
     assert "Use a roller <= 9.328 mm" in message(run(profile__offset="-1 mm"), "undercut")
 
 

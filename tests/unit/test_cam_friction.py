@@ -242,8 +242,8 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
         return 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
 
     assert area(rounded) - area(sharp) == pytest.approx(2 * (1 - np.pi / 4) * 0.003**2, rel=1e-3)
-    told = " ".join(outline("300 mm").notes)
-    assert "room for a tool radius" in told
+    reported = " ".join(outline("300 mm").notes)
+    assert "room for a tool radius" in reported
 
 
 def test_a_roller_meets_the_fillet_of_a_corner_not_the_rest_of_its_circle():

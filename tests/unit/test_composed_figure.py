@@ -96,7 +96,7 @@ def test_panels_too_narrow_to_read_are_refused(file):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("panels: []", "panels"),
         ("panels: [{run: a.yaml}]", "own.yaml:1:10: panels.0: the key 'plot' is missing"),
@@ -105,21 +105,21 @@ def test_panels_too_narrow_to_read_are_refused(file):
         ("panels: [{run: a.yaml, plot: b}]\nrows: 2", "rows"),
     ],
 )
-def test_a_malformed_file_is_refused_with_the_place(file, text, told):
-    with pytest.raises(SpecError, match=re.escape(told)):
+def test_a_malformed_file_is_refused_with_the_place(file, text, reported):
+    with pytest.raises(SpecError, match=re.escape(reported)):
         read(file(text))
 
 
 def test_a_picture_or_a_run_that_does_not_exist_is_said_with_those_that_do(file):
     root = Path("configs").absolute()
-    for text, told in (
+    for text, reported in (
         (f"panels:\n  - {{run: {root}/cam.yaml, plot: lop}}", "own.yaml:2:.*did you mean 'loop'"),
         (f"panels:\n  - {{run: {root}/cam.yaml, plot: xyz}}", "there are loop"),
         ("panels:\n  - {run: nowhere.yaml, plot: loop}", "own.yaml:2:.*no such file"),
         (f"panels:\n  - {{run: {root}, plot: loop}}", "is not the folder of a run"),
     ):
         name = file(text)
-        with pytest.raises(SpecError, match=told):
+        with pytest.raises(SpecError, match=reported):
             panels(name, read(name), serial)
 
 

@@ -18,8 +18,8 @@ MEASURES = {"d_rms": (rms, "rms of {}"), "d_max": (largest, "largest of {}"), "d
 def line(motion, effort, branch="load", **label):
     points = len(motion)
     names = np.full(points, branch) if isinstance(branch, str) else np.array(branch)
-    told = {name: (value, "text") for name, value in label.items()}
-    return Curve(np.array(motion), np.array(effort), names, np.ones(points, bool), label=told)
+    reported = {name: (value, "text") for name, value in label.items()}
+    return Curve(np.array(motion), np.array(effort), names, np.ones(points, bool), label=reported)
 
 
 def summary(*values, tag=""):

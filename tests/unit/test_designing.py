@@ -142,14 +142,14 @@ def squared(number: int) -> dict[str, Any]:
 
 
 def test_finished_starts_are_noted_and_not_done_again() -> None:
-    notes, told = Recorder(), []
+    notes, reported = Recorder(), []
     means = Run(notes=notes)
-    first = done(Stage(squared, (0, 1), "x"), means, NEVER, lambda records: told.append(len(records)))
+    first = done(Stage(squared, (0, 1), "x"), means, NEVER, lambda records: reported.append(len(records)))
     again = done(Stage(squared, (0, 1, 2), "x"), means, NEVER, lambda _: None)
     other = done(Stage(squared, (0, 1), "y"), means, NEVER, lambda _: None)
     assert (first.reused, again.reused, other.reused) == (0, 2, 0)
     assert {job: record["found"] for job, record in again.records.items()} == {0: 0, 1: 1, 2: 4}
-    assert told == [0, 1, 2]
+    assert reported == [0, 1, 2]
 
 
 def test_late_no_start_is_begun_and_one_that_ran_out_of_time_is_not_noted() -> None:

@@ -94,19 +94,19 @@ def test_the_documentation_comes_with_the_package_and_its_links_lead_to_files():
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "reported"),
     [
         ("", "[no links](`cfmkit docs cam`)"),
         ("https://example.org/us/cfmkit/", "[cam](https://example.org/us/cfmkit/blob/main/docs/cam.md)"),
     ],
 )
-def test_the_description_of_a_wheel_has_no_link_that_leads_nowhere(monkeypatch, url, told):
+def test_the_description_of_a_wheel_has_no_link_that_leads_nowhere(monkeypatch, url, reported):
     setuptools = pytest.importorskip("setuptools")
     given = {}
     monkeypatch.setenv("CFMKIT_URL", url)
     monkeypatch.setattr(setuptools, "setup", lambda **options: given.update(options))
     runpy.run_path(str(DOCS.parent / "setup.py"))
     assert LINKS.findall(given["long_description"]) == []
-    assert told.replace("[no links]", "cam ") in given["long_description"]
+    assert reported.replace("[no links]", "cam ") in given["long_description"]
     assert bool(given["project_urls"]) == bool(url)
     assert all(one.startswith("https://example.org/us/cfmkit") for one in given["project_urls"].values())

@@ -67,7 +67,7 @@ def loaded(network: Network, points: object, tolerance: float, **control: object
     return path
 
 
-def told(path: Path) -> list[tuple[str, int, int]]:
+def reported(path: Path) -> list[tuple[str, int, int]]:
     return [(event.kind, event.before, event.after) for event in path.events]
 
 
@@ -93,7 +93,7 @@ def test_down_and_up_again_passes_the_same_bifurcations(count: int, tolerance: f
     down = np.linspace(0.05, 2.1, 15)
     path = pressed(np.concatenate([down, down[::-1][1:], [0]]), tolerance, count)
     names = [("bifurcation", 0, count), ("bifurcation", count, 0)]
-    assert told(path) == names * 2
+    assert reported(path) == names * 2
     first, second, again, last = places(path)
     alone = pressed(down, 1e-9)
     np.testing.assert_allclose([first, last, second, again], np.repeat(places(alone), 2), atol=tolerance * 2.1 * RISE)
@@ -107,7 +107,7 @@ def test_down_and_up_again_passes_the_same_bifurcations(count: int, tolerance: f
 def test_on_a_branch_the_drive_may_turn_round_as_often_as_it_likes(tolerance: float, sign: int) -> None:
     path = pressed([1, 0.05, 1, 1.5, 0.5, 2, 1, 0], tolerance, sign=sign)
     opened, closed = ("bifurcation", 0, 1), ("bifurcation", 1, 0)
-    assert told(path) == [opened, closed] * 4
+    assert reported(path) == [opened, closed] * 4
     first, last = places(pressed([2.1], 1e-9))
     np.testing.assert_allclose(places(path), [first] * 3 + [last] * 4 + [first], atol=2 * tolerance * RISE)
     at = path.branch[path.at_requested]
@@ -139,7 +139,7 @@ def test_a_toggle_snaps_and_snaps_back_at_the_limit_points_of_its_force(toleranc
     first = int((np.diff(force) < 0).argmax())
     top, low = force[first], force[first:].min()
     path = loaded(toggle(1e-3), [0.4, 0.8, 1.5, 0.8, 0.4, 0], tolerance)
-    assert told(path) == [("limit point", a, b) for a, b in ((0, 1), (1, 0), (0, 1), (1, 0))]
+    assert reported(path) == [("limit point", a, b) for a, b in ((0, 1), (1, 0), (0, 1), (1, 0))]
     np.testing.assert_allclose(places(path), [top, low, low, top], atol=3e-5)  # of travel in steps
     assert path.requested[path.at_requested].tolist() == [0, 0, 0, 1, 2, 3, 4, 4, 4, 5]
     np.testing.assert_allclose(path.motion("t")[-1], 0, atol=1e-8)
@@ -152,5 +152,5 @@ def test_the_bifurcations_between_limit_points_are_the_same_at_every_tolerance(b
     paths = [loaded(arch(), asked, tolerance, branch=branch) for tolerance in (*TOLERANCES, 1e-9)]
     kinds = [("bifurcation", 0, 1), ("limit point", 1, 2), ("bifurcation", 2, 1), ("limit point", 1, 0)]
     for path, tolerance in zip(paths, TOLERANCES, strict=False):
-        assert told(path) == kinds
+        assert reported(path) == kinds
         np.testing.assert_allclose(places(path), places(paths[-1]), atol=2 * tolerance)

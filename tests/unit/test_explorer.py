@@ -53,8 +53,8 @@ def test_an_answer_is_what_analyze_says(explorer):
 
 
 def test_a_value_that_is_not_allowed_is_an_answer_with_its_reason(explorer):
-    (told,) = explorer.answer(["mechanism.springs.stiffness=-1 N/mm"])["problem"]
-    assert "stiffness" in told
+    (reported,) = explorer.answer(["mechanism.springs.stiffness=-1 N/mm"])["problem"]
+    assert "stiffness" in reported
     assert "problem" in explorer.answer(["mechanism.nothing=1"])
 
 

@@ -83,8 +83,8 @@ def test_a_corner_that_no_fillet_fits_stays_and_its_place_is_told():
 
 
 def test_a_sheet_names_the_widths_that_are_not_its_thickness():
-    told = r"the sheet is 6 mm, but 'mechanism\.positive\.width' is 10 mm: make them equal"
-    with pytest.raises(SpecError, match=told):
+    reported = r"the sheet is 6 mm, but 'mechanism\.positive\.width' is 10 mm: make them equal"
+    with pytest.raises(SpecError, match=reported):
         cfmkit.load("configs/vcfm_ding2022.yaml", ["mechanism.part.sheet=6 mm"])
     cfmkit.load("configs/beam_lan2010.yaml", ["mechanism.part.sheet=10 mm"])
 

@@ -74,7 +74,7 @@ def test_of_a_package_that_is_on_the_path_twice_the_first_one_counts(site, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "reported"),
     [
         ("import a_module_that_is_not_there\n", "ModuleNotFoundError: No module named 'a_module_that_is_not_there'"),
         ("FAMILY = 1 / 0\n", "it cannot be imported: ZeroDivisionError: division by zero"),
@@ -88,9 +88,9 @@ def test_of_a_package_that_is_on_the_path_twice_the_first_one_counts(site, tmp_p
     ],
     ids=["module", "error", "exit", "nothing", "kind", "name", "newer", "unstated", "field"],
 )
-def test_a_family_that_cannot_be_used_is_skipped_with_the_reason(site, source, told):
+def test_a_family_that_cannot_be_used_is_skipped_with_the_reason(site, source, reported):
     packages.install(site, "broken-one", source, "broken")
-    assert told in reason("broken")
+    assert reported in reason("broken")
     assert reason("broken").startswith("the family 'broken' of the package broken-one 1.0 cannot be used: ")
     assert families.skipped() == (reason("broken"),)
     assert {"cam", "beam"} <= {one.name for one in families.records()}

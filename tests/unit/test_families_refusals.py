@@ -22,7 +22,7 @@ def test_a_family_finds_only_what_it_explains():
 
 
 def test_numbers_are_told_in_the_units_of_the_user():
-    told = (
+    reported = (
         mm(0.0123456),
         deg(0.5235987755982988),
         newton(12.34567),
@@ -30,7 +30,7 @@ def test_numbers_are_told_in_the_units_of_the_user():
         rate(1234.567),
         percent(0.012345),
     )
-    assert told == ("12.35 mm", "30 deg", "12.35 N", "12.35 MPa", "1.235 N/mm", "1.23 %")
+    assert reported == ("12.35 mm", "30 deg", "12.35 N", "12.35 MPa", "1.235 N/mm", "1.23 %")
 
 
 def test_a_proposed_length_stays_on_its_side_of_the_exact_one():

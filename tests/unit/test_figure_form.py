@@ -114,7 +114,7 @@ def test_a_style_file_changes_the_look_and_only_inside(cam, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "reported"),
     [
         ({"formats": "png,jpg"}, "there is no format 'jpg'"),
         ({"formats": " , "}, "there are png, svg, pdf"),
@@ -123,19 +123,19 @@ def test_a_style_file_changes_the_look_and_only_inside(cam, tmp_path):
         ({"style": "nowhere.mplstyle"}, "cannot be read"),
     ],
 )
-def test_a_malformed_wish_is_refused_in_one_line(given, told):
-    with pytest.raises(UsageError, match=re.escape(told)):
+def test_a_malformed_wish_is_refused_in_one_line(given, reported):
+    with pytest.raises(UsageError, match=re.escape(reported)):
         form_of(**given)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [("font.siz: 4", "font.siz"), ("pdf.fonttype: 3", "not a style file's"), ("font.size: large-ish", "font.size")],
 )
-def test_a_style_file_that_says_something_wrong_is_refused(text, told, tmp_path):
+def test_a_style_file_that_says_something_wrong_is_refused(text, reported, tmp_path):
     file = tmp_path / "own.mplstyle"
     file.write_text(text)
-    with pytest.raises(UsageError, match=re.escape(told)) as caught:
+    with pytest.raises(UsageError, match=re.escape(reported)) as caught:
         form_of(style=str(file))
     assert "\n" not in str(caught.value)
 

@@ -125,7 +125,7 @@ def test_parts_without_a_result_are_bad_and_counted():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"design.tolerances": {"mechanism.no_length": {"normal": "1 mm"}}}, "design.tolerances.'mechanism.no_length'"),
         ({"design.yield": "90 %"}, "design.yield"),
@@ -133,11 +133,11 @@ def test_parts_without_a_result_are_bad_and_counted():
         ({"requirements": ({"metric": "yield", "min": "9 mm"},)}, "requirements.0.min"),
     ],
 )
-def test_bad_input_is_said_with_its_place(changes, told):
+def test_bad_input_is_said_with_its_place(changes, reported):
     spec = cfmkit.load("configs/cam.yaml").replace(changes)
     with pytest.raises(SpecError) as error:
         cfmkit.loads(cfmkit.dumps(spec))
-    assert told in {one.path for one in error.value.problems}
+    assert reported in {one.path for one in error.value.problems}
 
 
 def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):

@@ -113,12 +113,12 @@ def test_a_sensitivity_over_torques_takes_requirements_and_their_windows_in_degr
 
 def test_a_branch_that_a_family_cannot_have_is_refused_with_those_it_has(tmp_path):
     assert set(cfmkit.analyze(CAM).curve.branches) == set(family("cam").branches)
-    told = "there is no branch 'lod'; there are 'load', 'unload'"
-    with pytest.raises(UsageError, match=told):
+    reported = "there is no branch 'lod'; there are 'load', 'unload'"
+    with pytest.raises(UsageError, match=reported):
         metrics_of(CAM, ["force_ripple[lod]"])
     text = cfmkit.dumps(CAM).replace("metric: force_ripple", 'metric: "force_ripple[lod]"')
     assert "[lod]" in text
-    with pytest.raises(SpecError, match=told):
+    with pytest.raises(SpecError, match=reported):
         cfmkit.loads(text)
 
 

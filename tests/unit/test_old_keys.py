@@ -19,8 +19,8 @@ def test_tolerances_of_a_search_of_shapes_are_tolerances_of_the_design():
     old = {"nodes": "0.05 mm", "coefficients": "0.01 rad", "samples": 30}
     by_old = spec.replace({"design.optimise.tolerances": old})
     shape = [f"mechanism.beams.s.shape.coefficients.{k}" for k in (1, 2, 3)]
-    told = {path: {"normal": "0.01 rad"} for path in shape[: len(spec.mechanism.beams["s"].shape.coefficients) - 1]}
-    by_new = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}} | told})
+    reported = {path: {"normal": "0.01 rad"} for path in shape[: len(spec.mechanism.beams["s"].shape.coefficients) - 1]}
+    by_new = spec.replace({"design.tolerances": {"mechanism.nodes.b.at.1": {"normal": "0.05 mm"}} | reported})
     found, wanted = (tolerances_of(one, one.design, 0) for one in (by_old, by_new))
     stated = [{one.path: one.spread.deviation for one in each.parameters} for each in (found, wanted)]
     assert stated[0] == pytest.approx(stated[1])

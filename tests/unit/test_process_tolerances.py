@@ -40,10 +40,10 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
     found = assumed(spec)
     assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
-    told = expected(cfmkit.analyze(spec), Run())
-    assert "assumed" in told
-    assert "once the modulus is measured" in told
-    assert "design.process=fdm" in told
+    reported = expected(cfmkit.analyze(spec), Run())
+    assert "assumed" in reported
+    assert "once the modulus is measured" in reported
+    assert "design.process=fdm" in reported
 
 
 def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does_and_a_design_with_tolerances_no_line():

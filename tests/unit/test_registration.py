@@ -58,13 +58,13 @@ def test_most_of_a_width_error_is_taken_for_a_shift_along_the_steep_flanks():
 
 def test_the_shift_that_a_width_error_is_taken_for_is_told_beforehand():
     """0.01 mm of width, plain least squares: the registration moves as `growth` of the exact profile says."""
-    told = register(measured(), flanks(), robust=False).growth
+    reported = register(measured(), flanks(), robust=False).growth
     exact, wide = (register(measured(Errors(offset=size)), flanks(), robust=False) for size in (0.0, 0.01e-3))
     centre = np.concatenate(exact.points).mean(axis=0)
     turn = np.array([-centre[1], centre[0]]) * (wide.angle - exact.angle)
     moved = turned(np.zeros((1, 2)), wide.angle - exact.angle, np.zeros(2))[0]
-    assert wide.shift - exact.shift + turn - moved == pytest.approx(0.01e-3 * told, rel=1e-3, abs=1e-9)
-    assert told[1] > 3
+    assert wide.shift - exact.shift + turn - moved == pytest.approx(0.01e-3 * reported, rel=1e-3, abs=1e-9)
+    assert reported[1] > 3
 
 
 @pytest.mark.parametrize("offset", [-0.2e-3, -0.05e-3, 0.05e-3, 0.3e-3])

@@ -246,13 +246,13 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
         "across": 80.0, "along": 90.5, "depth": None, "parts": 12, "life": None, "finer_deviation": None,
         "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE],
     }  # fmt: skip
-    told = {
+    reported = {
         "status": "complete", "message": "1 meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
         "proposals": [one], "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip
-    text = suggestion_files.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
+    text = suggestion_files.page(reported, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
     outline = Outline(text)
     assert outline.unbalanced == []
     assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})

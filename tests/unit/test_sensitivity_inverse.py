@@ -81,8 +81,8 @@ def test_a_tolerance_that_does_not_exist_is_an_answer():
     alone = [one["value"] for one in found.summary["indices"] if one["index"] == "tolerance_alone"]
     assert alone == [None, None]
     assert found.summary["status"] != "partial"
-    (told,) = [one["message"] for one in found.summary["warnings"] if one["name"] == "not_stated"]
-    assert "even without the error of that parameter alone" in told
+    (reported,) = [one["message"] for one in found.summary["warnings"] if one["name"] == "not_stated"]
+    assert "even without the error of that parameter alone" in reported
 
 
 def test_a_study_states_tolerances_and_judges_parts_within_them():

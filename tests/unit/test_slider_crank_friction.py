@@ -178,7 +178,7 @@ def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted()
 
 
 @pytest.mark.parametrize(
-    ("block", "told"),
+    ("block", "reported"),
     [
         ({"angle_travel": "1 deg"}, "are of an 'adjustment'"),
         ({"adjustment": "1 N"}, "needs either 'anchor_travel' or 'angle_travel'"),
@@ -186,9 +186,9 @@ def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted()
         ({"adjustment": "1 N", "anchor_travel": "1 mm"}, "add 'slider' to 'springs'"),
     ],
 )
-def test_a_trim_that_contradicts_itself_is_refused(block, told):
+def test_a_trim_that_contradicts_itself_is_refused(block, reported):
     given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
-    with pytest.raises(SpecError, match=told):
+    with pytest.raises(SpecError, match=reported):
         given.replace({f"design.{key}": value for key, value in block.items()})
 
 

@@ -109,12 +109,12 @@ def test_printing_allowance_is_solved_but_not_drawn():
 
 
 @pytest.mark.parametrize(
-    ("name", "change", "told"),
+    ("name", "change", "reported"),
     [
         ("bilancia2019", "analysis.drive=force", "needs a part: 'mechanism.flexures' or 'mechanism.beam'"),
         ("strip", "analysis.side=before", "follows the side of its kink: remove 'analysis.side'"),
     ],
 )
-def test_what_is_no_part_is_refused(name, change, told):
-    with pytest.raises(SpecError, match=told):
+def test_what_is_no_part_is_refused(name, change, reported):
+    with pytest.raises(SpecError, match=reported):
         spec(name, "analysis.fidelity=solid", change)

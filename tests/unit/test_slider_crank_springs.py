@@ -174,7 +174,7 @@ def test_rates_per_degree_and_per_radian_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"mechanism__springs__slider": "-1 N/mm"}, "must be >= 0"),
         ({"mechanism__stretched_position": "500 mm"}, "either 'coupler_length' or 'stretched_position'"),
@@ -190,8 +190,8 @@ def test_rates_per_degree_and_per_radian_are_told_apart():
         ),
     ],
 )
-def test_contradictions_are_refused(changes, told):
-    with pytest.raises(cfmkit.SpecError, match=told):
+def test_contradictions_are_refused(changes, reported):
+    with pytest.raises(cfmkit.SpecError, match=reported):
         config("li2019", **changes)
 
 

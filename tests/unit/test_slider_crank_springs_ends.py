@@ -51,9 +51,9 @@ def test_springs_relaxed_folded_can_only_be_pulled():
 def test_positions_are_the_same_after_each_turn():
     turns = config("li2019_full_turn", analysis__angle=(-5 * DEG, -5 * DEG + 6 * math.pi))
     result = cfmkit.analyze(turns)
-    told = {item.name: item.message for item in result.warnings}["same_position_twice"]
+    reported = {item.name: item.message for item in result.warnings}["same_position_twice"]
     assert result.values["stable_positions"].value == 7
-    assert "has 2 different stable positions" in told
+    assert "has 2 different stable positions" in reported
 
 
 def test_a_window_outside_the_motion_is_no_trouble():
@@ -157,8 +157,8 @@ def test_a_curve_ends_before_the_effort_grows_without_bound(name):
     spec = config(base, **changes, analysis__window=None)
     result = cfmkit.analyze(spec)
     assert result.status.key == "partial"
-    told = {item.name: item.message for item in result.warnings}
-    assert "coupler_dead_point" in told if name == "dead point" else "force_unbounded" in told
+    reported = {item.name: item.message for item in result.warnings}
+    assert "coupler_dead_point" in reported if name == "dead point" else "force_unbounded" in reported
     middle = np.median(np.abs(result.curve.effort))
     assert np.abs(result.curve.effort).max() < 200.0 * middle  # the pole itself gave 1e5 times as much
     assert len(result.curve.effort) == spec.analysis.points

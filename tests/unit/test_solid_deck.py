@@ -90,9 +90,9 @@ def test_calculix_finds_the_same_force(made, tmp_path):
         data = files[f"vcfm-{name}.inp"]
         (tmp_path / f"{name}.inp").write_bytes(data)
         subprocess.run(["ccx", "-i", name], cwd=tmp_path, check=True, capture_output=True, timeout=120)
-        told = (tmp_path / f"{name}.dat").read_text()
+        reported = (tmp_path / f"{name}.dat").read_text()
         share = float(re.search(rb"widths are (\S+) times", data)[1])
-        force = re.findall(r"for set SHUTTLE-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+(\S+)", told)
+        force = re.findall(r"for set SHUTTLE-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)\s+(\S+)", reported)
         own = part_of(spec, piece).meshed(1e-3).followed([0.0, 0.4e-3 * share_of_travel, 0.8e-3 * share_of_travel])
         assert -float(force[0][1]) / share == pytest.approx(own.course.poses[-1].effort, rel=1e-3)
 
@@ -104,8 +104,8 @@ def force_at_the_end(folder, data):
     """Return the reaction of the node DRIVE at the end of a deck that CalculiX has run [N]."""
     (folder / "beams.inp").write_bytes(data)
     subprocess.run(["ccx", "-i", "beams"], cwd=folder, check=True, capture_output=True, timeout=120)
-    told = (folder / "beams.dat").read_text()
-    return float(re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)", told, re.S)[-1])
+    reported = (folder / "beams.dat").read_text()
+    return float(re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)", reported, re.S)[-1])
 
 
 def test_a_deck_of_beams_read_back_is_the_network(made):
@@ -184,8 +184,8 @@ def test_calculix_finds_the_torque_of_the_beams(tmp_path):
     path.write_text(TURNED, encoding="utf-8")
     data = cfmkit.export(path, format="inp")["beams-as-beams.inp"]
     force_at_the_end(tmp_path, data)
-    told = (tmp_path / "beams.dat").read_text()
-    x, y = re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", told, re.S)[-1]
+    reported = (tmp_path / "beams.dat").read_text()
+    x, y = re.findall(r"forces.*?set DRIVE and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", reported, re.S)[-1]
     arm, angle = 1e-3 * float(re.search(rb"torque is (\S+) mm", data)[1]), np.radians(25.0)
     torque = arm * (float(y) * np.cos(angle) - float(x) * np.sin(angle))
     assert torque == pytest.approx(cfmkit.analyze(path).curve.effort[-1], rel=0.01)
@@ -296,8 +296,8 @@ def test_a_neo_hookean_part_has_that_law_in_its_deck(tmp_path):
 @pytest.mark.parametrize("law", ["st-venant-kirchhoff", pytest.param("neo-hookean", marks=pytest.mark.slow)])
 def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, law):
     spec, data = deck_of(tmp_path, law=law, **PUSHED)
-    told, share = run_by_ccx(tmp_path, data)
-    x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", told)[0])
+    reported, share = run_by_ccx(tmp_path, data)
+    x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", reported)[0])
     (one,) = family("beam").driven_parts(spec)
     pose = one.part.meshed(one.size).followed([0.0, 2.5e-3, 5e-3]).course.poses[-1]
     assert -(0.5 * x - np.sqrt(0.75) * y) / share == pytest.approx(pose.effort, rel=1e-3)
@@ -306,9 +306,9 @@ def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, la
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_calculix_finds_the_torque_on_an_end_that_is_turned_and_moves_freely(tmp_path):
     spec, data = deck_of(tmp_path, **TWISTED)
-    told, share = run_by_ccx(tmp_path, data)
+    reported, share = run_by_ccx(tmp_path, data)
     x, y, angle = map(float, re.search(r"\(x, y\) = \((\S+), (\S+)\) mm turned by (\S+) rad", data.decode()).groups())
-    fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", told)[0])
+    fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", reported)[0])
     c, s = np.cos(angle), np.sin(angle)
     (one,) = family("beam").driven_parts(spec)
     pose = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]

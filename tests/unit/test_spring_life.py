@@ -61,7 +61,7 @@ def test_a_stress_that_the_data_do_not_cover_has_no_life_but_a_reason():
 
 
 @pytest.mark.parametrize(
-    ("springs", "told"),
+    ("springs", "reported"),
     [
         ({"count": 2}, "missing: give it, or 'wound'"),
         ({"stiffness": "0.9 N/mm", "wound": WIRE}, "times the rate that is stated"),
@@ -69,8 +69,8 @@ def test_a_stress_that_the_data_do_not_cover_has_no_life_but_a_reason():
         ({"stiffness": "0.5 N/mm", "life": 0}, "must be > 0"),
     ],
 )
-def test_springs_that_contradict_themselves_are_refused(springs, told):
-    with pytest.raises((ValidationError, SpecError), match=told):
+def test_springs_that_contradict_themselves_are_refused(springs, reported):
+    with pytest.raises((ValidationError, SpecError), match=reported):
         with_springs(**springs)
 
 

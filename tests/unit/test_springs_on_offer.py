@@ -124,7 +124,7 @@ def test_a_list_may_be_a_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "reported"),
     [
         ("E-1,0.55 mm", "stiffness"),
         ("E-1,-1", "stiffness"),
@@ -132,15 +132,15 @@ def test_a_list_may_be_a_file(tmp_path):
         (",0.55", "name"),
     ],
 )
-def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, told):
+def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, reported):
     (tmp_path / "springs.csv").write_text(f"name,stiffness [N/mm]\nE-0,1\n{line}\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"springs\.csv:3") as caught:
         offers(DataSource("springs.csv", tmp_path), "extension")
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reported"),
     [
         (b"name,stiffness [N/mm],name\nA,1,B\n", "'name' appears twice"),
         (b"name,stiffness [N/mm]\nA,1\nA,2\n", "csv:3: there are two springs 'A' with different values"),
@@ -152,11 +152,11 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, told):
         (b"stiffness [N/mm]\n1\n", "csv:2: name: missing"),
     ],
 )
-def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data, told):
+def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data, reported):
     (tmp_path / "springs.csv").write_bytes(data)
     with pytest.raises(DataError) as caught:
         offers(DataSource("springs.csv", tmp_path), "extension")
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -174,7 +174,7 @@ def test_two_different_springs_of_one_name_are_refused_in_a_list():
 
 
 @pytest.mark.parametrize(
-    ("block", "told"),
+    ("block", "reported"),
     [
         ({}, "needs 'stiffness'"),
         ({"kind": "torsion", "stiffness": "1 N/mm"}, "kind 'torsion' has no 'stiffness'"),
@@ -186,8 +186,8 @@ def test_two_different_springs_of_one_name_are_refused_in_a_list():
         ({"wire": "1 mm", "coil": "10 mm", "turns": 40, "stiffness": "5 N/mm"}, "times the rate that is stated"),
     ],
 )
-def test_a_spring_that_contradicts_itself_is_refused(block, told):
-    with pytest.raises(ValidationError, match=told):
+def test_a_spring_that_contradicts_itself_is_refused(block, reported):
+    with pytest.raises(ValidationError, match=reported):
         CatalogueSpring.model_validate({"name": "x"} | block)
 
 
@@ -330,7 +330,7 @@ def test_free_lengths_are_chosen_for_the_springs_that_can_be_had():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"travel": None}, "are picked for a window"),
         ({"objective": "least-squares"}, "remove 'objective'"),
@@ -338,8 +338,8 @@ def test_free_lengths_are_chosen_for_the_springs_that_can_be_had():
         ({"catalogue": None, "spring_room": "40 mm"}, "'spring_room' is of springs that are picked"),
     ],
 )
-def test_what_a_catalogue_does_not_go_with_is_refused(changes, told):
-    with pytest.raises(SpecError, match=told):
+def test_what_a_catalogue_does_not_go_with_is_refused(changes, reported):
+    with pytest.raises(SpecError, match=reported):
         cranked(**changes)
 
 

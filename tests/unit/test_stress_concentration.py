@@ -98,7 +98,7 @@ def buckled() -> tuple[Path, ...]:
     return tuple(both_images(leaf(), pushed, np.array([2e-3])))
 
 
-def told(paths: tuple[Path, ...], *rows: FilletRow, travel: float = 2e-3) -> np.ndarray:
+def reported(paths: tuple[Path, ...], *rows: FilletRow, travel: float = 2e-3) -> np.ndarray:
     return nominal_stresses(rows, np.full(len(rows), travel), lambda _travel: paths, lambda points: points)
 
 
@@ -106,7 +106,7 @@ def test_the_outer_fibres_of_a_section_have_the_axial_stress_less_and_more_the_b
     path = buckled[0]
     point = int(path.at_requested[np.abs(path.drive[path.at_requested] - 2e-3).argmin()])
     found = path.sections("leaf")
-    stress = told((path,), fillet(1e-9, 1.0), fillet(1e-9, -1.0))
+    stress = reported((path,), fillet(1e-9, 1.0), fillet(1e-9, -1.0))
     assert stress.mean() == pytest.approx(found.axial_stress[point, 0], rel=1e-6)
     assert 0.5 * np.diff(stress) == pytest.approx(found.bending_stress[point, 0], rel=1e-6)
 
@@ -136,11 +136,11 @@ def test_below_a_tenth_of_the_largest_stress_there_is_no_nominal_one(cantilever)
 
 def test_of_two_mirror_images_that_counts_whose_stresses_have_the_signs_of_the_solid(buckled):
     assert len(buckled) == 2
-    one, other = (told((path,), fillet(0.02, 1.0), fillet(0.98, 1.0)) for path in buckled)
+    one, other = (reported((path,), fillet(0.02, 1.0), fillet(0.98, 1.0)) for path in buckled)
     assert (one * other < 0).any()  # the leaf bends into an S or its mirror image
     for stress in (one, other):
         rows = fillet(0.02, 1.0, 1.3 * stress[0]), fillet(0.98, 1.0, 1.2 * stress[1])
-        assert told(buckled, *rows).tolist() == stress.tolist()
+        assert reported(buckled, *rows).tolist() == stress.tolist()
 
 
 def test_without_a_bifurcation_there_is_one_path_and_travels_of_both_signs_have_their_own():
@@ -152,10 +152,10 @@ def test_without_a_bifurcation_there_is_one_path_and_travels_of_both_signs_have_
 
 
 def test_a_fillet_off_its_beam_or_beyond_the_path_has_no_nominal_stress(buckled):
-    assert np.isnan(told(buckled, fillet(0.02, 1.0, off=0.1e-3))).all()
-    assert np.isnan(told(buckled, fillet(1.1, 1.0))).all()
-    assert np.isnan(told(buckled, fillet(0.02, 1.0), travel=3e-3)).all()
-    assert np.isnan(told(buckled, fillet(0.02, 1.0), travel=0.0)).all()
+    assert np.isnan(reported(buckled, fillet(0.02, 1.0, off=0.1e-3))).all()
+    assert np.isnan(reported(buckled, fillet(1.1, 1.0))).all()
+    assert np.isnan(reported(buckled, fillet(0.02, 1.0), travel=3e-3)).all()
+    assert np.isnan(reported(buckled, fillet(0.02, 1.0), travel=0.0)).all()
 
 
 def test_a_ratio_without_nominal_stress_is_an_empty_cell_and_does_not_count_for_the_largest():

@@ -188,8 +188,8 @@ def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(m
     def block(spec, asked):
         friction = asked.values["mechanism.profile.friction"]
         values = tuple({"": np.zeros(asked.size)} for _ in asked.measures)
-        told = {"high_pressure_angle": friction > 0.0015, "undercut": friction > 0.0005}
-        return BlockAnswer(friction < 0.0025, values, None, "force", told)
+        reported = {"high_pressure_angle": friction > 0.0015, "undercut": friction > 0.0005}
+        return BlockAnswer(friction < 0.0025, values, None, "force", reported)
 
     def single(spec, run):
         found = record.analyze(spec, run)

@@ -147,7 +147,7 @@ def test_what_misses_a_wish_says_which():
     narrow = replace(asked, room=(0.010, 0.060, 0.012))
     one = made(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
-    assert any("across the travel" in told for told in one.missed)
+    assert any("across the travel" in reported for reported in one.missed)
 
 
 PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
@@ -287,9 +287,9 @@ def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
     assert exit_code(found) == 0
 
 
-@pytest.mark.parametrize(("count", "told"), [(1, "1 mechanism meets the wish"), (2, "2 mechanisms meet the wish")])
-def test_one_proposal_is_told_of_in_the_singular(count, told):
-    assert message(SimpleNamespace(proposals=("one", "other")[:count], late=False)) == told
+@pytest.mark.parametrize(("count", "reported"), [(1, "1 mechanism meets the wish"), (2, "2 mechanisms meet the wish")])
+def test_one_proposal_is_told_of_in_the_singular(count, reported):
+    assert message(SimpleNamespace(proposals=("one", "other")[:count], late=False)) == reported
 
 
 def test_a_candidate_whose_time_is_up_is_not_made():

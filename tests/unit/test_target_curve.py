@@ -75,7 +75,7 @@ def test_a_smooth_curve_rounds_steps_and_does_not_overshoot():
 
 
 @pytest.mark.parametrize(
-    ("said", "told"),
+    ("said", "reported"),
     [
         ("{}", "give one of 'points', 'file' and 'stiffness'"),
         ("{points: [[0 mm, 1 N], [0 mm, 2 N]]}", "points must increase"),
@@ -92,15 +92,15 @@ def test_a_smooth_curve_rounds_steps_and_does_not_overshoot():
         ("{file: there-is-none.csv}", "there is no file"),
     ],
 )
-def test_what_is_no_curve_is_refused_in_a_line(said, told):
+def test_what_is_no_curve_is_refused_in_a_line(said, reported):
     with pytest.raises(SpecError) as caught:
         cam(said)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
     assert "target" in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("displacement [mm],force [N]\n0,1\n5,x\n", "curve.txt:3: "),
         ("displacement [mm],force [N]\n0,1\n5\n", "no force"),
@@ -112,13 +112,13 @@ def test_what_is_no_curve_is_refused_in_a_line(said, told):
     ],
     ids=["word", "gap", "no units", "one point", "backwards", "empty", "endless cell"],
 )
-def test_a_file_that_is_no_curve_is_refused_with_its_line(tmp_path, text, told):
+def test_a_file_that_is_no_curve_is_refused_with_its_line(tmp_path, text, reported):
     (tmp_path / "curve.txt").write_text(text)
     spec = tmp_path / "cam.yaml"
     spec.write_text(CAM.format(target="{file: curve.txt}", roller="2 mm", friction=0, mechanism="", design="", more=""))
     with pytest.raises(SpecError) as caught:
         cfmkit.load(spec)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 def test_a_file_says_the_same_as_its_points_and_the_design_no_longer_needs_it(tmp_path):
@@ -181,7 +181,7 @@ def test_a_profile_carries_weights_beside_its_curve(target):
 
 
 @pytest.mark.parametrize(
-    ("target", "more", "told"),
+    ("target", "more", "reported"),
     [
         ("{points: [[0 mm, 20 N], [120 mm, -5 N]]}", {}, "-5 N at 120 mm"),
         ("{points: [[0 mm, -1 N], [120 mm, 5 N]]}", {}, "-1 N at 0 mm"),
@@ -199,11 +199,11 @@ def test_a_profile_carries_weights_beside_its_curve(target):
         ("{points: [[0 mm, 60 N], [120 mm, 1 N]]}", {"mechanism": MASSES, "design": "gravity: true"}, "weight"),
     ],
 )
-def test_what_no_cam_gives_has_a_reason_and_no_design(target, more, told):
+def test_what_no_cam_gives_has_a_reason_and_no_design(target, more, reported):
     found = cfmkit.design(cam(target, **more))
     assert found.spec is None
     assert found.status.key == "infeasible"
-    assert told in found.message
+    assert reported in found.message
 
 
 def test_springs_that_are_tight_at_a_start_without_force_have_no_path():
@@ -295,7 +295,7 @@ def test_a_torque_follows_a_line_over_the_angle():
 
 
 @pytest.mark.parametrize(
-    ("design", "drive", "told"),
+    ("design", "drive", "reported"),
     [
         ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}", "force", "needs its window: give 'travel'"),
         ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}, travel: [5 mm, 30 mm]", "force", "beyond the points"),
@@ -304,10 +304,10 @@ def test_a_torque_follows_a_line_over_the_angle():
         ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}, travel: [5 mm, 8 mm]", "torque", "curve of force"),
     ],
 )
-def test_springs_refuse_what_is_no_curve_of_theirs(design, drive, told):
+def test_springs_refuse_what_is_no_curve_of_theirs(design, drive, reported):
     with pytest.raises(SpecError) as caught:
         cfmkit.loads(SPRINGS.format(design=design, drive=drive))
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 def test_a_v_beam_falls_in_a_line():
@@ -321,20 +321,20 @@ def test_a_v_beam_falls_in_a_line():
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ({"design.target": {"stiffness": "-5 N/mm", "start": "13.4 N"}}, "must be above 0"),
         ({"design.target": {"points": (("0 mm", "13 N"), ("3 mm", "11 N"))}}, "give it points there"),
     ],
 )
-def test_a_v_beam_that_cannot_follow_says_why(change, told):
+def test_a_v_beam_that_cannot_follow_says_why(change, reported):
     found = cfmkit.design(cfmkit.load("configs/vcfm_falling.yaml").replace(change))
     assert found.spec is None
-    assert told in found.message
+    assert reported in found.message
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ({"design.optimise.objective": "range"}, "objective: ripple"),
         ({"design.target.points": (("0 mm", "1 N"), ("9 mm", "2 N"))}, "beyond the points"),
@@ -342,7 +342,7 @@ def test_a_v_beam_that_cannot_follow_says_why(change, told):
         ({"design.optimise.force.target": "3 N"}, "remove 'optimise.force'"),
     ],
 )
-def test_a_network_refuses_a_curve_that_its_search_cannot_compare_with(change, told):
+def test_a_network_refuses_a_curve_that_its_search_cannot_compare_with(change, reported):
     spec = cfmkit.load("configs/beam_design_lan.yaml")
     with pytest.raises(SpecError) as caught:
         spec.replace(
@@ -352,7 +352,7 @@ def test_a_network_refuses_a_curve_that_its_search_cannot_compare_with(change, t
             }
             | change
         )
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
 STRIP = """

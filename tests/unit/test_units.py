@@ -208,11 +208,11 @@ def test_a_wrong_quantity_is_refused_with_what_to_write(text: str, dimension: st
 )
 def test_any_text_is_a_quantity_or_refused_in_one_line(text: str, dimension: str) -> None:
     try:
-        told = str(read_quantity(text, dimension))
+        reported = str(read_quantity(text, dimension))
     except QuantityError as error:
-        told = str(error)
-    assert told.isprintable()
-    assert told not in ("nan", "inf", "-inf")
+        reported = str(error)
+    assert reported.isprintable()
+    assert reported not in ("nan", "inf", "-inf")
 
 
 @settings(max_examples=300, deadline=None)

@@ -61,9 +61,9 @@ def test_bounds_are_told_with_units() -> None:
 def test_dumps_are_si_in_python_and_text_in_json() -> None:
     part = Part(width="12 mm", at="90 deg", limit="5 %")
     assert part.model_dump() == {"width": 0.012, "depth": 0.1, "slip": 0.02, "at": math.pi / 2, "limit": "5 %"}
-    told = {"width": "12 mm", "depth": "100 mm", "slip": 0.02, "at": "90 deg", "limit": "5 %"}
-    assert part.model_dump(mode="json") == told
-    assert Part.model_validate(told) == part
+    reported = {"width": "12 mm", "depth": "100 mm", "slip": 0.02, "at": "90 deg", "limit": "5 %"}
+    assert part.model_dump(mode="json") == reported
+    assert Part.model_validate(reported) == part
 
 
 def test_a_place_keeps_its_dimension_through_copies_pickles_and_dumps() -> None:

@@ -74,8 +74,8 @@ def test_slack_and_overstretched_springs_are_told(spec):
     assert "spring_slack" in {item.name for item in pulled.warnings}
     assert pulled.load_cases[0].motion[0] == 0.0  # the shuttle rests where it was made: slack springs do not pull
     over = cfmkit.analyze(spec.replace({"mechanism.springs.max_elongation": "6 mm"}))
-    (told,) = [item.message for item in over.warnings if item.name == "spring_overstretched"]
-    assert "deflected by 6.674 mm, their limit is 6 mm, reached at 4.08 mm of travel" in told
+    (reported,) = [item.message for item in over.warnings if item.name == "spring_overstretched"]
+    assert "deflected by 6.674 mm, their limit is 6 mm, reached at 4.08 mm of travel" in reported
 
 
 def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec):
@@ -89,8 +89,8 @@ def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec)
     assert room * 0.99 < pressed.load_cases[0].motion[-1] + 8e-3 <= room * (1 + 1e-9)
     closed = cfmkit.analyze(spec.replace({"analysis.preloads": (60e-3,)}))
     assert closed.status is Status.NO_EQUILIBRIUM
-    told = float(re.search(r"free_length'\s+of ([0-9.]+) mm", pressed.message)[1])
-    cured = pressed.spec.replace({"mechanism.springs.free_length": f"{told} mm"})
+    reported = float(re.search(r"free_length'\s+of ([0-9.]+) mm", pressed.message)[1])
+    cured = pressed.spec.replace({"mechanism.springs.free_length": f"{reported} mm"})
     assert cfmkit.analyze(cured).status is Status.COMPLETE
 
 
@@ -139,7 +139,7 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"mechanism.springs": None}, "needs 'positive', a spring of leaves, or 'springs' that are bought"),
         ({"mechanism.springs.initial_tension": "1 N"}, "compression springs have none"),
@@ -152,8 +152,8 @@ def test_where_none_fits_the_nearest_three_are_told(spec):
         ),
     ],
 )
-def test_what_contradicts_itself_is_refused(spec, changes, told):
-    with pytest.raises(SpecError, match=told):
+def test_what_contradicts_itself_is_refused(spec, changes, reported):
+    with pytest.raises(SpecError, match=reported):
         spec.replace(changes)
 
 
@@ -187,12 +187,12 @@ def test_leaves_that_relax_beside_springs_that_do_not_have_no_common_law(spec):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"points": [[1e3, "80 MPa"], [1e5, "35 MPa"]]}, "above 'ultimate_strength'"),
         ({"points": [[1e3, "40 MPa"], [1e5, "35 MPa"]], "cycles": 1e6}, "at which 'points' end"),
     ],
 )
-def test_what_fatigue_data_do_not_show_is_refused(spec, changes, told):
-    with pytest.raises(SpecError, match=told):
+def test_what_fatigue_data_do_not_show_is_refused(spec, changes, reported):
+    with pytest.raises(SpecError, match=reported):
         spec.replace({"mechanism.material.fatigue": {"ultimate_strength": "60 MPa"} | changes})

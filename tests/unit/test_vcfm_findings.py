@@ -56,8 +56,8 @@ def test_a_failure_mode_is_found_with_its_numbers(name):
 def test_leaves_too_thick_for_a_model_are_said_to_be(structure, thickness, model, words):
     """At 4 mm of 35 the closed forms are off by 4 % (V) and 6 % (cosine) up to the flat pose, by 10 % beyond."""
     found = analyzed(*leaf(structure=structure, thickness=thickness), f"analysis.fidelity={model}")
-    told = [one.message for one in found.warnings if one.name == "theory_range"]
-    assert [words in one for one in told] == ([True] if words else [])
+    reported = [one.message for one in found.warnings if one.name == "theory_range"]
+    assert [words in one for one in reported] == ([True] if words else [])
 
 
 @pytest.mark.parametrize("structure", ["v-beam", "cosine"])
@@ -80,22 +80,22 @@ def test_a_sound_mechanism_has_nothing_to_be_said_against_it():
 
 def test_a_stress_that_is_too_high_from_the_first_point_on_passes_no_limit_there():
     found = analyzed("mechanism.material.yield_strength=5 MPa", "analysis.preloads=[7.5 mm]")
-    (told,) = (one.message for one in found.warnings if one.name == "overstressed")
-    assert "is above 5 MPa from" in told
+    (reported,) = (one.message for one in found.warnings if one.name == "overstressed")
+    assert "is above 5 MPa from" in reported
     found = analyzed("mechanism.material.yield_strength=30 MPa", "analysis.preloads=[0 mm]", "analysis.travel=6 mm")
-    (told,) = (one.message for one in found.warnings if one.name == "overstressed")
-    assert "passes 30 MPa at" in told
+    (reported,) = (one.message for one in found.warnings if one.name == "overstressed")
+    assert "passes 30 MPa at" in reported
 
 
 def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):
     """The closed form overrates the stress of leaves by up to 0.75 % at 7 deg, and that of the spring by nothing."""
     spring = cfmkit.load(CONFIGS / "vcfm_pla_adjustable.yaml", ["mechanism.material.yield_strength=29.56 MPa"])
-    for spec, told in ((spring, True), (cfmkit.load(CONFIGS / "vcfm_pla.yaml"), False)):
+    for spec, reported in ((spring, True), (cfmkit.load(CONFIGS / "vcfm_pla.yaml"), False)):
         found = api.analyze(spec)
         assert 0.99 < found.metrics["travel_safety_factor"].value < 1
-        assert ("overstressed" in names(found)) is told
+        assert ("overstressed" in names(found)) is reported
         swept = api.sweep(spec, vary={"mechanism.bistable.width": spec.mechanism.bistable.width * np.ones(1)})
-        assert ("overstressed" in (swept.table["warnings"][0] or "")) is told
+        assert ("overstressed" in (swept.table["warnings"][0] or "")) is reported
     main(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
     assert "(this model overrates the stress by up to" in " ".join(capsys.readouterr().out.split())
 
@@ -130,10 +130,10 @@ def test_what_is_measured_of_hybrid_leaves_is_not_held_against_a_force_that_they
 def test_the_cure_of_a_force_that_is_not_flat_works(changes):
     """Either another width, or the part of the travel that is flat: tried before it is reported."""
     found = analyzed(*changes)
-    told = message(found, "not_flat")
+    reported = message(found, "not_flat")
     (flat,) = [one for one in found.warnings if one.name == "not_flat"]
     cures = list(flat.cures)
-    if wider := re.search(r"leaves ([\d.]+) times as wide", told):
+    if wider := re.search(r"leaves ([\d.]+) times as wide", reported):
         cures = [f"mechanism.bistable.width={6 * float(wider[1])} mm"]
     assert cures
     cured = analyzed(*changes, *cures)
@@ -142,9 +142,9 @@ def test_the_cure_of_a_force_that_is_not_flat_works(changes):
 
 
 def test_a_window_that_begins_before_the_leaves_buckle_is_told_the_flat_part():
-    told = message(analyzed(FLAT, "analysis.window=[0.3 mm, 4.6 mm]"), "not_flat")
-    assert "cancel, but not in the whole window" in told
-    assert "the leaves are buckled from 0.9097 mm to 4.771 mm only; the force is flat from" in told
+    reported = message(analyzed(FLAT, "analysis.window=[0.3 mm, 4.6 mm]"), "not_flat")
+    assert "cancel, but not in the whole window" in reported
+    assert "the leaves are buckled from 0.9097 mm to 4.771 mm only; the force is flat from" in reported
 
 
 @pytest.mark.parametrize("flexure", [5, 7, 10])
@@ -159,11 +159,11 @@ def test_hybrid_leaves_are_told_with_their_exact_force_and_stress(flexure, thick
     assert found.spec.analysis.fidelity == "exact"
     assert found.curve.force.tolist() == exact.curve.force.tolist()
     bodies = analyzed(*hybrid, "analysis.fidelity=analytic")
-    told = message(bodies, "theory_range")
+    reported = message(bodies, "theory_range")
     assert "theory_range" not in names(found)
     force, stress = (bodies.curve.extra[name].values for name in ("bistable_force", "bistable_stress"))
     true_force, true_stress = (found.curve.extra[name].values for name in ("bistable_force", "bistable_stress"))
-    if "bend and buckle" not in told:
+    if "bend and buckle" not in reported:
         assert force.max() == pytest.approx(true_force.max(), rel=0.1)
         assert 0.5 < stress.max() / true_stress.max() < 1
         assert thickness > 4.265 / 6
@@ -243,8 +243,8 @@ def test_a_spring_that_closes_ends_the_curve_there():
         assert found.status is Status.PARTIAL
         assert found.curves[0].motion[-1] == pytest.approx(6 * MM)
         assert room - 12 - 0.02 < found.curves[1].motion[-1] / MM <= room - 12
-        (told,) = [one for one in found.warnings if one.name == "spring_closed"]
-        assert analyzed(*told.cures, preloads="[0 mm, 12 mm]").status is Status.COMPLETE
+        (reported,) = [one for one in found.warnings if one.name == "spring_closed"]
+        assert analyzed(*reported.cures, preloads="[0 mm, 12 mm]").status is Status.COMPLETE
     closed = analyzed(preloads="[30 mm]")
     assert closed.status is Status.NO_EQUILIBRIUM
     assert "'analysis.preloads'" in closed.message
@@ -275,8 +275,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("change", REFUSED)
 def test_a_refused_design_names_the_key_that_blocks_it(change):
-    told = designed(change).message
-    assert all(key in told for key in REFUSED[change])
+    reported = designed(change).message
+    assert all(key in reported for key in REFUSED[change])
 
 
 def test_stress_is_that_of_the_worst_preload():
@@ -301,16 +301,16 @@ def test_a_usable_stroke_keeps_the_allowable_stress_at_every_preload():
 
 
 def test_travel_beyond_the_closed_forms_is_told():
-    told = message(analyzed("analysis.travel=7.2 mm"), "theory_range")
-    assert "beyond 1.6 times the rise (6.825 mm)" in told
+    reported = message(analyzed("analysis.travel=7.2 mm"), "theory_range")
+    assert "beyond 1.6 times the rise (6.825 mm)" in reported
     assert "theory_range" not in names(analyzed("analysis.travel=7.2 mm", "analysis.fidelity=exact"))
 
 
 def test_a_pull_beyond_the_rise_leaves_no_outward_force():
     found = analyzed(FLAT, preloads="[0 mm, -2 mm, -4.3 mm]")
-    told = message(found, "preload_out_of_range")
-    assert "a preload of -4.3 mm" in told
-    assert "vanishes at -4.265 mm" in told
+    reported = message(found, "preload_out_of_range")
+    assert "a preload of -4.3 mm" in reported
+    assert "vanishes at -4.265 mm" in reported
     assert "preload_out_of_range" not in names(analyzed(FLAT, preloads="[0 mm, -2 mm, -4.1 mm]"))
 
 
@@ -504,6 +504,6 @@ def test_a_preload_of_a_thousand_kilometres_is_refused_with_its_place(tmp_path, 
     changes = ["--set", "analysis.preloads=[0 mm, 1e9 mm]", "--fidelity", "exact"]
     assert main(["check", spec, "--set", "analysis.preloads=[0 mm, 3500 mm]"]) == 0
     assert main(["analyze", spec, *changes, "-o", str(tmp_path / "out"), "--no-plots"]) == 3
-    told = capsys.readouterr().err
-    assert "analysis.preloads" in told
-    assert "at most 3500 mm" in told
+    reported = capsys.readouterr().err
+    assert "analysis.preloads" in reported
+    assert "at most 3500 mm" in reported

@@ -118,14 +118,14 @@ def test_what_is_solved_is_a_part_of_what_is_drawn(leaf, positive):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ("mechanism.bistable.waviness=0.1 mm", "does not know it: leaves are as drawn"),
         ("analysis.branch=primary", "follows the stable branch only"),
     ],
 )
-def test_what_a_solid_does_not_know_is_refused(change, told):
-    with pytest.raises(SpecError, match=told):
+def test_what_a_solid_does_not_know_is_refused(change, reported):
+    with pytest.raises(SpecError, match=reported):
         spec("ding2022", "analysis.fidelity=solid", change)
 
 

@@ -24,9 +24,9 @@ def test_the_solid_of_a_verified_design_has_the_wanted_mean_force():
     mean = api.evaluate(design.spec, ["force_mean"])["force_mean"].value
     assert mean == pytest.approx(design.search["verified_target"].quantity.value, rel=1e-6)
     assert design.search["verified_target"].quantity.value == pytest.approx(11.15)
-    (told,) = (text for word, text in design.notes if word == "verify")
-    assert "mechanism.bistable.width" in told
-    assert "mechanism.positive.width" in told
+    (reported,) = (text for word, text in design.notes if word == "verify")
+    assert "mechanism.bistable.width" in reported
+    assert "mechanism.positive.width" in reported
 
 
 def test_widths_are_multiplied_by_what_the_force_misses(monkeypatch):
@@ -89,8 +89,8 @@ def test_under_a_load_the_widths_make_the_solid_as_stiff_as_the_beams_over_the_t
     found = verified(spec, Design(spec, Status.COMPLETE), Run())
     assert found.search["verified_width_factor"].quantity.value == pytest.approx(1 / 1.1, rel=1e-4)
     assert found.spec.at("mechanism.width") == pytest.approx(0.006 / 1.1, rel=1e-4)
-    (told,) = (text for word, text in found.notes if word == "verify")
-    assert "which both reach" in told
+    (reported,) = (text for word, text in found.notes if word == "verify")
+    assert "which both reach" in reported
 
 
 def test_a_design_under_a_load_may_end_with_its_solid(tmp_path):

@@ -16,7 +16,7 @@ def changed(path, *changes):
     return cfmkit.load(path, changes)
 
 
-def told(path, *changes):
+def reported(path, *changes):
     found = cfmkit.analyze(changed(path, *changes))
     return [one for one in found.warnings if one.name == "wide_beam"]
 
@@ -24,23 +24,23 @@ def told(path, *changes):
 def test_lans_part_is_too_soft_by_what_its_energy_says_and_the_cure_counts_it():
     """In the energy of the curve 3.6 % at 2 mm, 5.0 at 10, 5.4 at 13.5; its slope gives 3.8, 6.0, 6.7 of the force."""
     short = ("analysis.travel=13.5 mm", "analysis.points=28")
-    (one,) = told(LAN, *short)
+    (one,) = reported(LAN, *short)
     assert "about 5.43 % more energy at 13.5 mm" in one.message
     assert one.cures == ("mechanism.wide_beams=true",)
-    assert told(LAN, *short, "mechanism.wide_beams=true") == []
+    assert reported(LAN, *short, "mechanism.wide_beams=true") == []
     narrow, wide = (cfmkit.analyze(changed(LAN, *short, *more)).curve for more in ((), ("mechanism.wide_beams=true",)))
     assert wide.force[4] / narrow.force[4] - 1 == pytest.approx(0.0372, abs=2e-4)
     assert wide.force[20] / narrow.force[20] - 1 == pytest.approx(0.0602, abs=2e-4)
 
 
 def test_narrow_beams_are_not_told_of():
-    assert told(LAN, "mechanism.width=1 mm", "analysis.points=11") == []
-    assert told(DING) == []
+    assert reported(LAN, "mechanism.width=1 mm", "analysis.points=11") == []
+    assert reported(DING) == []
 
 
 def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
     wide = "mechanism.bistable.width=20 mm"
-    (one,) = told(DING, wide)
+    (one,) = reported(DING, wide)
     assert "4.74 % more energy in the leaves at 4.263 mm" in one.message
     assert "only 'analysis.fidelity: exact' accounts for it" in one.message
     with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
@@ -48,7 +48,7 @@ def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
 
 
 def test_a_wide_strip_is_told_of():
-    (one,) = told(STRIP, "mechanism.beam.width=30 mm", "analysis.points=15", "design=null")
+    (one,) = reported(STRIP, "mechanism.beam.width=30 mm", "analysis.points=15", "design=null")
     assert "more energy at" in one.message
 
 

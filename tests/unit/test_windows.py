@@ -74,9 +74,9 @@ def test_a_window_outside_the_travel_is_told_with_its_place_in_every_family(name
     if place != "analysis.window":
         changes["requirements"] = needed(FAMILIES[name][2], outside)
     result = cfmkit.analyze(spec_of(name).replace(changes))
-    (told,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
-    assert told.message.startswith(f"{place}: the window ")
-    assert "is not within the curve" in told.message
+    (reported,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
+    assert reported.message.startswith(f"{place}: the window ")
+    assert "is not within the curve" in reported.message
 
 
 def test_a_window_within_the_travel_needs_no_warning():
@@ -89,9 +89,12 @@ def test_shares_are_of_the_travel_requested_where_a_curve_ends_early():
     changes = {"analysis.travel": "300 mm", "analysis.window": shares, "requirements": needed("force_mean", shares)}
     result = cfmkit.analyze(spec_of("cam").replace(changes))
     assert result.status.key == "partial"
-    (told,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
-    assert "analysis.window and requirements.0.over: the window 150 ... 300 mm" in told.message
-    assert "ends before the requested travel does (0 ... 300 mm): metrics are those over 150 ... 240 mm" in told.message
+    (reported,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
+    assert "analysis.window and requirements.0.over: the window 150 ... 300 mm" in reported.message
+    assert (
+        "ends before the requested travel does (0 ... 300 mm): metrics are those over 150 ... 240 mm"
+        in reported.message
+    )
     (outcome,) = cfmkit.check(result)
     assert not outcome.ok
 

@@ -100,7 +100,7 @@ def test_every_expected_message_has_its_file() -> None:
 
 
 def test_messages_hold_no_jargon() -> None:
-    told = "\n".join(line for lines in EXPECTED.values() for line in lines)
+    reported = "\n".join(line for lines in EXPECTED.values() for line in lines)
     jargon = (
         "pydantic",
         "http",
@@ -113,7 +113,7 @@ def test_messages_hold_no_jargon() -> None:
         "token",
         "BaseModel",
     )
-    assert not [word for word in jargon if word in told]
+    assert not [word for word in jargon if word in reported]
 
 
 def test_the_good_file_is_read() -> None:
@@ -358,7 +358,7 @@ def test_reading_common_units_needs_no(heavy: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flow", "told"),
+    ("flow", "reported"),
     [
         ("{pivot: 28,303 N*mm/rad, other: 1 mm}", "'28,303 N*mm/rad' has a decimal comma; write 28.303 N*mm/rad"),
         ("{pivot: -0,69 N/mm}", "'-0,69 N/mm' has a decimal comma; write -0.69 N/mm"),
@@ -366,15 +366,15 @@ def test_reading_common_units_needs_no(heavy: str) -> None:
         ("{pivot: 1,234,567 N}", "'1,234' has a decimal comma; write 1.234"),
     ],
 )
-def test_a_decimal_comma_in_a_flow_block_is_called_one(flow, told):
+def test_a_decimal_comma_in_a_flow_block_is_called_one(flow, reported):
     found = read_document(f"cfmkit: 1\nsprings: {flow}\n", "a.yaml").problems
     assert [(problem.line, problem.column, problem.path, problem.message) for problem in found] == [
-        (2, 18, "springs.pivot", told)
+        (2, 18, "springs.pivot", reported)
     ]
 
 
 @pytest.mark.parametrize(
-    ("flow", "column", "path", "told"),
+    ("flow", "column", "path", "reported"),
     [
         ("[2,5 mm, 4 mm]", 10, "window.0", "'2,5 mm' has a decimal comma; write 2.5 mm"),
         ("[2 mm, 4,5 mm]", 16, "window.1", "'4,5 mm' has a decimal comma; write 4.5 mm"),
@@ -382,10 +382,10 @@ def test_a_decimal_comma_in_a_flow_block_is_called_one(flow, told):
         ("[0,5 mm, 4 mm]", 10, "window", "'0,5 mm' has a decimal comma; write 0.5 mm"),
     ],
 )
-def test_a_decimal_comma_in_a_flow_list_is_called_one_at_its_place(flow, column, path, told):
+def test_a_decimal_comma_in_a_flow_list_is_called_one_at_its_place(flow, column, path, reported):
     found = read_document(f"cfmkit: 1\nwindow: {flow}\n", "a.yaml").problems
     assert [(problem.line, problem.column, problem.path, problem.message) for problem in found] == [
-        (2, column, path, told)
+        (2, column, path, reported)
     ]
 
 

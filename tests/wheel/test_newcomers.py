@@ -48,8 +48,8 @@ def cfmkit(run):
 def test_a_designer_with_a_laser_gets_parts_and_a_page_to_send(cfmkit, tmp_path):
     assert "cam" in cfmkit("examples").stdout
     cfmkit("examples", "cam")
-    told = cfmkit("design", "cam.yaml", "--set", "design.force=40 N", "--report", "--figures", "png,svg")
-    assert "force" in told.stdout
+    reported = cfmkit("design", "cam.yaml", "--set", "design.force=40 N", "--report", "--figures", "png,svg")
+    assert "force" in reported.stdout
     out = tmp_path / "cfm-out" / "cam-design"
     assert {"cam.dxf", "cam.svg"} <= {path.name for path in (out / "geometry").iterdir()}
     assert (out / "design.yaml").is_file()

@@ -202,8 +202,8 @@ def _page(found: BatchResult, written: Written, more: Sequence[str], everything:
     yield BLANK
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
-            told = requirement["sentence"].removesuffix(": missed")
-            yield Paragraph("missed", f"{visible(one.spec)}: {told}", BAD)
+            reported = requirement["sentence"].removesuffix(": missed")
+            yield Paragraph("missed", f"{visible(one.spec)}: {reported}", BAD)
         for item in one.warnings if everything else ():
             yield Paragraph("warning", f"{visible(one.spec)}: {item['name']}: {item['message']}", BAD)
     if found.compared is not None:
@@ -216,8 +216,10 @@ def _page(found: BatchResult, written: Written, more: Sequence[str], everything:
 def _changes(compared: BatchComparison, everything: bool) -> Iterator[Block]:
     """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
     beyond = compared.beyond
-    told = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
-    yield Paragraph("compared", told, BAD if beyond else GOOD)
+    reported = (
+        f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
+    )
+    yield Paragraph("compared", reported, BAD if beyond else GOOD)
     shown = compared.changes if everything else beyond[:MOST_CHANGES]
     for one in shown:
         yield Paragraph("changed", f"{visible(one.spec)}: {one.sentence}", BAD if one.beyond else FAINT)
@@ -244,6 +246,6 @@ def _detail(one: Entry) -> str:
         return f"{len(one.missed)} of {len(one.requirements)} requirements"
     if one.code:
         return one.message
-    told = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
+    reported = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
     count = len(one.warnings)
-    return told + (f", {count} warning{'s' * (count != 1)}" if count else "")
+    return reported + (f", {count} warning{'s' * (count != 1)}" if count else "")

@@ -167,8 +167,8 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True)))
     state = Field("state", lambda one: one["reason"] or one["state"], wraps=True)
     yield from listed("families", found["families"], (field("name"), field("package"), field("version"), state))
-    told = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
-    yield Verbatim("\n".join(["", *told, ""]))
+    reported = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
+    yield Verbatim("\n".join(["", *reported, ""]))
 
 
 def _version(package: Mapping[str, Any]) -> str:

@@ -95,12 +95,12 @@ def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
         found = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)
     records = [_record(one.name, entry) for one, entry in zip(chosen, found.entries, strict=True)]
     wrong = [one for one in records if one["exit_code"] != 0]
-    told = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
+    reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
         *listed("examples", records, (field("name"), field("status"), field("message", wraps=True))),
-        Paragraph("verdict", told, BAD if wrong else GOOD),
+        Paragraph("verdict", reported, BAD if wrong else GOOD),
     )
-    return Answer({"message": told, "examples": records}, page, found.exit_code)
+    return Answer({"message": reported, "examples": records}, page, found.exit_code)
 
 
 def _record(name: str, entry: Entry) -> dict[str, Any]:

@@ -48,8 +48,8 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     try:
         server = ExplorerServer(explorer, options.port)
     except OSError as error:
-        told = (error.strerror or str(error)).lower()
-        raise UsageError(f"--port: {options.port} cannot be listened on: {told}") from None
+        reported = (error.strerror or str(error)).lower()
+        raise UsageError(f"--port: {options.port} cannot be listened on: {reported}") from None
     with server:
         if options.json:  # the one document comes at the end
             terminal.complain([f"explore  {server.address}"])

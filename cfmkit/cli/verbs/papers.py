@@ -61,14 +61,14 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
             progress.done(1, 0, False)
     counts = {verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict) for verdict in VERDICTS}
     wrong = [one for one in records if one["trouble"]]
-    told = f"{sum(counts.values())} printed numbers; " + (
+    reported = f"{sum(counts.values())} printed numbers; " + (
         f"{len(wrong)} verdicts do not hold" if wrong else "every verdict that was computed holds"
     )
-    data = {"message": told, "papers": records, "counts": counts}
+    data = {"message": reported, "papers": records, "counts": counts}
     errors = tuple({"message": f"{one['paper']}, {one['place']}, {one['what']}: {one['trouble']}"} for one in wrong)
     return Answer(
         data,
-        _page(records, counts, told, bool(terminal.verbose)),
+        _page(records, counts, reported, bool(terminal.verbose)),
         ExitCode.REQUIREMENT_MISSED if wrong else ExitCode.OK,
         complaints=tuple(f"error    {one['message']}" for one in errors),
         errors=errors,
@@ -79,7 +79,7 @@ def _outcome(done: Any) -> dict[str, Any]:
     return {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
 
 
-def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbose: bool) -> Iterator[Block]:
+def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, verbose: bool) -> Iterator[Block]:
     from cfmkit.cli.show_topics import references
 
     titles = {one["name"]: one["reference"] for one in references()}
@@ -88,7 +88,7 @@ def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbo
         mine = [one for one in records if one["paper"] == paper]
         yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)
     yield BLANK
-    yield Paragraph("verdict", told, BAD if "do not hold" in told else GOOD)
+    yield Paragraph("verdict", reported, BAD if "do not hold" in reported else GOOD)
     named = [{"count": str(n), "verdict": verdict, "meaning": VERDICTS[verdict]} for verdict, n in counts.items()]
     yield from listed("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_block_types import JsonText
-from cfmkit.cli.verb_result import Answer, told_of
+from cfmkit.cli.verb_result import Answer, reported_for
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
@@ -33,7 +33,7 @@ def run(options: SchemaOptions, terminal: Terminal) -> Answer:
 
     if options.family is not None:
         return _answer(schema([families.family(options.family)]))
-    return told_of(families.skipped(), _answer(schema(families.records())))
+    return reported_for(families.skipped(), _answer(schema(families.records())))
 
 
 def _answer(found: dict[str, Any]) -> Answer:

@@ -234,8 +234,8 @@ def spread(option: str) -> tuple[str, Any]:
     path, equals, text = (part.strip() for part in option.partition("="))
     first, colon, second = (part.strip() for part in text.partition(":"))
     if not (path and equals and colon and first and second) or ":" in second:
-        told = "write PATH=low:high, PATH=normal:DEVIATION or PATH=uniform:HALF-WIDTH, with units"
-        raise UsageError(f"--vary {option!r}: {told}")
+        reported = "write PATH=low:high, PATH=normal:DEVIATION or PATH=uniform:HALF-WIDTH, with units"
+        raise UsageError(f"--vary {option!r}: {reported}")
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
 
 

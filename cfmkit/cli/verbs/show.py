@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.cli.page_block_types import BLANK, GOOD, Paragraph, field, listed
-from cfmkit.cli.verb_result import Answer, told_of
+from cfmkit.cli.verb_result import Answer, reported_for
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def run(options: ShowOptions, terminal: Terminal) -> Answer:
     except UsageError:
         _refer_to_help(options.topic)
         raise
-    return told_of(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
+    return reported_for(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
 
 
 def _refer_to_help(name: str | None) -> None:

@@ -126,11 +126,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
         made = run_study_in_folder.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = run_study_in_folder.commit(place, made, terminal, code)
         run_study_in_folder.finish(place, [records])
-        told = summary.as_json(records)
+        reported = summary.as_json(records)
     written = Written(out, (*manifest.files, "manifest.json"), run_study_in_folder.now() - start)
     about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
-    page = _page(records, told, code, written, terminal.verbose > 0)
-    return Answer(told | about, page, code, tuple(_complaints(records, code, options, document)))
+    page = _page(records, reported, code, written, terminal.verbose > 0)
+    return Answer(reported | about, page, code, tuple(_complaints(records, code, options, document)))
 
 
 def request(options: SweepOptions) -> SweepRequest:
@@ -197,10 +197,10 @@ def _refusal(records: Records, document: Document) -> tuple[str, ...]:
     study = records.work.study
     try:
         with placing(document):
-            told = study.solve(study.variant(records.work.plan.point(0))).message
+            reported = study.solve(study.variant(records.work.plan.point(0))).message
     except CfmError as error:
         return lines_of(error)
-    return (f"error    {told}",)
+    return (f"error    {reported}",)
 
 
 def _page(

@@ -101,7 +101,7 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
-    return Design(changed, Status.COMPLETE, _told(spec, changed), warnings=(*found, *_stress(changed)))
+    return Design(changed, Status.COMPLETE, _reported(spec, changed), warnings=(*found, *_stress(changed)))
 
 
 def _force(spec: BeamSpec) -> float | None:
@@ -262,11 +262,11 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
     reached = _force(changed)
     if reached is not None and abs(reached / predicted - 1) <= CLOSE:
         return []
-    told = (
+    reported = (
         "" if reached is None else f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
     )
     corrected = "; corrected" if wanted.force is not None else ""
-    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{told}{corrected}")]
+    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{reported}{corrected}")]
 
 
 def _force_ratio(old: Mechanism, new: Mechanism) -> float:
@@ -294,7 +294,7 @@ def _stress(spec: BeamSpec) -> list[Finding]:
     ]
 
 
-def _told(old: BeamSpec, new: BeamSpec) -> str:
+def _reported(old: BeamSpec, new: BeamSpec) -> str:
     """Return what was changed, in one sentence."""
     changes = []
     pairs = {

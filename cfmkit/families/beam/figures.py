@@ -155,8 +155,8 @@ def _colors(count: int) -> list[str]:
 def _key(solution: Solution, poses: list[int]) -> list[tuple[str, str]]:
     """Return what the motion is in each pose, and its colour."""
     kind = "angle" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
-    told = (value_text(float(solution.motion[pose]), kind) for pose in poses)
-    return list(zip(told, _colors(len(poses)), strict=True))
+    reported = (value_text(float(solution.motion[pose]), kind) for pose in poses)
+    return list(zip(reported, _colors(len(poses)), strict=True))
 
 
 def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> Label:

@@ -230,12 +230,12 @@ def _closure(solution: Solution) -> Iterator[Finding]:
             "mechanism.closure=rotscale",
         )
         return
-    told = ", ".join(
+    reported = ", ".join(
         f"{name} {format_short(float(np.real(one.rotation)), 'angle')} and x {float(np.real(one.scale)):.5f} "
         f"(it missed by {format_short(one.gap, 'length')})"
         for name, one in fits.items()
     )
-    yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {told}")
+    yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {reported}")
 
 
 def _moved(solution: Solution) -> list[str]:
@@ -315,11 +315,11 @@ def _accuracy(solution: Solution) -> Iterator[Finding]:
 
 
 def _imperfection(solution: Solution) -> Iterator[Finding]:
-    told = in_units(solution.assembly, solution.path.imperfection)
-    if told.startswith("none: "):
-        yield finding("imperfection", f"the beams were not bent: {told.removeprefix('none: ')}")
-    elif told:
-        yield finding("imperfection", f"the beams were bent by {told}")
+    reported = in_units(solution.assembly, solution.path.imperfection)
+    if reported.startswith("none: "):
+        yield finding("imperfection", f"the beams were not bent: {reported.removeprefix('none: ')}")
+    elif reported:
+        yield finding("imperfection", f"the beams were bent by {reported}")
 
 
 def _stress(solution: Solution) -> Iterator[Finding]:
@@ -359,8 +359,8 @@ def _width(solution: Solution) -> Iterator[Finding]:
     share, beam = found.share[solution.keep], found.beam[solution.keep]
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)
-    if told := too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"):
-        yield finding("wide_beam", told, "mechanism.wide_beams=true")
+    if reported := too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"):
+        yield finding("wide_beam", reported, "mechanism.wide_beams=true")
 
 
 def _gaps(solution: Solution) -> Iterator[Finding]:

@@ -259,5 +259,5 @@ def _frequencies(solution: Solution) -> dict[str, Column]:
 def _branches(solution: Solution) -> Any:
     """Return the name of the branch at every point, with units."""
     names = solution.path.branch[solution.keep]
-    told = {name: in_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
-    return read_only(np.array([told[name] for name in names.tolist()]), np.str_)
+    reported = {name: in_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
+    return read_only(np.array([reported[name] for name in names.tolist()]), np.str_)

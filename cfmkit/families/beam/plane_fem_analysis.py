@@ -362,8 +362,8 @@ def _ended(solution: SolidSolution) -> str:
     where = format_short(solution.end if solution.reached else float(course.travel[-1]), "angle" if turns else "length")
     if solution.reached is not None and solution.reached.how is LoadEnd.MAXIMUM:
         largest = format_short(solution.copies * solution.reached.effort, "torque" if turns else "force")
-        told = f"the part snaps at {largest}, at {where}: the load cannot grow further"
-        return f"{told}; follow the curve beyond its maximum (analysis.through_folds)"
+        reported = f"the part snaps at {largest}, at {where}: the load cannot grow further"
+        return f"{reported}; follow the curve beyond its maximum (analysis.through_folds)"
     if course.ended:
         return f"{course.ended}, at {where}"
     if solution.reached is not None and solution.reached.how is LoadEnd.SHORT:
@@ -431,8 +431,8 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
-    if told := _ended(solution):
-        yield finding("ends_early" if course.touching is None else "self_contact", told)
+    if reported := _ended(solution):
+        yield finding("ends_early" if course.touching is None else "self_contact", reported)
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
@@ -440,11 +440,11 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding(
             "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
         )
-    for name, told in solution.error.too_large():
-        yield finding(name, told)
+    for name, reported in solution.error.too_large():
+        yield finding(name, reported)
     thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())
-    if told := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson):
-        yield finding("wide_beam", told)
+    if reported := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson):
+        yield finding("wide_beam", reported)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
         largest, spot = solution.worst

@@ -63,8 +63,8 @@ class FormulaProfile(Model):
         bad = ~(np.abs(heights) <= LARGEST * 1e3)
         if bad.any():
             place = x[int(bad.argmax())]
-            told = f"has no height at x = {place:.6g} mm: a finite number of mm is needed everywhere on the surface"
-            refuse("FormulaProfile", {("height",): told})
+            reported = f"has no height at x = {place:.6g} mm: a finite number of mm is needed everywhere on the surface"
+            refuse("FormulaProfile", {("height",): reported})
         return self
 
 
@@ -114,8 +114,8 @@ class Rescale(Model):
         if self.width is not None and abs(self.width / sheet - 1.0) > 1e-9:
             return {("design", "rescale", "width"): f"the sheet is {said} ('mechanism.part.sheet'): make them equal"}
         if self.force is not None and self.thickness is not None and self.free == "width":
-            told = f"the sheet ({said}) keeps the width, so the thickness follows from the force: leave it out"
-            return {("design", "rescale", "thickness"): f"{told}, or 'free: size'"}
+            reported = f"the sheet ({said}) keeps the width, so the thickness follows from the force: leave it out"
+            return {("design", "rescale", "thickness"): f"{reported}, or 'free: size'"}
         return {}
 
 

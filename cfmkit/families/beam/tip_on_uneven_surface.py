@@ -362,11 +362,11 @@ def _findings(tip: Tip, found: Ride, allowable: float | None) -> Iterator[Findin
     if not len(found.place):
         return
     places = tip.course.places(float(found.place[-1]))
-    for way, told in ((1, "along x"), (-1, "back")):
+    for way, reported in ((1, "along x"), (-1, "back")):
         jammed = ~np.isfinite(tip.contact(places, way))
         if jammed.any():
             place = format_short(float(places[int(jammed.argmax())]), "length")
-            yield finding("tip_jams", f"on the way {told} the slope at {place} is too steep for the friction")
+            yield finding("tip_jams", f"on the way {reported} the slope at {place} is too steep for the friction")
 
 
 def curve_of(found: Ride) -> Curve:

@@ -26,8 +26,8 @@ def _parts(spec: CamSpec) -> Iterator[BoughtPart]:
     count = len(rates) if len(rates) > 1 else springs.count or 1
     limit = f", up to {mm(springs.max_elongation)}" if springs.max_elongation else ""
     tight = f", stretched by {mm(mechanism.preload)} at the start" if mechanism.preload else ""
-    told = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
-    yield BoughtPart("between the rollers", springs.name or "", count, f"extension spring, {told}{limit}{tight}")
+    reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    yield BoughtPart("between the rollers", springs.name or "", count, f"extension spring, {reported}{limit}{tight}")
     if bearings := mechanism.bearings:
         rated = f", C {newton(bearings.dynamic_rating)}" if bearings.dynamic_rating else ""
         rated += f", C0 {newton(bearings.static_rating)}" if bearings.static_rating else ""

@@ -36,13 +36,13 @@ def room(result: Result) -> Room | None:
     high = max(*pins, float(path[:, 1].max()) + radius, float(plate[:, 3].max()))
     thick = PLATE if mechanism.contact is None else mechanism.contact.width
     depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
-    told = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, " + (
+    reported = f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, " + (
         f"springs {mechanism.springs.name or 'as wound'}" if mechanism.springs.wound else "springs wound of steel wire"
     )
     if depth is None:
-        told = "no steel spring fits between the rollers"
+        reported = "no steel spring fits between the rollers"
     # plate, two rollers, two braces, slider
-    return Room(2.0 * half, high - low, depth, 6 + count_of(mechanism.springs), told, (-half, low))
+    return Room(2.0 * half, high - low, depth, 6 + count_of(mechanism.springs), reported, (-half, low))
 
 
 BRACE = 0.010

@@ -80,12 +80,12 @@ def smallest(solution: Solution) -> dict[str, Quantity]:
 
 def touching(solution: Solution) -> Iterator[Finding]:
     """Yield which parts come nearer than wanted, the worst first."""
-    envelope, told = solution.assembly.spec.mechanism.envelope, set()
+    envelope, reported = solution.assembly.spec.mechanism.envelope, set()
     for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
         least = int(np.argmin(gap))
-        if envelope is None or pair in told or gap[least] >= (0.0 if pair == BESIDE else envelope.gap) - ROUNDING:
+        if envelope is None or pair in reported or gap[least] >= (0.0 if pair == BESIDE else envelope.gap) - ROUNDING:
             continue
-        told.add(pair)
+        reported.add(pair)
         by = f"overlap by {mm(-float(gap[least]))}" if gap[least] < 0 else f"come within {mm(float(gap[least]))}"
         yield finding(
             "parts_touch",

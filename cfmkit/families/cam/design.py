@@ -114,8 +114,8 @@ def _with_choice(spec: CamSpec, target: CamDesign, factor: float, choice: Choice
     _check_stroke(law, target, choice.springs)
     _check_bend(spec, law, target)
     written = _written(spec, target, choice, factor)
-    told = (*_overwritten(spec, written), *_plate_lacks(written))
-    return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=told)
+    reported = (*_overwritten(spec, written), *_plate_lacks(written))
+    return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=reported)
 
 
 def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
@@ -282,8 +282,8 @@ def _from_catalogue(
     if not rejected:
         none = "the catalogue has no extension spring, which is what pulls the rollers together"
         raise Infeasible(finding("no_spring_fits", f"{none} ('design.catalogue')"))
-    told = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
-    raise Infeasible(finding("no_spring_fits", f"{told}, or change {_in_the_way(told)}"))
+    reported = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
+    raise Infeasible(finding("no_spring_fits", f"{reported}, or change {_in_the_way(reported)}"))
 
 
 def _with_spring(
@@ -363,9 +363,9 @@ _LIMITS = {
 """Which key blocks a spring of the catalogue that is refused for a reason."""
 
 
-def _in_the_way(told: str) -> str:
+def _in_the_way(reported: str) -> str:
     """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
-    keys = [key for word, key in _LIMITS.items() if f": {word}" in told]
+    keys = [key for word, key in _LIMITS.items() if f": {word}" in reported]
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
 
 

@@ -280,8 +280,8 @@ def _pressure(solution: Solution) -> Iterator[Finding]:
     if solution.assembly.spec.mechanism.contact is None:
         return
     top, travel = largest_pressure(FlankSamples.of(solution))
-    if told := overstressed(solution.assembly.spec.mechanism, top, f"at {mm(travel)} of travel"):
-        yield told
+    if reported := overstressed(solution.assembly.spec.mechanism, top, f"at {mm(travel)} of travel"):
+        yield reported
 
 
 def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:
@@ -320,8 +320,8 @@ def _built_mechanics(built: Built) -> Iterator[Finding]:
     pressed = pressure_of(built, 1.0)
     if (top := worst(pressed)) is not None:
         place = f"at {mm(float(built.travel[top]))} of travel"
-        if told := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
-            yield told
+        if reported := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
+            yield reported
     held = ~np.isfinite(built.forces(1.0)[0])
     if held.any():
         friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]

@@ -260,8 +260,8 @@ class Mechanism(Model):
     def _only_hanging_weights_help(self) -> Self:
         hangs = self.mounting is not None and self.mounting.elevation < 0
         if self.profile.slope_factor < 1 and not hangs:
-            told = "must be >= 1: only weights that hang down ('mounting') help the springs"
-            refuse("Mechanism", {("profile", "slope_factor"): told})
+            reported = "must be >= 1: only weights that hang down ('mounting') help the springs"
+            refuse("Mechanism", {("profile", "slope_factor"): reported})
         return self
 
     @model_validator(mode="after")
@@ -274,22 +274,24 @@ class Mechanism(Model):
             sides.append((own.rest_half_width, own.roller_radius, left.roller_radius or self.roller_radius))
         room = 2.0 * min((x0 or self.rest_half_width) - max(cut or 0.0, built) for x0, cut, built in sides)
         if self.plate.base_width > room > 0:
-            told = (
+            reported = (
                 f"a tab of {format_short(self.plate.base_width, 'length')} cuts into the rollers: they leave "
                 f"{format_short(room, 'length')} between them at the start"
             )
-            refuse("Mechanism", {("plate", "base_width"): told})
+            refuse("Mechanism", {("plate", "base_width"): reported})
         return self
 
     @model_validator(mode="after")
     def _rest_length_leaves_no_slack(self) -> Self:
         longest = 2.0 * self.rest_half_width
         if (length := self.springs.rest_length) is not None and length > longest * (1 + 1e-12):
-            told = f"{format_short(length, 'length')} is longer than the {format_short(longest, 'length')} at the start"
-            refuse("Mechanism", {("springs", "rest_length"): f"{told}: the springs would be slack there"})
+            reported = (
+                f"{format_short(length, 'length')} is longer than the {format_short(longest, 'length')} at the start"
+            )
+            refuse("Mechanism", {("springs", "rest_length"): f"{reported}: the springs would be slack there"})
         if (preload := self.springs.preload) is not None and preload >= longest:
-            told = f"must be below {format_short(longest, 'length')}, the distance of the roller axes at the start"
-            refuse("Mechanism", {("springs", "preload"): told})
+            reported = f"must be below {format_short(longest, 'length')}, the distance of the roller axes at the start"
+            refuse("Mechanism", {("springs", "preload"): reported})
         return self
 
     @property

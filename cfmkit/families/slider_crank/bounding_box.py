@@ -93,8 +93,8 @@ def _linkage(result: Result) -> Room:
     along, across = high - low
     count = int(np.count_nonzero(solution.assembly.rates))
     depth, why = _depth(spec, solution.assembly.rates)
-    told = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}{why}"
-    return Room(float(across), float(along), depth, 3 + count, told, (float(low[0]), float(low[1])), True)
+    reported = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}{why}"
+    return Room(float(across), float(along), depth, 3 + count, reported, (float(low[0]), float(low[1])), True)
 
 
 def _depth(spec: SliderCrankSpec, rates: np.ndarray) -> tuple[float | None, str]:

@@ -150,8 +150,8 @@ def _too_weak(wish: Wish, most: float) -> str:
     """Return what is wrong where no springs hold the torque."""
     if not most > 0.0:
         return f"springs drive no crank one way over {deg(wish.travel)}: it would pass where it is stretched or folded"
-    told = format_short(most, "torque", 2)
-    return f"springs of steel wire that fit at the pins hold at most {told} over this angle"
+    reported = format_short(most, "torque", 2)
+    return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
 
 
 def _overfilled(wish: Wish) -> str | None:

@@ -70,14 +70,14 @@ def _coil(name: str, turn: tuple[float, float], deep: float, rest: float) -> Wou
 
 def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
     dimension, way = ("stiffness", "length") if name == "slider" else ("rotational_stiffness", "angle")
-    told = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
+    reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
-    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {told}{wide}"
+    return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
 
 
 def _wound_to_measure(name: str, coil: Wound) -> dict[str, Any]:
-    told = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
-    return {"at": name, "name": told, "wound": {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}}
+    reported = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
+    return {"at": name, "name": reported, "wound": {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}}
 
 
 def depth_of_springs(wish: Wish, sheet: float) -> float:

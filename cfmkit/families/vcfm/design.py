@@ -96,8 +96,8 @@ def _attempt(spec: VcfmSpec) -> Design:
         message = "a design needs an allowable stress: add 'mechanism.material.yield_strength'"
         return Design(None, Status.INVALID, message)
     if target.level <= 0:
-        told = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"
-        return no_design(finding("target_curve", f"{told}: it must be above 0 there ('design.target')"))
+        reported = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"
+        return no_design(finding("target_curve", f"{reported}: it must be above 0 there ('design.target')"))
     sizes = closed_form(spec, target)
     active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
     if target.refine:

@@ -229,8 +229,8 @@ def stress_map(result: Result) -> Figure:
     views = []
     for name, solved, share, own in solids:
         pose = int(solved.peaks[0].argmax())
-        told = f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"
-        views.append(StressView(solved, pose, told, own))
+        reported = f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"
+        views.append(StressView(solved, pose, reported, own))
     return stress_map_figure(result, views, "stress of leaf and spring as drawn")
 
 
@@ -273,8 +273,8 @@ def _poses(solution: Solution) -> list[tuple[str, float, float]]:
     nominal, most = solution.nominal, max(solution.pushes, key=lambda push: abs(push.preload))
     low, high = solution.window
     middle = 0.5 * (low + high)
-    told, pushed = value_text(middle, "length"), value_text(most.preload, "length")
-    first = [("as made", 0.0, 0.0), (f"pushed by {told}", middle, nominal.preload)]
+    reported, pushed = value_text(middle, "length"), value_text(most.preload, "length")
+    first = [("as made", 0.0, 0.0), (f"pushed by {reported}", middle, nominal.preload)]
     if most.preload == nominal.preload:
         end = float(nominal.travel[-1])
         flat = solution.parts.balance
@@ -284,7 +284,7 @@ def _poses(solution: Solution) -> list[tuple[str, float, float]]:
     return [
         *first,
         (f"at rest with a preload of {pushed}", rest_at, most.preload),
-        (f"pushed by {told}, preload {pushed}", middle, most.preload),
+        (f"pushed by {reported}, preload {pushed}", middle, most.preload),
     ]
 
 

@@ -107,20 +107,20 @@ def _leaf_shape(solution: Solution) -> Iterator[Finding]:
         return
     q = float(solution.parts.strip.slenderness)
     negative, straight = q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
-    told = f"rise over thickness is {q:.4g}"
+    reported = f"rise over thickness is {q:.4g}"
     if kind == "cosine":  # whose limits depend on the angle: as the curve has it
         negative, straight = one.negative_stiffness > 0, bool(np.isfinite(one.linear[0]))
     limits = {"v-beam": (f", below {NEGATIVE_ABOVE}", ", not above pi"), "cosine": ("", "")}[kind]
     if not negative:
         yield finding(
             "no_negative_stiffness",
-            f"{told}{limits[0]}: the force of the leaves only rises and cannot cancel that of the spring; "
+            f"{reported}{limits[0]}: the force of the leaves only rises and cannot cancel that of the spring; "
             "use thinner or steeper leaves",
         )
     elif not straight:
         yield finding(
             "no_linear_region",
-            f"{told}{limits[1]}: the leaves do not buckle and their force curve is rounded; the constant-force "
+            f"{reported}{limits[1]}: the leaves do not buckle and their force curve is rounded; the constant-force "
             "window is only its maximum. Use thinner or steeper leaves",
         )
 
@@ -135,8 +135,8 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
         return
     one = solution.character
     alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
-    told = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
-    cause = f"{told} cancel, but not in the whole window" if alike else f"{told} do not cancel"
+    reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
     low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
     words, cures = _flattening(solution, ripple)
     yield finding(
@@ -238,10 +238,10 @@ def _returns(solution: Solution) -> Iterator[Finding]:
     inside = solution.inside(push, (low, high))
     beyond = push.rest is None or push.rest > low
     if beyond or (len(inside) and inside.min() <= 0):
-        told = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
+        reported = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
         yield finding(
             "force_reversal",
-            f"within {mm(low)} ... {mm(high)} the force falls to {told}: no outward force remains; a preload "
+            f"within {mm(low)} ... {mm(high)} the force falls to {reported}: no outward force remains; a preload "
             f"above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
         )
     yield from _overload(solution, push)
@@ -289,8 +289,8 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
 
 
 def _bought_springs(solution: Solution) -> Iterator[Finding]:
-    for name, told in spring_faults(solution):
-        yield finding(name, told)
+    for name, reported in spring_faults(solution):
+        yield finding(name, reported)
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:
@@ -343,28 +343,30 @@ def _width(solution: Solution) -> Iterator[Finding]:
         (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' accounts for it")
     )
     for name, share, place in solution.hindered_curling:
-        if told := too_soft(share, f"in the {name} at {mm(place)}"):
-            yield finding("wide_beam", told + hint, *cures)
+        if reported := too_soft(share, f"in the {name} at {mm(place)}"):
+            yield finding("wide_beam", reported + hint, *cures)
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:
     about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity in TRACED
     share = about.waviness / about.thickness
     if share > WAVY or (about.waviness and not exact):
-        told = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
+        reported = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
         effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
         yield finding(
-            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told}{effect}"
+            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {reported}{effect}"
         )
     push = solution.nominal
     if not push.leaves.stable.all():
         lost = push.travel[~push.leaves.stable]
-        told = f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
+        reported = (
+            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
+        )
         if solution.spec.analysis.branch == "stable":
-            yield finding("unstable_branch", f"{told}, which was not found")
+            yield finding("unstable_branch", f"{reported}, which was not found")
         else:
             follow = "analysis.branch: stable follows them"
-            yield finding("unstable_branch", f"{told}: {follow}", "analysis.branch=stable")
+            yield finding("unstable_branch", f"{reported}: {follow}", "analysis.branch=stable")
 
 
 def _range(solution: Solution) -> Iterator[Finding]:
@@ -426,15 +428,17 @@ def _spring_range(solution: Solution) -> Iterator[Finding]:
     worst = max(ends, key=lambda end: end / PRESSED if end > 0 else -end / STRETCHED)
     share = abs(worst) / (2.0 * length)
     if angle > STEEP:
-        told = f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
+        reported = (
+            f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
+        )
     elif share > (PRESSED if worst > 0 else STRETCHED):
         what = "compressed" if worst > 0 else "stretched"
-        told = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
+        reported = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
     else:
         return
     yield finding(
         "theory_range",
-        f"{told}; the closed form's constant stiffness is off by several per cent: verify with "
+        f"{reported}; the closed form's constant stiffness is off by several per cent: verify with "
         "'analysis.fidelity: exact'",
         "analysis.fidelity=exact",
     )
@@ -483,17 +487,18 @@ def _truss(solution: Solution) -> Iterator[Finding]:
 
 
 def _measured(solution: Solution) -> Iterator[Finding]:
-    told = solution.spec.analysis.measured
-    if told is None or float(solution.parts.strip.slenderness) < FLAT_BUCKLED_ABOVE:
+    reported = solution.spec.analysis.measured
+    if reported is None or float(solution.parts.strip.slenderness) < FLAT_BUCKLED_ABOVE:
         return
     if solution.spec.mechanism.bistable.structure == "hybrid":  # whose flexures push where it is flat
         return
     balance = float(solution.parts.balance)
-    there, needed = told.positive_stiffness * balance, measured_stiffness_for(told.force, balance)
-    if abs(there / told.force - 1.0) > solution.spec.analysis.flatness:
+    there, needed = reported.positive_stiffness * balance, measured_stiffness_for(reported.force, balance)
+    if abs(there / reported.force - 1.0) > solution.spec.analysis.flatness:
         yield finding(
             "measured_contradiction",
-            f"the reported {newton(told.force)} and K_p = {rate(told.positive_stiffness)} contradict each other: at "
-            f"{mm(balance)} the leaves carry no force, for any number, width or modulus, and the force is "
-            f"K_p h = {newton(there)}; {newton(told.force)} needs {rate(needed)}",
+            f"the reported {newton(reported.force)} and K_p = {rate(reported.positive_stiffness)} "
+            f"contradict each other: at {mm(balance)} the leaves carry no force, "
+            f"for any number, width or modulus, and the force is K_p h = {newton(there)}; "
+            f"{newton(reported.force)} needs {rate(needed)}",
         )

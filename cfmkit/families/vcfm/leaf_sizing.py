@@ -195,8 +195,8 @@ def leaves_for(have: int, wanted: float, sheet: float) -> int:
     """
     count = have + 2 * max(0, ceil((wanted - have) / 2.0 - 1e-9))
     if count > MOST_LEAVES:
-        told = f"from a sheet of {mm(sheet)} ('mechanism.part.sheet') {count} leaves would have to be cut"
-        raise Infeasible(finding("envelope", f"{told}, {MOST_LEAVES} at most: use a thicker sheet"))
+        reported = f"from a sheet of {mm(sheet)} ('mechanism.part.sheet') {count} leaves would have to be cut"
+        raise Infeasible(finding("envelope", f"{reported}, {MOST_LEAVES} at most: use a thicker sheet"))
     return count
 
 
@@ -300,5 +300,5 @@ def next_side(side: LeafStrip, stiffer: float, over: float, least: float) -> Lea
 
 def stress_unreachable(leaf: LeafStrip, stress: float, allowable: float) -> Infeasible:
     """Return what is raised where the sizes do not come within the stress [Pa]."""
-    told = f"the exact stress of leaves of {mm(float(leaf.length))} from this sheet is {mpa(stress)}"
-    return Infeasible(finding("stress_unreachable", f"{told}, {mpa(allowable)} is allowed ('mechanism.material')"))
+    reported = f"the exact stress of leaves of {mm(float(leaf.length))} from this sheet is {mpa(stress)}"
+    return Infeasible(finding("stress_unreachable", f"{reported}, {mpa(allowable)} is allowed ('mechanism.material')"))

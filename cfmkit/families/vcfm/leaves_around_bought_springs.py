@@ -129,9 +129,9 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
     none = "it lists no spring of the required kind ('mechanism.springs.kind')"
-    told = f"no spring fits: {nearest(missed) if missed else none}"
+    reported = f"no spring fits: {nearest(missed) if missed else none}"
     return no_design(
-        finding("no_spring_fits", f"{told} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")
+        finding("no_spring_fits", f"{reported} ('{'design.catalogue' if target.catalogue else 'mechanism.springs'}')")
     )
 
 
@@ -196,11 +196,11 @@ def _around(
         ),
     ]
     if springs.free_length is not None and target.spring_room is not None:
-        told = f"too long, {mm(springs.free_length)} relaxed ('design.spring_room' {mm(target.spring_room)})"
-        ratios.append((springs.free_length / target.spring_room, told))
-    worst, told = max(ratios)
+        reported = f"too long, {mm(springs.free_length)} relaxed ('design.spring_room' {mm(target.spring_room)})"
+        ratios.append((springs.free_length / target.spring_room, reported))
+    worst, reported = max(ratios)
     if worst > 1 + 1e-9:
-        return Miss(label, worst - 1.0, told)
+        return Miss(label, worst - 1.0, reported)
     own = target.model_copy(update={"force": left, "rise": rise, "preload": preload or None})
     try:
         thickness = thickness_for(own)

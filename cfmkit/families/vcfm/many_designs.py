@@ -305,8 +305,8 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         "overstressed": _overstressed(spec, slab),
         "measured_contradiction": np.array(False),
     }
-    if (told := spec.analysis.measured) is not None:
-        apart = np.abs(told.positive_stiffness / measured_stiffness_for(told.force, rise) - 1.0)
+    if (reported := spec.analysis.measured) is not None:
+        apart = np.abs(reported.positive_stiffness / measured_stiffness_for(reported.force, rise) - 1.0)
         found["measured_contradiction"] = (q >= FLAT_BUCKLED_ABOVE) & (apart > slab.flatness)
     return {name: np.ravel(np.broadcast_to(mask, (size, 1))) for name, mask in found.items()}
 

@@ -250,11 +250,11 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
     if (spec.mechanism.part or CutPart()).fillet == 0:
-        told = "without fillets the stress in inside corners has no value"
-        yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
-    for name, told in sampler.mesh_error.too_large():
-        yield finding(name, told)
+        reported = "without fillets the stress in inside corners has no value"
+        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    for name, reported in sampler.mesh_error.too_large():
+        yield finding(name, reported)
     about = spec.mechanism
     for part in (about.bistable, about.positive):
-        if part is not None and (told := bracket(part.width, part.thickness, about.material.poisson)):
-            yield finding("wide_beam", told)
+        if part is not None and (reported := bracket(part.width, part.thickness, about.material.poisson)):
+            yield finding("wide_beam", reported)

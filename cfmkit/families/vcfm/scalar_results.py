@@ -299,7 +299,7 @@ _READING_COLUMNS = {
 
 
 def _readings(solution: Solution) -> Iterator[TableReading]:
-    mechanism, told = solution.spec.mechanism, solution.spec.analysis.measured
+    mechanism, reported = solution.spec.mechanism, solution.spec.analysis.measured
     if mechanism.positive is None:
         for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
             mark = ", as specified" if leaves == mechanism.bistable.half_beams else ""
@@ -314,10 +314,10 @@ def _readings(solution: Solution) -> Iterator[TableReading]:
     if mechanism.kinds == ("diamond", "v-beam"):
         one_chain = TrussDiamond(strip_of(mechanism.flexures, mechanism.material), 0.5).stiffness
         yield TableReading("the paper's eq. 19 as printed: truss law", 2, float(one_chain), truss=True)
-    if told is not None:
-        yield TableReading("measured stiffness, 2 half-beams", 2, told.positive_stiffness)
-        yield TableReading("twice the measured stiffness, 4 half-beams", 4, 2.0 * told.positive_stiffness)
-        needed = measured_stiffness_for(told.force, solution.parts.balance)
+    if reported is not None:
+        yield TableReading("measured stiffness, 2 half-beams", 2, reported.positive_stiffness)
+        yield TableReading("twice the measured stiffness, 4 half-beams", 4, 2.0 * reported.positive_stiffness)
+        needed = measured_stiffness_for(reported.force, solution.parts.balance)
         yield TableReading("the stiffness that the measured force needs, 4 half-beams", 4, needed)
 
 

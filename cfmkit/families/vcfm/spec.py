@@ -205,8 +205,8 @@ class Mechanism(Model):
         block = data if isinstance(data, Mapping) else {}
         old = block["material"].get("allowable_stress") if isinstance(block.get("material"), Mapping) else None
         if old is not None and block.get("safety_factor") not in (None, 1):
-            told = "is an old word, and means nothing beside 'safety_factor': give 'yield_strength' instead"
-            refuse("Mechanism", {("material", "allowable_stress"): told})
+            reported = "is an old word, and means nothing beside 'safety_factor': give 'yield_strength' instead"
+            refuse("Mechanism", {("material", "allowable_stress"): reported})
         return data
 
     @model_validator(mode="after")
@@ -388,8 +388,8 @@ class VcfmSpec(Spec):
         part = self.mechanism
         sheet = None if part.part is None else part.part.sheet
         if sheet is not None and self.design is not None and self.design.leaf_length is not None:
-            told = "the length of leaves from a sheet follows from the force: drop it, or 'mechanism.part.sheet'"
-            refuse("Spec", {("design", "leaf_length"): told})
+            reported = "the length of leaves from a sheet follows from the force: drop it, or 'mechanism.part.sheet'"
+            refuse("Spec", {("design", "leaf_length"): reported})
         refuse("Spec", sheet_faults(part.part, self.out_of_plane_widths))
         return self
 
@@ -400,13 +400,13 @@ class VcfmSpec(Spec):
             return self
         if frame.stop is not None and frame.stop < self.travel * (1 - 1e-9):
             stop, travel = (format_short(one, "length") for one in (frame.stop, self.travel))
-            told = (
+            reported = (
                 f"the stop holds the shuttle at {stop}, but the travel is {travel}: make the stop or 'analysis' agree"
             )
-            refuse("Spec", {("mechanism", "part", "frame", "stop"): told})
+            refuse("Spec", {("mechanism", "part", "frame", "stop"): reported})
         if frame.seat is not None and self.mechanism.springs is not None:
-            told = "a seat is drawn for a spring of leaves; these springs are bought: leave it out"
-            refuse("Spec", {("mechanism", "part", "frame", "seat"): told})
+            reported = "a seat is drawn for a spring of leaves; these springs are bought: leave it out"
+            refuse("Spec", {("mechanism", "part", "frame", "seat"): reported})
         return self
 
     @property
@@ -431,8 +431,8 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _wide_leaves_are_traced(self) -> Self:
         if self.mechanism.wide_beams and self.analysis.fidelity in ("truss", "analytic"):
-            told = "no closed form knows it: add 'analysis.fidelity: exact'"
-            refuse("Spec", {("mechanism", "wide_beams"): told})
+            reported = "no closed form knows it: add 'analysis.fidelity: exact'"
+            refuse("Spec", {("mechanism", "wide_beams"): reported})
         return self
 
     @model_validator(mode="after")

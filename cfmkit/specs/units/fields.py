@@ -71,14 +71,14 @@ class UnitField:
         """
         number, dimension = self._read(value)
         if number and not SMALLEST <= abs(number) <= LARGEST:
-            told = value.strip() if isinstance(value, str) else decimal_text(number)
+            reported = value.strip() if isinstance(value, str) else decimal_text(number)
             raise QuantityError(
-                f"{told} is outside the range of the computation: {SMALLEST:g} to {LARGEST:g} in SI units"
+                f"{reported} is outside the range of the computation: {SMALLEST:g} to {LARGEST:g} in SI units"
             )
         if dimension == "angle" and abs(number) > MOST_TURNS * math.tau:
-            told = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
+            reported = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
             raise QuantityError(
-                f"{told} is outside the range of the computation: at most {MOST_TURNS} turns of 360 deg"
+                f"{reported} is outside the range of the computation: at most {MOST_TURNS} turns of 360 deg"
             )
         return number, dimension
 
@@ -105,19 +105,19 @@ class UnitField:
         """
         if all(_BOUNDS[name][1](value, bound) for name, bound in bounds.items()):
             return value
-        told = given.strip() if isinstance(given, str) else self.told(value)
-        raise QuantityError(f"{told} is not allowed: must be {self.limits(bounds)}")
+        reported = given.strip() if isinstance(given, str) else self.reported(value)
+        raise QuantityError(f"{reported} is not allowed: must be {self.limits(bounds)}")
 
     def limits(self, bounds: Mapping[str, float]) -> str:
         """Return bounds in words with units: ``> 0 and <= 500 mm``."""
-        return " and ".join(f"{_BOUNDS[name][0]} {self.told(bound)}" for name, bound in bounds.items())
+        return " and ".join(f"{_BOUNDS[name][0]} {self.reported(bound)}" for name, bound in bounds.items())
 
     @property
     def needs_unit(self) -> bool:
         """Whether a number other than zero must carry a unit in a file."""
         return self.dimensions[0] not in UNITLESS
 
-    def told(self, value: float) -> str:
+    def reported(self, value: float) -> str:
         """Return an SI value with its unit, for a message."""
         return format_quantity(value, self.dimensions[0]) if value else "0"
 

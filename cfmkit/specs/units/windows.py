@@ -117,6 +117,6 @@ def between(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
     start, stop = travel
     places = [start + float(end) * (stop - start) if isinstance(end, Share) else float(end) for end in ends]
     if places[0] == places[1]:
-        told = " and ".join(_WindowEnd((*PLACES, SHARE)).write(end) for end in ends)
-        raise InputError(f"a window from {told} has no width on this travel")
+        reported = " and ".join(_WindowEnd((*PLACES, SHARE)).write(end) for end in ends)
+        raise InputError(f"a window from {reported} has no width on this travel")
     return min(places), max(places)

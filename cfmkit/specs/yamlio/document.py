@@ -125,10 +125,10 @@ class Document:
         """Return a problem at a path, with its place in the file or the option that set it."""
         path = self._path(path)
         line, column, option = self._place(path, self._reading.keys if at_key else self._reading.values)
-        told = dotted(path)
+        reported = dotted(path)
         if option:
-            return Problem(option, 0, 0, "" if option == f"--set {told}" else told, message)
-        return Problem(self.source, line, column, told, message)
+            return Problem(option, 0, 0, "" if option == f"--set {reported}" else reported, message)
+        return Problem(self.source, line, column, reported, message)
 
     def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> Document:
         new = [Problem(option.label, 0, 0, dotted(path), message) for path, message in faults]
@@ -172,9 +172,9 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
 
 def _no_block(reading: Reading) -> Fault:
     what = "a list" if isinstance(reading.tree, tuple) else "a single value"
-    told = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
+    reported = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
     line, column = reading.values.get((), (1, 1))
-    return Fault(line, column, (), f"{told}; a specification starts with 'cfmkit: 1' and 'family: ...'")
+    return Fault(line, column, (), f"{reported}; a specification starts with 'cfmkit: 1' and 'family: ...'")
 
 
 def _located(fault: Fault, source: str) -> Problem:

@@ -161,8 +161,8 @@ def not_among(value: Any, allowed: Sequence[Any]) -> str:
     if len(allowed) == 1:
         return f"{described(value)} is not allowed here, only {described(allowed[0])} is"
     hint = did_you_mean(str(value), [str(item) for item in allowed])
-    told = listed("one of", allowed) or "a known choice"
-    return f"{described(value)} is not {told}" + (f"; {hint}" if hint else "")
+    reported = listed("one of", allowed) or "a known choice"
+    return f"{described(value)} is not {reported}" + (f"; {hint}" if hint else "")
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
@@ -238,8 +238,8 @@ def _out_of_bounds(line: _Error) -> str:
     slot = next((slot for slot in line.trace.slots if slot.bounds), None)
     given = line.trace.node
     if slot is not None and slot.quantity is not None:
-        told = given.strip() if isinstance(given, str) else slot.quantity.told(float(given))
-        return f"{told} is not allowed: must be {slot.quantity.limits(slot.bounds)}"
+        reported = given.strip() if isinstance(given, str) else slot.quantity.reported(float(given))
+        return f"{reported} is not allowed: must be {slot.quantity.limits(slot.bounds)}"
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
     limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())

@@ -136,8 +136,8 @@ class _Builder:
         elif anchor:
             self._complain(event, path, f"'&{anchor}' (an anchor) is not read; remove it")
         if tag := getattr(event, "tag", None):
-            told = tag.replace("tag:yaml.org,2002:", "!!")
-            self._complain(event, path, f"the tag {shown(told)} is not read; write the plain value")
+            reported = tag.replace("tag:yaml.org,2002:", "!!")
+            self._complain(event, path, f"the tag {shown(reported)} is not read; write the plain value")
 
     def _scalar(self, event: ScalarEvent, path: Path) -> Any:
         try:
@@ -177,8 +177,8 @@ class _Builder:
             key = self._key(event, path)
             here = (*path, key)
             if first := self.reading.keys.get(here):
-                told = f"the key {shown(key)} was given in line {first[0]} already; keep one"
-                self._complain(event, here, told, spoils=False)
+                reported = f"the key {shown(key)} was given in line {first[0]} already; keep one"
+                self._complain(event, here, reported, spoils=False)
             self.reading.keys.setdefault(here, _place(event))
             last = next(self.events)
             block.setdefault(key, self._node(last, here))
@@ -187,9 +187,9 @@ class _Builder:
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
         """Complain about a number that YAML ended at its decimal comma, as in ``{pivot: 28,303 N*mm/rad}``."""
         before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
-        told = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
+        reported = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
         if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
-            self._complain(whole, path, told)
+            self._complain(whole, path, reported)
 
     def _key(self, event: Event, path: Path) -> str:
         """Return a key; what is not a plain name is complained about and replaced by its text."""

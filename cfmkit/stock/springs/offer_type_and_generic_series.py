@@ -143,5 +143,5 @@ def nearest(misses: Sequence[Miss], count: int = 3) -> str:
     """Return the choices that miss least, and what, in one line."""
     best = sorted(misses, key=lambda miss: miss.share)[:count]
     left = len(misses) - len(best)
-    told = "; ".join(f"{miss.label}: {miss.reason}" for miss in best)
-    return f"{told}{f'; {left} others miss more' if left else ''}"
+    reported = "; ".join(f"{miss.label}: {miss.reason}" for miss in best)
+    return f"{reported}{f'; {left} others miss more' if left else ''}"

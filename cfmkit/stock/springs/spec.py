@@ -304,8 +304,8 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
             except ValidationError as error:
                 first = error.errors()[0]
                 place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
-                told = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-                raise DataError(f"{source}:{rows.line_num}: {place}: {told}") from None
+                reported = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
+                raise DataError(f"{source}:{rows.line_num}: {place}: {reported}") from None
             except ValueError as error:
                 raise DataError(f"{source}:{rows.line_num}: {error}") from None
     except csv.Error as error:

@@ -113,16 +113,16 @@ def by_interval(found: Findings) -> bool:
 def message(found: Findings) -> str:
     """Return the outcome in one sentence."""
     evaluator = found.evaluator
-    told = f"{found.setup.method}: {evaluator.count} samples"
+    reported = f"{found.setup.method}: {evaluator.count} samples"
     if found.interrupted:
         of = f"{evaluator.missing} of {evaluator.count + evaluator.missing} samples"
         again = "run the same command again without --fresh" if found.fresh else "run the same command again"
-        return f"{told}; interrupted: {of} were not computed; {again} to go on"
+        return f"{reported}; interrupted: {of} were not computed; {again} to go on"
     if evaluator.failed:
-        told += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
+        reported += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
     if found.unstated:
-        told += f"; {found.unstated} of {len(found.lines)} indices are not stated"
-    return told
+        reported += f"; {found.unstated} of {len(found.lines)} indices are not stated"
+    return reported
 
 
 def warnings(found: Findings) -> tuple[Finding, ...]:
@@ -130,18 +130,18 @@ def warnings(found: Findings) -> tuple[Finding, ...]:
     evaluator, setup = found.evaluator, found.setup
     extra = []
     if evaluator.failed:
-        told = f"{evaluator.failed} of {evaluator.count} samples have no result: {POLICIES[setup.policy]}"
+        reported = f"{evaluator.failed} of {evaluator.count} samples have no result: {POLICIES[setup.policy]}"
         if setup.policy == "resample":
-            told += f" ({found.replaced} blocks)"
-        extra.append(Finding("failed_samples", told))
+            reported += f" ({found.replaced} blocks)"
+        extra.append(Finding("failed_samples", reported))
     elif found.unstated and not found.interrupted:
-        told = f"{found.unstated} indices are not stated: "
+        reported = f"{found.unstated} indices are not stated: "
         if setup.method == "inverse":
-            told = f"{found.unstated} tolerances are not stated: even without the error of that parameter alone, "
-            told += "or of all, the yield would stay too low"
+            reported = f"{found.unstated} tolerances are not stated: even without the error of that parameter alone, "
+            reported += "or of all, the yield would stay too low"
         else:
-            told += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
-        extra.append(Finding("not_stated", told))
+            reported += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
+        extra.append(Finding("not_stated", reported))
     return (*setup.warnings, *extra)
 
 

@@ -228,7 +228,7 @@ def with_options(block: Sensitivity | None, changes: Mapping[str, Any]) -> dict[
 
     A number of samples is that of the block's own method: another method chooses its own.
     """
-    told = block.model_dump(exclude_unset=True) if block else {}
+    reported = block.model_dump(exclude_unset=True) if block else {}
     if block is not None and changes.get("method", block.method) != block.method:
-        told.pop("samples", None)
-    return told | {key: value for key, value in changes.items() if value is not None}
+        reported.pop("samples", None)
+    return reported | {key: value for key, value in changes.items() if value is not None}

@@ -15,7 +15,7 @@ from cfmkit.studies.sensitivity.distributions import draw, values_across, values
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failed_sample_policy import evaluated, nothing, stated
 from cfmkit.studies.sensitivity.result_types import Findings, IndexLine, lines_of
-from cfmkit.studies.sensitivity.result_types import stated as told
+from cfmkit.studies.sensitivity.result_types import stated as reported
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -109,10 +109,10 @@ def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nomin
     above, below = border_unit(metric.dimension), border_unit(one.dimension)
     scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
-    value, low, high = (told(end * scale, "ratio") for end in _around(slope.value, slope.error))
+    value, low, high = (reported(end * scale, "ratio") for end in _around(slope.value, slope.error))
     yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, local.LEVELS)
     relative = local.normalised(1.0, one.spread.nominal, at_nominal)
-    value, low, high = (told(end, "ratio") for end in _around(slope.value * relative, slope.error * abs(relative)))
+    value, low, high = (reported(end, "ratio") for end in _around(slope.value * relative, slope.error * abs(relative)))
     yield IndexLine(metric.label, one.path, oat.SLOPE, value, low, high, "1", local.LEVELS)
 
 
@@ -257,7 +257,7 @@ def _tolerance_lines(setup: Setup, answer: inverse.ToleranceFactors) -> Iterator
         stated_width = spread.deviation if spread.kind == "normal" else 0.5 * (spread.high - spread.low)
         for name in ("alone", "together", "allocated"):
             width = float(getattr(answer, name)[k]) * stated_width
-            value = told(float(to_border(width, one.dimension)), "ratio")
+            value = reported(float(to_border(width, one.dimension)), "ratio")
             unit = border_unit(one.dimension)
             yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, ESTIMATED)
 

@@ -178,8 +178,8 @@ def points_of(method: Method, samples: int, parameters: int, groups: int) -> int
 def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
     """Raise if method, failure policy and parameters do not go together."""
     if block.method in ("oat", "local") and block.on_failure == "resample":
-        told = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
-        raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", told)])
+        reported = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
+        raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", reported)])
     if block.method == "inverse" and not spec.part_requirements:
         lacking = "asks which tolerances keep a yield: give 'requirements' that a part meets or misses"
         raise SpecError([Problem("", 0, 0, "sensitivity.method", lacking)])
@@ -190,8 +190,8 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         raise SpecError([Problem("", 0, 0, f"sensitivity.costs.{path}", missing) for path in unknown])
     outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
     if block.method in MADE and outside:
-        told = "the nominal value is outside the range; tolerances are tightened towards it"
-        raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", told) for one in outside])
+        reported = "the nominal value is outside the range; tolerances are tightened towards it"
+        raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", reported) for one in outside])
 
 
 def _noted(one: Requirement) -> tuple[str, Ends | None]:
@@ -213,8 +213,8 @@ def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, .
     """Return the metrics that are numbers: of a word there is no derivative and no variance."""
     words = [one.name for one in metrics if one.words]
     if words and block.metrics:
-        told = f"{words[0]!r} is a word, and a sensitivity is about numbers; name another metric"
-        raise SpecError([Problem("", 0, 0, "sensitivity.metrics", told)])
+        reported = f"{words[0]!r} is a word, and a sensitivity is about numbers; name another metric"
+        raise SpecError([Problem("", 0, 0, "sensitivity.metrics", reported)])
     return tuple(one for one in metrics if not one.words)
 
 
@@ -232,8 +232,8 @@ def _solved(study: Study) -> Result:
     """Return the result without any deviation."""
     result = study.solve(study.spec)
     if not result.status.usable:
-        told = "the specification itself has no solution, so deviations from it cannot be studied"
-        raise SolutionError(f"{told}: {result.message}")
+        reported = "the specification itself has no solution, so deviations from it cannot be studied"
+        raise SolutionError(f"{reported}: {result.message}")
     return result
 
 
@@ -241,13 +241,13 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
     """Return the study of those metrics that have a value, and the result without deviations as it sees it."""
     row = study.row(result)
     valued = [k for k, value in enumerate(row.values) if value is not None]
-    told = {one.label: item.reason or "there is none" for one, item in _valueless(study, result)}
+    reported = {one.label: item.reason or "there is none" for one, item in _valueless(study, result)}
     if not valued:
-        reasons = "; ".join(dict.fromkeys(row.message or reason for reason in told.values()))
+        reasons = "; ".join(dict.fromkeys(row.message or reason for reason in reported.values()))
         raise SolutionError(f"none of the metrics has a value for the specification itself: {reasons}")
     without = tuple(
         Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
-        for label, reason in told.items()
+        for label, reason in reported.items()
     )
     outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).values))
     values = np.array([row.values[k] for k in valued], dtype=np.float64)
@@ -264,8 +264,8 @@ def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]
 
 def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
     if block.correlated and block.method not in MADE:
-        told = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
-        yield Finding("correlation_not_used", told)
+        reported = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
+        yield Finding("correlation_not_used", reported)
     if block.method == "sobol" and samples & (samples - 1):
         yield Finding("unbalanced", f"{samples} is not a power of two: Sobol sequences are balanced at 64, 128, 256")
     if block.method in MADE and not spec.part_requirements:
@@ -287,5 +287,5 @@ def _followers(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Findin
             continue
         follow = [path for path, value in moved.items() if path != one.path and base.get(path) != value]
         if follow:
-            told = f"{', '.join(follow)} follow {one.path}: every sample is another part, made for its own value"
-            yield Finding("derived_part", f"{told}; `cfmkit design` writes a design.yaml in which they are fixed")
+            reported = f"{', '.join(follow)} follow {one.path}: every sample is another part, made for its own value"
+            yield Finding("derived_part", f"{reported}; `cfmkit design` writes a design.yaml in which they are fixed")

@@ -52,9 +52,9 @@ def nearest(wish: Wish, name: str, seed: int, clock: Clock) -> dict[str, str]:
             edges.append((factor, key, easing))
     found: dict[str, str] = {}
     for factor, key, easing in sorted(edges, key=lambda one: one[0]):
-        told = None if len(found) == NAMED else _met(wish, name, (easing, factor), seed, clock)
-        if told is not None:
-            found[key] = told
+        reported = None if len(found) == NAMED else _met(wish, name, (easing, factor), seed, clock)
+        if reported is not None:
+            found[key] = reported
     return found
 
 
@@ -107,12 +107,12 @@ def _met(wish: Wish, name: str, eased_by: tuple[Easing, float], seed: int, clock
             return None
         # the sides that were just enough by the laws may be too little: then all of them
         choices = [_only_needed(wish, (name, seed), eased), eased] if easing is _larger else [eased]
-        for asked, told in {text: (one, text) for one, text in choices}.values():
+        for asked, reported in {text: (one, text) for one, text in choices}.values():
             for candidate in _offered(asked, name, seed)[:TRIED]:
                 if clock.late():
                     return None
                 if made(ProposalJob(name, candidate, asked, seed, clock.deadline)).good:
-                    return told
+                    return reported
     return None
 
 

@@ -99,7 +99,7 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
         _frame(ax, space, size, (wide, high))
         ax.set_title(names[number], fontsize=SMALL, loc="left", pad=1.5)
     figure.text(0.02, 1.0 - 5.0 / total, "the proposals to one scale, each in the room given", fontsize=NORMAL)
-    figure.text(0.02, 1.5 / total, _scale_told(wish), fontsize=SMALL, color=GREY)
+    figure.text(0.02, 1.5 / total, _scale_reported(wish), fontsize=SMALL, color=GREY)
     return figure
 
 
@@ -108,7 +108,7 @@ def _within(width: float, text: str) -> str:
     return textwrap.fill(text, int(width / LETTER))
 
 
-def _scale_told(wish: Wish) -> str:
+def _scale_reported(wish: Wish) -> str:
     sides = " x ".join(f"{1e3 * side:.4g}" for side in wish.room[:2])
     return f"dashed: the room, {sides} mm" + (" across and along the travel" if wish.kind == "force" else "")
 

@@ -118,9 +118,9 @@ def made(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; whatever its design or model refuses is its message."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
-        spec, told = _designed(job, clock)
+        spec, reported = _designed(job, clock)
         if spec is None:
-            return Proposal(job.family, candidate.variant, message=told)
+            return Proposal(job.family, candidate.variant, message=reported)
         return judged(job.family, candidate.variant, spec, job.wish, job.seed, clock)
     except (
         CfmError,
@@ -264,8 +264,8 @@ def _too_short(wish: Wish, result: Result) -> Iterator[str]:
     length = 0.0 if window is None else float(window[1]) - float(window[0])
     if length < wish.travel * (1.0 - SLACK):
         dimension = "length" if wish.kind == "force" else "angle"
-        told = format_short(length, dimension), format_short(wish.travel, dimension)
-        yield f"is constant over {told[0]}: {told[1]} wished"
+        reported = format_short(length, dimension), format_short(wish.travel, dimension)
+        yield f"is constant over {reported[0]}: {reported[1]} wished"
 
 
 def _badly_adjusted(wish: Wish, result: Result) -> Iterator[str]:

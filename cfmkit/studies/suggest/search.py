@@ -375,8 +375,8 @@ def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
     for one in done:
         if not one.good and not one.near:
-            told = one.message or "; ".join(one.missed)
-            found[one.family] = tuple(dict.fromkeys((*found.get(one.family, ()), told)))
+            reported = one.message or "; ".join(one.missed)
+            found[one.family] = tuple(dict.fromkeys((*found.get(one.family, ()), reported)))
     return found
 
 

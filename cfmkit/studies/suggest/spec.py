@@ -101,8 +101,10 @@ class WishBlock(Model):
     @model_validator(mode="after")
     def _fits_itself(self) -> Self:
         if self.travel is not None and self.travel >= self.room[1]:
-            told = f"a travel of {format_short(self.travel, 'length')} does not fit into the second side of the room, "
-            refuse("Wish", {("travel",): told + format_short(self.room[1], "length")})
+            reported = (
+                f"a travel of {format_short(self.travel, 'length')} does not fit into the second side of the room, "
+            )
+            refuse("Wish", {("travel",): reported + format_short(self.room[1], "length")})
         if self.adjustable is not None:
             if self.force is None:
                 refuse("Wish", {("adjustable",): "goes with 'force' only"})

@@ -92,7 +92,9 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
         return GoodParts(None, "its yield is not known: the errors of its dimensions by the process are not known")
     first = _first_order(result, found)
     if first is not None and first[0] < wanted:
-        return GoodParts(first[0], _told(first[0], f"made by {found.process.name}, to first order", wanted, first[1]))
+        return GoodParts(
+            first[0], _reported(first[0], f"made by {found.process.name}, to first order", wanted, first[1])
+        )
     if not draw:
         return GoodParts(None if first is None else first[0])
     return _drawn(result, found, wanted, clock)
@@ -116,7 +118,7 @@ def _drawn(result: Result, found: Assumed, wanted: float, clock: Clock) -> GoodP
         good += int(met.sum())
         if looked - good > most_bad:
             made = f"of {looked} parts made by {found.process.name}"
-            return GoodParts(good / looked, _told(good / looked, made, wanted))
+            return GoodParts(good / looked, _reported(good / looked, made, wanted))
     return GoodParts(good / looked)
 
 
@@ -131,7 +133,7 @@ def _met(result: Result) -> Iterator[NDArray[np.bool_]]:
         yield np.asarray(judge(made, values[begin : begin + AT_ONCE], result, Run()).met.all(axis=1))
 
 
-def _told(share: float, made: str, wanted: float, measured: float | None = None) -> str:
+def _reported(share: float, made: str, wanted: float, measured: float | None = None) -> str:
     text = f"yield {_percent(share)} {made}, wanted at least {_percent(wanted)}"
     better = measured is not None and measured > share + 0.005
     return f"{text} ({_percent(float(measured or 0.0))} once the modulus is measured)" if better else text

@@ -47,17 +47,17 @@ def _ratio(wish: ObliqueDesign, half_span: float) -> float:
     """Return the largest a over L0 that keeps the force within the tolerance."""
     reach = 0.5 * wish.range / half_span
     if departure(LEAST, reach) > wish.tolerance:
-        told = f"a range of {mm(wish.range)} needs springs of more than {mm(half_span / LEAST)}"
-        raise Infeasible(finding("no_room", told), {"design.range": _range(LEAST, wish, half_span)})
+        reported = f"a range of {mm(wish.range)} needs springs of more than {mm(half_span / LEAST)}"
+        raise Infeasible(finding("no_room", reported), {"design.range": _range(LEAST, wish, half_span)})
     ratio = MOST
     if departure(MOST, reach) > wish.tolerance:
         ratio = bracketed_root(lambda g: departure(g, reach) - wish.tolerance, LEAST, MOST)
     height = half_span * sqrt(1.0 / ratio**2 - 1.0)
     if wish.height_max is not None and height > wish.height_max:
-        told = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(wish.height_max)}"
+        reported = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(wish.height_max)}"
         flattest = half_span / hypot(half_span, wish.height_max)
         nearer = {"design.range": _range(flattest, wish, half_span)} if flattest <= MOST else {}
-        raise Infeasible(finding("no_room", told), {"design.height_max": at_least(height)} | nearer)
+        raise Infeasible(finding("no_room", reported), {"design.height_max": at_least(height)} | nearer)
     return ratio
 
 
@@ -72,12 +72,12 @@ def _range(ratio: float, wish: ObliqueDesign, half_span: float) -> str:
 def _coils_stay_apart(part: Mechanism, end: float) -> None:
     """Refuse springs that are solid before the range ends."""
     if part.oblique.solid_length > part.half_span:
-        told = f"the oblique springs are solid at {mm(part.oblique.solid_length)}, before they lie flat"
-        raise Infeasible(finding("coils_touch", told), {"mechanism.oblique.solid_length": at_most(part.half_span)})
+        reported = f"the oblique springs are solid at {mm(part.oblique.solid_length)}, before they lie flat"
+        raise Infeasible(finding("coils_touch", reported), {"mechanism.oblique.solid_length": at_most(part.half_span)})
     if (room := part.vertical.free_length - part.vertical.solid_length) < end:
-        told = f"the vertical spring can be compressed by {mm(room)}; the range ends at {mm(end)}"
+        reported = f"the vertical spring can be compressed by {mm(room)}; the range ends at {mm(end)}"
         longer = at_least(part.vertical.solid_length + end)
-        raise Infeasible(finding("coils_touch", told), {"mechanism.vertical.free_length": longer})
+        raise Infeasible(finding("coils_touch", reported), {"mechanism.vertical.free_length": longer})
 
 
 def departure(ratio: float, reach: float) -> float:

@@ -153,12 +153,14 @@ def _numbers(solution: Solution) -> dict[str, float]:
 def _findings(solution: Solution) -> Iterator[Finding]:
     (place, which), slope, vertical = solution.contact, solution.stiffness, solution.part.vertical.stiffness
     if place < solution.travel:
-        told = f"the coils of the {which} touch at {mm(place)}, within the travel of {mm(solution.travel)}"
-        yield finding("coils_touch", told)
+        reported = f"the coils of the {which} touch at {mm(place)}, within the travel of {mm(solution.travel)}"
+        yield finding("coils_touch", reported)
     if abs(slope) > QUASI_ZERO * vertical:
         right = solution.zero_ratio * vertical
-        told = (
+        reported = (
             f"the slope at {mm(solution.height)} is {rate(slope)}; oblique springs of {rate(right)} make it zero at "
             f"{newton(vertical * solution.height)}"
         )
-        yield finding("stiff" if slope > 0 else "falling", told, f"mechanism.oblique.stiffness={right / 1e3!r} N/mm")
+        yield finding(
+            "stiff" if slope > 0 else "falling", reported, f"mechanism.oblique.stiffness={right / 1e3!r} N/mm"
+        )

@@ -168,7 +168,7 @@ def test_a_curve_ends_where_coils_touch():
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "told"),
+    ("path", "value", "reported"),
     [
         ("mechanism.oblique.free_length", "50 mm", "'oblique.free_length' must be above 'half_span'"),
         ("mechanism.vertical.solid_length", "150 mm", "'solid_length' must be below 'free_length'"),
@@ -177,8 +177,8 @@ def test_a_curve_ends_where_coils_touch():
         ("analysis.fidelity", "dynamic", "dynamic"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_sentence(path, value, told):
+def test_what_is_wrong_is_told_in_one_sentence(path, value, reported):
     with pytest.raises(cfmkit.SpecError) as caught:
         springs().replace({path: value})
     (problem,) = caught.value.problems
-    assert told in problem.message
+    assert reported in problem.message

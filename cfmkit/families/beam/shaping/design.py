@@ -65,7 +65,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     return Design(
         best.spec,
         Status.COMPLETE,
-        _told(task, best, result),
+        _reported(task, best, result),
         active_bounds=held,
         warnings=_warnings(task, best, result),
         search=search_of(task, best, drawn, result),
@@ -211,7 +211,7 @@ def _nothing(result: Explored, plan: StartBudget) -> Design:
     return Design(None, Status.INFEASIBLE, said)
 
 
-def _told(task: Task, design: Judged, result: Explored) -> str:
+def _reported(task: Task, design: Judged, result: Explored) -> str:
     """Return what the search did, in one sentence; force and window in it are those of the analysis."""
     found, window = design.found, design.window
     some = [one for one in result.found.values() if one is not None]

@@ -218,14 +218,14 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     """Return what only the search knows, each number with the model and the window that it is of."""
     own = design.window
     asked, whole = (task.layers * task.window[0], own[1]), (0.0, own[1])
-    told = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
-    told |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
-    told |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
-    told |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
+    reported = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
+    reported |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
+    reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
+    reported |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
     numbers = _counts(result) | _audited(design.audit) | _drawn(drawn)
     if task.fidelity != REISSNER:  # else the metrics say it
         numbers |= _reissner(design)
-    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *told[name]) for name in numbers}
+    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *reported[name]) for name in numbers}
 
 
 def _reissner(design: Judged) -> dict[str, float | None]:

@@ -73,9 +73,11 @@ def runs_on_corner(parts: Build) -> Finding:
 def _pressure(moved: MotionSolution) -> Iterator[Finding]:
     pressed = contact_pressure(moved)
     top = worst(pressed)
-    told = None if top is None else overstressed(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
-    if told:
-        yield told
+    reported = (
+        None if top is None else overstressed(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
+    )
+    if reported:
+        yield reported
 
 
 def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:

@@ -325,7 +325,7 @@ def _slack(name: str, margin: FloatArray, machine: Machine) -> float:
 
 def _said(name: str, known: Mapping[str, FloatArray], machine: Machine, when: str) -> Finding:
     worst = float(np.nanmin(known[name]))
-    told: dict[str, Callable[[], Finding]] = {
+    reported: dict[str, Callable[[], Finding]] = {
         "flanks_collide": lambda: flanks_cross(worst),
         "rollers_collide": lambda: rollers_overlap(worst, f"{when} and after"),
         "lift_off": lambda: finding(
@@ -340,4 +340,4 @@ def _said(name: str, known: Mapping[str, FloatArray], machine: Machine, when: st
             f"rollers no longer; use shorter springs ('mechanism.rest_half_width', here {mm(machine.rest_length / 2)})",
         ),
     }
-    return told[name]()
+    return reported[name]()

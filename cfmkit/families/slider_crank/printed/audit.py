@@ -146,24 +146,24 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
 
 def _at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
-    form, told = found.form, []
+    form, reported = found.form, []
     ends = at_bounds(values, found.ranges.form, *AT_END)
     for k in np.flatnonzero(ends).tolist():
         value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
-            told.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
+            reported.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
         elif k < form.count + form.placed:
-            told.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
+            reported.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
         else:
-            told.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
+            reported.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
     if found.task.goal == "stroke" and np.isclose(0.01 * found.descent.z[-1], found.ranges.longest, rtol=1e-6):
-        told.append(f"stroke at its longest, {mm(found.ranges.longest)}")
-    return told
+        reported.append(f"stroke at its longest, {mm(found.ranges.longest)}")
+    return reported
 
 
 def _held(solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[float | None, float | None]) -> list[str]:
     """Return where the band and the stress hold the strip."""
-    told = []
+    reported = []
     ripple, stress = limits
     if ripple is not None:
         for sign, name in ((1.0, "upper"), (-1.0, "lower")):
@@ -171,12 +171,12 @@ def _held(solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[floa
             peaks = [k for k in np.flatnonzero(off > (1.0 - HELD) * ripple).tolist() if _peak(off, k)]
             if peaks:
                 places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
-                told.append(f"{name} edge of the band at {places}")
+                reported.append(f"{name} edge of the band at {places}")
     last = np.flatnonzero(inside)[-1]
     if stress is not None and solution.stress[last] > (1.0 - 0.5 * HELD) * stress:
         where = mm(float(solution.place[last]))
-        told.append(f"stress {mpa(stress)} at the end, {where} along the strip")
-    return told
+        reported.append(f"stress {mpa(stress)} at the end, {where} along the strip")
+    return reported
 
 
 def _peak(values: FloatArray, k: int) -> bool:

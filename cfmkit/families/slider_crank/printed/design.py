@@ -368,8 +368,8 @@ def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, floa
     )
     mechanism = spec.mechanism.model_copy(update={"beam": part})
     if spec.design is not None and spec.design.target is not None:
-        told = spec.design.target.written_out(spec.design.force)
-        spec = spec.model_copy(update={"design": spec.design.model_copy(update={"target": told, "force": None})})
+        target = spec.design.target.written_out(spec.design.force)
+        spec = spec.model_copy(update={"design": spec.design.model_copy(update={"target": target, "force": None})})
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
@@ -405,12 +405,12 @@ def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
 
 
 def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
-    told = []
+    findings = []
     if found.descent.ending is not SearchEnding.OPTIMUM:
         text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
-        told.append(finding("optimizer_stopped", text))
+        findings.append(finding("optimizer_stopped", text))
     if found.lost:
-        told.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
+        findings.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
     if not judged.opinion.stable:
-        told.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
-    return tuple(told)
+        findings.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
+    return tuple(findings)

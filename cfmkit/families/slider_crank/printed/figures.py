@@ -46,8 +46,8 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 @styled
 def curve(result: Result) -> Figure:
     """Return the force over the slider's travel, the band that it should keep enlarged."""
-    told = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
-    what = told[str(result.spec.at("analysis.fidelity"))]
+    reported = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
+    what = reported[str(result.spec.at("analysis.fidelity"))]
     return loop_figure(result, None, f"force over travel of the slider: {what}")
 
 

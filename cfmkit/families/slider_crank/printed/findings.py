@@ -129,8 +129,8 @@ def _width(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         return
     share = hindered_curling(solution.pressed.path).share[solution.pressed.path.at_requested]
     worst = int(share.argmax())
-    if told := too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}"):
-        yield finding("wide_beam", told, "mechanism.wide_beams=true")
+    if reported := too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}"):
+        yield finding("wide_beam", reported, "mechanism.wide_beams=true")
 
 
 def _guide(solution: Solution) -> Iterator[Finding]:

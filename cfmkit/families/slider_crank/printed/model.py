@@ -91,9 +91,9 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
     pressed = kept_clear(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not PressingEnd.WRONG_BRANCH
-    told = () if pressed.ending is PressingEnd.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    reported = () if pressed.ending is PressingEnd.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
     if not usable:
-        return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=told)
+        return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=reported)
     whole = (float(pressed.travel[0]), float(pressed.travel[-1]))
     window = whole if spec.analysis.window is None else between(spec.analysis.window, (low, high))
     solution = Solution(
@@ -110,11 +110,11 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     )
     return Result(
         spec=spec,
-        status=Status.PARTIAL if told else Status.COMPLETE,
-        message=told[0].message if told else "",
+        status=Status.PARTIAL if reported else Status.COMPLETE,
+        message=reported[0].message if reported else "",
         curves=(_curve(solution),),
         values=_values(solution) if run.wants(OF_SPRINGS | DEFINITIONS) else {},
-        warnings=(*told, *findings_of(spec, solution)) if run.wanted is None else told,
+        warnings=(*reported, *findings_of(spec, solution)) if run.wanted is None else reported,
         travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,

@@ -267,13 +267,13 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
     if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
-        told = "without fillets the stress in inside corners has no value"
-        yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
-    for name, told in solution.error.too_large():
-        yield finding(name, told)
+        reported = "without fillets the stress in inside corners has no value"
+        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    for name, reported in solution.error.too_large():
+        yield finding(name, reported)
     piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
-    if told := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
-        yield finding("wide_beam", told)
+    if reported := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
+        yield finding("wide_beam", reported)
     limit = made_of.allowable_stress
     peaks, places = solution.fine.peaks
     if limit is not None and peaks.max() > limit:

@@ -128,16 +128,16 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     """
     options, refused = _options(task, window)
     if not options:
-        told = nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
-        raise Infeasible(finding("no_spring_fits", f"no spring of the catalogue fits: {told} ('design.catalogue')"))
+        reported = nearest(refused) if refused else "it lists none of the kind that 'design.springs' needs"
+        raise Infeasible(finding("no_spring_fits", f"no spring of the catalogue fits: {reported} ('design.catalogue')"))
     tolerance = task.wanted.tolerance
     best = _sets(goal, options, 1)
     if best and (tolerance is None or best[0].deviation <= tolerance * (1 + 1e-9)):
         return best[0]
     misses = [_missed(one) for one in (_sets(goal, options, 3) if best else [])]
-    told = nearest(misses) if misses else _none_together(task, refused)
+    reported = nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
-    raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {told}{allowed}"))
+    raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {reported}{allowed}"))
 
 
 def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
@@ -181,9 +181,9 @@ def _missed(one: Chosen) -> Miss:
 
 def _none_together(task: SpringTask, refused: list[Miss]) -> str:
     """Return why no set does what is required beside the target: to let the force be trimmed."""
-    told = f"; {nearest(refused)}" if refused else ""
+    reported = f"; {nearest(refused)}" if refused else ""
     way = "anchor_travel" if task.wanted.anchor_travel is not None else "angle_travel"
-    return f"none is stiff enough for 'design.adjustment' within 'design.{way}'{told}"
+    return f"none is stiff enough for 'design.adjustment' within 'design.{way}'{reported}"
 
 
 def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
@@ -223,8 +223,8 @@ def _why_not(offer: Offer, moved: float, wanted: CrankDesign) -> tuple[float, st
         return 1.0, "its initial tension would load it in the unloaded position"
     room = wanted.spring_room
     if kind == "length" and room is not None and offer.free_length is not None and offer.free_length > room:
-        told = f"too long, {format_short(offer.free_length, kind)} relaxed"
-        return offer.free_length / room - 1.0, f"{told} ('design.spring_room' {format_short(room, kind)})"
+        reported = f"too long, {format_short(offer.free_length, kind)} relaxed"
+        return offer.free_length / room - 1.0, f"{reported} ('design.spring_room' {format_short(room, kind)})"
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"moved by {needed}, it allows {allowed}"

@@ -281,9 +281,9 @@ def _written(solved: Solved) -> SliderCrankSpec:
     springs = spec.mechanism.springs.model_copy(update=rates | anchor | bought)
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if wanted.target is not None:
-        told = wanted.target.written_out(wanted.torque or wanted.force)
+        reported = wanted.target.written_out(wanted.torque or wanted.force)
         spec = spec.model_copy(
-            update={"design": wanted.model_copy(update={"target": told, "torque": None, "force": None})}
+            update={"design": wanted.model_copy(update={"target": reported, "torque": None, "force": None})}
         )
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
@@ -368,13 +368,13 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     """Return how far rates and lengths may move without harm, if they may move far."""
     if solved.bought:
         return ()
-    told = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
-    if not told:
+    reported = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
+    if not reported:
         return ()
     wanted = solved.task.wanted
     extra = max(wanted.slack, NEGLIGIBLE)
     cure = "" if wanted.slack else "; 'design.slack' and 'design.prefer' choose among them"
-    text = f"within another {100 * extra:.2g} % of deviation lie many designs: {'; '.join(told)}{cure}"
+    text = f"within another {100 * extra:.2g} % of deviation lie many designs: {'; '.join(reported)}{cure}"
     return (finding("near_optima", text),)
 
 
@@ -387,13 +387,13 @@ def _of_rates(solved: Solved) -> str:
     if np.isnan(span).any():
         return ""
     wide = span[:, 1] - span[:, 0] > 0.2 * np.maximum(solved.rates, 1e-300)
-    told = []
+    reported = []
     for k, name in enumerate(JOINTS):
         if name in solved.task.wanted.springs and wide[k] and math.isfinite(span[k, 1]):
             dimension = "stiffness" if name == "slider" else "rotational_stiffness"
             low, high = (format_short(float(end), dimension) for end in span[k])
-            told.append(f"{name.replace('_', ' ')} {low} to {high}")
-    return ", ".join(told) if len(told) > 1 else ""
+            reported.append(f"{name.replace('_', ' ')} {low} to {high}")
+    return ", ".join(reported) if len(reported) > 1 else ""
 
 
 def _of_lengths(solved: Solved, search: Lowest | None) -> str:

@@ -198,6 +198,6 @@ def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         limit = getattr(limits, name)
         if limit is not None and value > limit * (1 + 1e-9):
             dimension = "length" if name == "slider" else "angle"
-            told, allowed = format_short(value, dimension), format_short(limit, dimension)
+            reported, allowed = format_short(value, dimension), format_short(limit, dimension)
             what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
-            yield finding("joint_overrotated", f"the {what} is moved by {told}; its limit is {allowed}")
+            yield finding("joint_overrotated", f"the {what} is moved by {reported}; its limit is {allowed}")

@@ -51,7 +51,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         contours += [circle((x, y), hole, "cut", hole=True) for x in (0.0, length)]
     part = spec.mechanism.part
     y = -3.0 * eye
-    told = (
+    reported = (
         DrawnDimension("crank", (0.0, 0.0), (linkage.crank, 0.0)),
         DrawnDimension("coupler", (0.0, y), (linkage.coupler, y)),
     )
@@ -59,4 +59,4 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     facts += [("links", f"{format_short(2.0 * eye, 'length')} wide, ends round")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
     sheet = Sheet(part.sheet if part else None, (), KEY)
-    return Drawing("slider-crank", tuple(contours), sheet=sheet, dimensions=told, facts=tuple(facts))
+    return Drawing("slider-crank", tuple(contours), sheet=sheet, dimensions=reported, facts=tuple(facts))
