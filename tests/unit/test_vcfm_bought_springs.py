@@ -170,6 +170,18 @@ def test_a_design_follows_leaves_back_only_as_far_as_a_long_preload_pushes_them(
     assert 1e-3 < float(str(back.value)) < 15e-3
 
 
+def test_a_leaf_is_traced_once_with_whichever_springs_stand_beside_it(spec):
+    from cfmkit.families.vcfm.exact_model import ExactSampler
+
+    stiffer = spec.replace({"mechanism.springs.count": 4})
+    longer = spec.replace({"mechanism.bistable.length": 1.01 * spec.mechanism.bistable.length})
+    one, same, other = (ExactSampler(each, 5e-3, 1e-3) for each in (spec, stiffer, longer))
+    assert same.pushed is one.pushed
+    assert same.pulled is one.pulled
+    assert other.pushed is not one.pushed
+    assert ExactSampler(spec.replace({"mechanism.wide_beams": True}), 5e-3, 1e-3).pushed is not one.pushed
+
+
 @pytest.mark.slow
 def test_the_refined_design_keeps_force_and_stress_by_the_exact_model(spec):
     found = family("vcfm").design(spec, Run())

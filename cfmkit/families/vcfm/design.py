@@ -9,6 +9,7 @@ the widths, lengths and numbers are found in a few passes (`leaf_sizing`).
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, sqrt
@@ -158,9 +159,12 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: LeafStrip) -> None:
     """Raise if the leaves would rather buckle out of the plane."""
     if leaf.width >= SQUAT * leaf.thickness:
         return
-    longer = leaf.length
-    while sized_leaf(spec, target, leaf.thickness, longer).width < MARGIN * SQUAT * leaf.thickness:
-        longer *= 1.002
+
+    def wide_enough(steps: int) -> bool:
+        width = float(sized_leaf(spec, target, leaf.thickness, leaf.length * STEP**steps).width)
+        return width >= MARGIN * SQUAT * float(leaf.thickness)
+
+    longer = leaf.length * STEP ** bisect_left(range(MOST_STEPS), True, key=wide_enough)  # widths grow with lengths
     raise Infeasible(
         finding(
             "out_of_plane_buckling",
@@ -190,6 +194,9 @@ def written(spec: VcfmSpec, sizes: DesignSizes) -> VcfmSpec:
 
 MARGIN = 1.01
 """On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
+
+STEP, MOST_STEPS = 1.002, 10_000
+"""Of leaf lengths that are proposed: leaves are made longer by so much, and so often at most, until they are wide."""
 
 ROOM = 1.02
 """On the room that is proposed: the exact stress may lengthen the spring, and so widen it."""

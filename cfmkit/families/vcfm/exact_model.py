@@ -7,7 +7,7 @@ one leaf or one chain is traced, by symmetry. How that is interpolated, `interpo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, VcfmSpec
     from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
@@ -51,10 +52,14 @@ def section(strip: LeafStrip, thickness: Any = None, wide: bool = False) -> Any:
 
 def leaf_network(spec: VcfmSpec) -> Network:
     """Return one leaf between wall and shuttle, or both leaves of a V whose shuttle can turn."""
+    parts = spec.mechanism
+    return _network_of(parts.bistable, parts.material, parts.wide_beams)
+
+
+def _network_of(about: Bistable, made_of: LeafMaterial, wide: bool) -> Network:
     from cfmkit.elastica import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
 
-    about = spec.mechanism.bistable
-    strip = strip_of(about, spec.mechanism.material)
+    strip = strip_of(about, made_of)
     x, h = strip.reach, strip.rise
     nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, guided(0.5 * np.pi, rotates=not about.guided))}
     thickness, shape, mirrored = strip.thickness, STRAIGHT, STRAIGHT
@@ -62,12 +67,24 @@ def leaf_network(spec: VcfmSpec) -> Network:
         shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
     if about.structure == "hybrid":
         thickness = Taper(*(np.array(item) for item in about.profile))
-    made = section(strip, thickness, spec.mechanism.wide_beams)
+    made = section(strip, thickness, wide)
     beams = {"leaf": Beam("wall", "shuttle", made, shape)}
     if not about.guided:
         nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)
         beams["mirrored leaf"] = Beam("far wall", "shuttle", made, mirrored)
     return Network(nodes, beams)
+
+
+KEPT = 128
+"""Paths of leaves, some 50 kB each: a catalogue asks for one leaf with one spring after another, a wish for one design
+in one room after another."""
+
+
+@lru_cache(maxsize=KEPT)
+def _leaf_path(about: Bistable, made_of: LeafMaterial, wide: bool, end: float, branch: str | None) -> Traced:
+    """Return what a leaf does up to `end` [m]; a branch is followed, and its waviness counts, where one is stated."""
+    control = {} if branch is None else {"branch": branch, "imperfection": about.waviness}
+    return traced(_network_of(about, made_of, wide), "shuttle", end, **control)
 
 
 @dataclass(frozen=True)
@@ -150,10 +167,10 @@ class ExactSampler:
     def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
         """Trace leaf and spring."""
         about, preloads = spec.mechanism.bistable, spec.analysis.preloads
-        network, back = leaf_network(spec), max(back, 0.02 * end)
+        leaf, back = (about, spec.mechanism.material, spec.mechanism.wide_beams), max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
-        self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
-        self.pulled = traced(network, "shuttle", -back)
+        self.pushed = _leaf_path(*leaf, end, spec.analysis.branch)
+        self.pulled = _leaf_path(*leaf, -back, None)
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
         self.problem = problem_of("bistable", (self.pushed, self.pulled), 1.0)
         if self.coils is not None:

@@ -161,8 +161,12 @@ def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
             first = closed_form(spec, spec.design)  # type: ignore[arg-type]
         except Infeasible:
             return
+    target = spec.design
+    assert target is not None
     for more in LONGER:
-        made = spec.replace({"design.leaf_length": float(first.leaf.length) * more})
+        # a length above zero needs no other check, and validating it took longer than the closed forms
+        length = {"leaf_length": float(first.leaf.length) * more}
+        made = spec.model_copy(update={"design": target.model_copy(update=length)})
         try:
             sizes = closed_form(made, made.design)  # type: ignore[arg-type]
         except Infeasible:
