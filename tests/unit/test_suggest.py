@@ -13,13 +13,14 @@ import pytest
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
 from cfmkit.designing.run_many_starts import NEVER
-from cfmkit.errors import SpecError, UsageError
+from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
+from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
-from cfmkit.families.slider_crank.proposals_for_wish import _motion
-from cfmkit.families.slider_crank.torque_that_springs_carry import flattest_springs, largest_torque
+from cfmkit.families.slider_crank.springs_wound_for_wish import wound
+from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning
 from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
@@ -492,10 +493,35 @@ def test_springs_for_a_torque_are_the_flattest_of_those_that_fit():
 def test_more_torque_than_the_bound_is_held_by_no_springs():
     asked, offer = torque_offer("100 N*mm", "60 deg", "[150 mm, 150 mm, 12 mm]")
     parts = offer.candidates[0].spec.mechanism
-    motion = _motion(asked, linkage_of(parts), parts.unloaded_angle)
-    bound = largest_torque(motion)
+    motion = _turning(asked, linkage_of(parts), parts.unloaded_angle)
+    bound = largest_effort(motion)
     assert flattest_springs(motion, 0.3 * bound, 0.0).deviation < 0.05
     assert flattest_springs(motion, 1.2 * bound, 0.0).deviation > 0.1
+
+
+def pinned_for_force(force, room):
+    asked = wish_of(None, {"force": force, "travel": "20 mm", "ripple": "5 %", "room": room, "material": "pla"}).wish()
+    offer = function_named(family("slider-crank").propose)(asked, Run())
+    return asked, offer, [one for one in offer.candidates if one.variant == "springs at pins"]
+
+
+def test_springs_for_a_force_are_the_flattest_of_those_that_fit():
+    """The flattest of any size are stiffer at the crank pin than any that is wound for this motion and this depth."""
+    asked, _, offered = pinned_for_force("200 N", "[150 mm, 200 mm, 40 mm]")
+    free = offered[0].spec.replace(
+        {"design": {"force": "200 N", "travel": ["0.8 mm", "20.8 mm"], "springs": ["pivot", "crank_pin", "slider_pin"]}}
+    )
+    with pytest.raises(SolutionError, match="no spring of steel wire fits at the crank pin"):
+        wound(family("slider-crank").design(free, Run()).spec, asked)
+    best = made(ProposalJob("slider-crank", offered[0], asked, 0))
+    assert best.good, best.missed or best.message
+    assert best.numbers["depth"] <= asked.depth
+
+
+def test_a_force_that_no_springs_at_the_pins_hold_is_refused_with_the_largest_that_they_do():
+    _, offer, offered = pinned_for_force("1.2 kN", "[150 mm, 200 mm, 40 mm]")
+    assert not offered
+    assert "springs of steel wire that fit at the pins hold at most" in offer.reason
 
 
 def test_proposals_that_differ_by_what_nobody_sees_stay_in_their_order():

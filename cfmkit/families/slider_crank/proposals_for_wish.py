@@ -1,56 +1,36 @@
 """From a wish to slider-cranks worth designing: kept proportions at the size that travel and room allow.
 
-Lengths scale with one factor: angles, and the shape of the curve, stay. For springs at pins the rates follow from the
-effort. For a strip the stress decides the thickness and the force the width, for flexures likewise; both are left to
-the family's own design.
+Lengths scale with one factor: angles, and the shape of the curve, stay. For a strip the stress decides the thickness
+and the force the width, for flexures likewise; both are left to the family's own design. Linkages with springs at their
+joints are those of `sprung_linkages_for_wish`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import SolutionError
-from cfmkit.families.findings import deg, mm, percent
-from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.findings import mm
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
-from cfmkit.families.slider_crank.springs_wound_for_wish import depth_of_springs, wound
-from cfmkit.families.slider_crank.torque_that_springs_carry import SprungMotion, flattest_springs, largest_torque
-from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.slider_crank.sprung_linkages_for_wish import (
+    Proportions,
+    largest_first,
+    overfilled,
+    pushed_analysis,
+    pushed_linkage,
+    turned_linkages,
+)
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
-from cfmkit.specs.units import Place, format_short
+from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
-from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
-from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.wishes import Wish
-
-
-@dataclass(frozen=True)
-class Proportions:
-    """A linkage over its crank's length, and what of its room is known.
-
-    Attributes
-    ----------
-    stretched, offset : float
-        Position of the stretched slider, and height of its way, over the crank's length.
-    unloaded : float
-        Crank angle with all springs relaxed [rad].
-    reach : float
-        Largest travel that is of use, over the crank's length.
-    """
-
-    stretched: float
-    offset: float
-    unloaded: float
-    reach: float
 
 
 PUSHED = (
@@ -88,180 +68,35 @@ LATER = 10.0
 FLEXURE = 0.2
 """Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
 
-TURNED = (
-    (1.0, 5.0, 0.3, -5.0),
-    (1.0, 5.0, 0.3, -9.0),
-    (1.0, 2.5, 0.0, -8.0),
-    (1.0, 3.0, 0.3, -15.0),
-    (1.0, 2.0, 0.5, -25.0),
-    (1.0, 1.65, 0.5, -88.0),
-    (1.0, 3.7, 0.0, -122.0),
-    (1.0, 10.0, 0.0, -82.5),
-)
-"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019. The
-last three are the flattest of some thousands of random linkages over 40 to 90 deg: their springs are wound up first."""
-
-WOUND_UP = -math.radians(60.0)
-"""Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
-
-SHRUNK = (0.99, 0.8)
-"""Sizes of linkages for a torque, over the largest that the room allows: smaller ones leave room for wider springs."""
-
-ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
-"""What round wire in bending holds at most, over its volume [J/m^3]."""
-
-STRONG = 4.0
-"""Torque that springs can hold by the bound over the one wished, above which more of it says nothing."""
-
-FLAT, HOPELESS = 0.45, 0.25
-"""Deviation over the ripple wished up to which springs are left out; largest one of a torque that is worth a look."""
-
-WEAK = 0.9
-"""Of the torque wished: linkages whose springs hold less by the bound are not designed; it knows some places only."""
-
-LINK_SHARE = 1.0 / 12.0
-"""Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
-
 OFFERED = 24
 
 PART = "cfmkit.families.slider_crank.proposals_for_wish:part"
 """What finishes the parts of one piece."""
 
-WOUND = "cfmkit.families.slider_crank.springs_wound_for_wish:wound"
-"""What finishes linkages with springs."""
-
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return linkages at sizes that fit the room, to be given springs, flexures or a strip by the family's design."""
-    return _of_torque(wish) if wish.kind == "torque" else _of_force(wish)
-
-
-def _of_torque(wish: Wish) -> FamilyOffer:
-    if (reason := _overfilled(wish)) is not None:
-        return FamilyOffer(reason=reason)
-    found = [_turned(wish, size, one) for size in SHRUNK for one in TURNED]
-    candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
-    if candidates:
-        return FamilyOffer(tuple(candidates))
-    return FamilyOffer(reason=_too_weak(wish, max(one for one in found if isinstance(one, float))))
-
-
-def _too_weak(wish: Wish, most: float) -> str:
-    """Return what is wrong where no springs hold the torque."""
-    if not most > 0.0:
-        return f"springs drive no crank one way over {deg(wish.travel)}: it would pass where it is stretched or folded"
-    reported = format_short(most, "torque", 2)
-    return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
-
-
-def _overfilled(wish: Wish) -> str | None:
-    """Return what is wrong where springs at pins would fill more than the room, taken as deep as it is wide."""
-    wire = wish.target * wish.travel / ENERGY
-    deep = wire / (wish.room[0] * wish.room[1])
-    if deep <= (wish.depth or max(wish.room[:2])):
-        return None
-    return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
-
-
-def _turned(wish: Wish, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
-    """Return a linkage that turns as much as is wished around its stretched position, a share of what fits the room.
-
-    Or the largest torque that springs can hold, where that is less than what is wished [N m].
-    """
-    crank, coupler, offset, unloaded = linkage
-    low = math.radians(unloaded)
-    within = _within(wish, low)
-    angles = np.linspace(low, within[1], 181)
-    y = crank * np.sin(angles)
-    inside = coupler**2 - (offset - y) ** 2
-    if (inside <= 0.0).any():
-        return 0.0
-    x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
-    sides = np.ptp(x) + 2.0 * EYE_SHARE * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * EYE_SHARE * crank
-    size = share * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
-    link = Linkage(crank * size, coupler * size, offset * size)
-    most = largest_torque(_motion(wish, link, low))
-    if most < WEAK * wish.low:
-        return most
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
-            "unloaded_angle": low, "springs": {}, **_plates(wish),
-        },
-        "analysis": {"angle": (low, within[1]), "points": 961},
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
-    done = "cfmkit.families.slider_crank.proposals_for_wish:finish"
-    return Candidate("springs at pins", spec, finish=done, promise=-min(most / wish.target, STRONG))
-
-
-def _within(wish: Wish, unloaded: float) -> tuple[float, float]:
-    """Return between which crank angles a torque may be held [rad]."""
-    if unloaded > WOUND_UP:
-        return unloaded, unloaded + max(3.0 * wish.travel, math.radians(20.0))
-    return 0.0, max(1.6 * wish.travel, math.radians(60.0))
-
-
-def _motion(wish: Wish, link: Linkage, unloaded: float) -> SprungMotion:
-    """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
-    low, high = _within(wish, unloaded)
-    deep = depth_of_springs(wish, thickness_of_links(wish))
-    return SprungMotion(
-        link, unloaded, low, min(high, unloaded + math.pi), wish.travel, deep, shared=wish.depth is not None
-    )
-
-
-def _plates(wish: Wish) -> dict[str, Any]:
-    """Return of which sheet links are, where their depth matters."""
-    return {} if wish.depth is None else {"part": {"sheet": thickness_of_links(wish)}}
-
-
-def thickness_of_links(wish: Wish) -> float:
-    """Return how thick the links of springs at pins are [m]; zero where their depth does not matter."""
-    return 0.0 if wish.depth is None else max(LINK_SHARE * wish.depth, wish.thinnest)
-
-
-def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
-    """Return a linkage for a torque with the springs that hold it best, over a window as long as the angle wished.
-
-    Raises
-    ------
-    cfmkit.errors.SolutionError
-        If no springs that fit come near it.
-    """
-    unloaded = float(spec.mechanism.unloaded_angle or 0.0)
-    held = flattest_springs(_motion(wish, linkage_of(spec.mechanism), unloaded), wish.target, FLAT * wish.ripple)
-    if held is None or held.deviation > HOPELESS:
-        off = "" if held is None else f" nearer than {percent(held.deviation)}"
-        raise SolutionError(f"no springs of steel wire that fit at the pins hold this torque{off}")
-    window = held.begin, held.begin + wish.travel * (1.0 + 1e-6)
-    # the motion is up to the window's end: what the linkage could do beyond it needs no room
-    motion = min(unloaded, window[0]), window[1]
-    sprung = spec.replace(
-        {
-            "mechanism.springs": dict(zip(JOINTS, held.rates.tolist(), strict=True)),
-            "analysis.window": tuple(Place(end, "angle") for end in window),
-            "analysis.angle": motion,
-            "analysis.reference_angle": 0.5 * sum(window),
-        }
-    )
-    return wound(sprung, wish)
+    return turned_linkages(wish) if wish.kind == "torque" else _of_force(wish)
 
 
 def _of_force(wish: Wish) -> FamilyOffer:
     if wish.adjustable is not None:
         return FamilyOffer(reason="the force of a slider-crank is fixed by its springs and cannot be adjusted")
-    found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
-    if found:
+    tried = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
+    if found := [one for one in tried if isinstance(one, Candidate)]:
         return FamilyOffer(tuple(_varied(found)))
+    reasons = []
     fits = [printed_size(wish, lengths) for lengths in PUSHED]
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
-        return FamilyOffer(reason=f"a strip would have to be about {mm(wide)} wide")
-    if (reason := _overfilled(wish)) is not None:
-        return FamilyOffer(reason=reason)
+        reasons.append(f"a strip would have to be about {mm(wide)} wide")
+    if most := max((one for one in tried if isinstance(one, float)), default=0.0):
+        told = format_short(most, "force", 2)
+        reasons.append(f"springs of steel wire that fit at the pins hold at most {told} over this travel")
+    elif not reasons and (reason := overfilled(wish)) is not None:
+        reasons.append(reason)
+    if reasons:
+        return FamilyOffer(reason="; ".join(reasons))
     need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
     return FamilyOffer(reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it")
 
@@ -279,12 +114,15 @@ def printed_size(wish: Wish, lengths: Proportions) -> float:
     return min((wish.room[0] - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
 
 
-def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
-    """Return parts and linkages of some proportions at all sizes that fit."""
+def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate | float]:
+    """Return parts and linkages of some proportions at all sizes that fit.
+
+    Or the largest force that springs at pins can hold, where that is less than what is wished [N].
+    """
     printed = printed_size(wish, lengths)
     pinned = min(wish.room[0] / (lengths.offset + 2 * EYE_SHARE), wish.room[1] / (lengths.stretched + 2 * EYE_SHARE))
-    pins = _overfilled(wish) is None
-    found = []
+    pins = overfilled(wish) is None
+    found: list[Candidate | float] = []
     for size in SIZES:
         for start in STARTS:
             travel = start * wish.travel, (1.0 + start) * wish.travel * (1.0 + 1e-6)
@@ -294,7 +132,7 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
             if travel[1] <= lengths.reach * pair:
                 found += _pairs(wish, lengths, pair, travel)
             if travel[1] <= lengths.reach * size * pinned and pins and start == STARTS[0]:
-                found.append(_springs(wish, lengths, size * pinned, travel))
+                found.append(pushed_linkage(wish, lengths, size * pinned, travel[0]))
     return found
 
 
@@ -369,18 +207,6 @@ def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _rank(crank: float, wish: Wish) -> float:
-    """Return how soon a size is tried: the largest first, which is the flattest and needs the least depth."""
-    return -crank / wish.room[1]
-
-
-def _analysis(travel: tuple[float, float]) -> dict[str, Any]:
-    return {
-        "drive": "force", "travel": (0.0, travel[1]), "window": tuple(Place(end, "length") for end in travel),
-        "points": 241,
-    }  # fmt: skip
-
-
 def _strip(
     wish: Wish, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
 ) -> Candidate:
@@ -397,7 +223,7 @@ def _strip(
             "force": wish.target, "travel": travel,
             "beam": {"shape": "uniform", "goal": "ripple", "width": wide, "thickness": thick},
         },
-        "analysis": _analysis(travel),
+        "analysis": pushed_analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate(
@@ -405,7 +231,7 @@ def _strip(
         spec,
         True,
         PART,
-        _rank(crank, wish),
+        largest_first(crank, wish),
     )
 
 
@@ -443,7 +269,7 @@ def _flexures(
             "flexures": {"pivot": one, "crank_pin": one, "slider_pin": one},
         },
         "design": {"force": wish.target, "travel": (0.0, travel[1]), "flexures": {}},
-        "analysis": _analysis(travel),
+        "analysis": pushed_analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
     return Candidate(
@@ -451,7 +277,7 @@ def _flexures(
         spec,
         True,
         PART,
-        _rank(crank, wish),
+        largest_first(crank, wish),
     )
 
 
@@ -475,19 +301,3 @@ def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     names = ("pivot", "crank_pin", "slider_pin")
     parts = {name: getattr(made.mechanism.flexures, name).width * factor for name in names}
     return made.replace({f"mechanism.flexures.{name}.width": width for name, width in parts.items()})
-
-
-def _springs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, float]) -> Candidate:
-    """Return a linkage with springs at its pins, the flattest that there are."""
-    data = {
-        "family": "slider-crank",
-        "name": "suggested",
-        "mechanism": {
-            "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-            "unloaded_offset": 4e-4, "springs": {}, **_plates(wish),
-        },
-        "design": {"force": wish.target, "travel": travel, "springs": ("pivot", "crank_pin", "slider_pin")},
-        "analysis": _analysis(travel),
-    }  # fmt: skip
-    spec = SliderCrankSpec.model_validate(data)
-    return Candidate("springs at pins", spec, True, WOUND, _rank(crank, wish))

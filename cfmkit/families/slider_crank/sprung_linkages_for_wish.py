@@ -1,0 +1,283 @@
+"""Linkages with springs of steel wire at their joints that may do what is wished: for a torque, or for a force.
+
+Kept proportions at the size that the room allows; lengths scale with one factor, the angles stay. Which springs hold
+the effort best, of those that can be wound and have their place, `flattest_springs_that_fit` says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import SolutionError
+from cfmkit.families.findings import deg, mm, percent
+from cfmkit.families.slider_crank.flattest_springs_that_fit import SprungMotion, flattest_springs, largest_effort
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
+from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
+from cfmkit.families.slider_crank.springs_wound_for_wish import depth_of_springs, wound
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.families.wishes import Candidate, FamilyOffer
+from cfmkit.specs.units import Place, format_short
+from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
+from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
+
+if TYPE_CHECKING:
+    from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
+    from cfmkit.families.wishes import Wish
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """A linkage over its crank's length, and what of its room is known.
+
+    Attributes
+    ----------
+    stretched, offset : float
+        Position of the stretched slider, and height of its way, over the crank's length.
+    unloaded : float
+        Crank angle with all springs relaxed [rad].
+    reach : float
+        Largest travel that is of use, over the crank's length.
+    """
+
+    stretched: float
+    offset: float
+    unloaded: float
+    reach: float
+
+
+TURNED = (
+    (1.0, 5.0, 0.3, -5.0),
+    (1.0, 5.0, 0.3, -9.0),
+    (1.0, 2.5, 0.0, -8.0),
+    (1.0, 3.0, 0.3, -15.0),
+    (1.0, 2.0, 0.5, -25.0),
+    (1.0, 1.65, 0.5, -88.0),
+    (1.0, 3.7, 0.0, -122.0),
+    (1.0, 10.0, 0.0, -82.5),
+)
+"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019. The
+last three are the flattest of some thousands of random linkages over 40 to 90 deg: their springs are wound up first."""
+
+WOUND_UP = -math.radians(60.0)
+"""Unloaded angle below which the torque is constant behind the stretched position, not around it [rad]."""
+
+SHRUNK = (0.99, 0.8)
+"""Sizes of linkages for a torque, over the largest that the room allows: smaller ones leave room for wider springs."""
+
+ENERGY = (BENDING_SHARE * tensile_strength(1e-3)) ** 2 / (8.0 * YOUNGS_MODULUS)
+"""What round wire in bending holds at most, over its volume [J/m^3]."""
+
+STRONG = 4.0
+"""Torque that springs can hold by the bound over the one wished, above which more of it says nothing."""
+
+FLAT, HOPELESS = 0.45, 0.25
+"""Deviation over the ripple wished that is flat enough: up to it springs for a torque are left out, and those for a
+force stay in the first window and the room; and the largest deviation that is worth a look."""
+
+WEAK = 0.9
+"""Of the torque wished: linkages whose springs hold less by the bound are not designed; it knows some places only."""
+
+LINK_SHARE = 1.0 / 12.0
+"""Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
+
+FINISH = "cfmkit.families.slider_crank.sprung_linkages_for_wish:finish"
+"""What finishes linkages with springs at their pins."""
+
+
+def turned_linkages(wish: Wish) -> FamilyOffer:
+    """Return linkages for a torque at their crank, those whose springs can hold most of it first; or why none can."""
+    if (reason := overfilled(wish)) is not None:
+        return FamilyOffer(reason=reason)
+    found = [_turned(wish, size, one) for size in SHRUNK for one in TURNED]
+    candidates = sorted((one for one in found if isinstance(one, Candidate)), key=lambda one: one.promise)
+    if candidates:
+        return FamilyOffer(tuple(candidates))
+    return FamilyOffer(reason=_too_weak(wish, max(one for one in found if isinstance(one, float))))
+
+
+def _too_weak(wish: Wish, most: float) -> str:
+    """Return what is wrong where no springs hold the torque."""
+    if not most > 0.0:
+        return f"springs drive no crank one way over {deg(wish.travel)}: it would pass where it is stretched or folded"
+    reported = format_short(most, "torque", 2)
+    return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
+
+
+def overfilled(wish: Wish) -> str | None:
+    """Return what is wrong where springs at pins would fill more than the room, taken as deep as it is wide."""
+    wire = wish.target * wish.travel / ENERGY
+    deep = wire / (wish.room[0] * wish.room[1])
+    if deep <= (wish.depth or max(wish.room[:2])):
+        return None
+    return f"the wire of steel springs for this work would fill the room to a depth of {mm(deep)}"
+
+
+def _turned(wish: Wish, share: float, linkage: tuple[float, float, float, float]) -> Candidate | float:
+    """Return a linkage that turns as much as is wished around its stretched position, a share of what fits the room.
+
+    Or the largest torque that springs can hold, where that is less than what is wished [N m].
+    """
+    crank, coupler, offset, unloaded = linkage
+    low = math.radians(unloaded)
+    within = _within(wish, low)
+    angles = np.linspace(low, within[1], 181)
+    y = crank * np.sin(angles)
+    inside = coupler**2 - (offset - y) ** 2
+    if (inside <= 0.0).any():
+        return 0.0
+    x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
+    sides = np.ptp(x) + 2.0 * EYE_SHARE * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * EYE_SHARE * crank
+    size = share * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
+    link = Linkage(crank * size, coupler * size, offset * size)
+    most = largest_effort(_turning(wish, link, low))
+    if most < WEAK * wish.low:
+        return most
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
+            "unloaded_angle": low, "springs": {}, **_plates(wish),
+        },
+        "analysis": {"angle": (low, within[1]), "points": 961},
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate("springs at pins", spec, finish=FINISH, promise=-min(most / wish.target, STRONG))
+
+
+def _within(wish: Wish, unloaded: float) -> tuple[float, float]:
+    """Return between which crank angles a torque may be held [rad]."""
+    if unloaded > WOUND_UP:
+        return unloaded, unloaded + max(3.0 * wish.travel, math.radians(20.0))
+    return 0.0, max(1.6 * wish.travel, math.radians(60.0))
+
+
+def _turning(wish: Wish, link: Linkage, unloaded: float) -> SprungMotion:
+    """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
+    low, high = _within(wish, unloaded)
+    ends = low, min(high, unloaded + math.pi)
+    return _sprung(wish, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler))
+
+
+def _sprung(wish: Wish, assembly: Assembly, ends: tuple[float, float], widest: float) -> SprungMotion:
+    """Return what springs have to do where the effort may be held between two ends of the motion."""
+    deep = depth_of_springs(wish, thickness_of_links(wish))
+    return SprungMotion(assembly, *ends, wish.travel, widest, deep, shared=wish.depth is not None)
+
+
+def _pushing(spec: SliderCrankSpec, wish: Wish) -> list[SprungMotion]:
+    """Return what springs have to do at the pins of a linkage that is pushed, what is wanted most first.
+
+    A window at the beginning of the travel: there the springs turn least. Torsion springs that stay in the room even
+    where there are two of the widest, then those that stand beside each other.
+    """
+    assembly = assemble(spec)
+    link, (first, last) = assembly.linkage, _reached(spec)
+    ends = assembly.units(np.array([0.0, last]))
+    high = max(link.offset, *(link.crank * np.sin(ends.angle)))
+    beside = min(link.crank, link.coupler)
+    inside = min(beside, wish.room[0] - high, wish.room[1] - float(ends.position[0]))
+    windows = (first, first + wish.travel), (first, last)
+    return [_sprung(wish, assembly, window, wide) for wide in (inside, beside) for window in windows if wide > 0.0]
+
+
+def _reached(spec: SliderCrankSpec) -> tuple[float, float]:
+    """Return between which travels a force may be held, by the analysis of a candidate [m]."""
+    first, last = (float(end) for end in spec.analysis.window or (0.0, 0.0))
+    return first, last
+
+
+def _plates(wish: Wish) -> dict[str, Any]:
+    """Return of which sheet links are, where their depth matters."""
+    return {} if wish.depth is None else {"part": {"sheet": thickness_of_links(wish)}}
+
+
+def thickness_of_links(wish: Wish) -> float:
+    """Return how thick the links of springs at pins are [m]; zero where their depth does not matter."""
+    return 0.0 if wish.depth is None else max(LINK_SHARE * wish.depth, wish.thinnest)
+
+
+def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a linkage with the springs that hold the torque or the force best, over a window as long as is wished.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If no springs that fit come near it.
+    """
+    held = _torque_held(spec, wish) if wish.kind == "torque" else _force_held(spec, wish)
+    if held is None or held.deviation > HOPELESS:
+        off = "" if held is None else f" nearer than {percent(held.deviation)}"
+        raise SolutionError(f"no springs of steel wire that fit at the pins hold this {wish.kind}{off}")
+    name, dimension = ("angle", "angle") if wish.kind == "torque" else ("travel", "length")
+    start = float(spec.mechanism.unloaded_angle or 0.0) if wish.kind == "torque" else 0.0
+    window = held.begin, held.begin + wish.travel * (1.0 + 1e-6)
+    # the motion is up to the window's end: what the linkage could do beyond it needs no room
+    motion = min(start, window[0]), window[1]
+    sprung = spec.replace(
+        {
+            "mechanism.springs": dict(zip(JOINTS, held.rates.tolist(), strict=True)),
+            "analysis.window": tuple(Place(end, dimension) for end in window),
+            f"analysis.{name}": motion,
+            f"analysis.reference_{name}": 0.5 * sum(window),
+        }
+    )
+    return wound(sprung, wish)
+
+
+def _torque_held(spec: SliderCrankSpec, wish: Wish) -> HeldEffort | None:
+    unloaded = float(spec.mechanism.unloaded_angle or 0.0)
+    return flattest_springs(_turning(wish, linkage_of(spec.mechanism), unloaded), wish.target, FLAT * wish.ripple)
+
+
+def _force_held(spec: SliderCrankSpec, wish: Wish) -> HeldEffort | None:
+    """Return the springs of the first motion that are flat enough, else the flattest of all; none is left out."""
+    best: HeldEffort | None = None
+    for motion in _pushing(spec, wish):
+        held = flattest_springs(motion, wish.target, 0.0)
+        if held is not None and (best is None or held.deviation < best.deviation):
+            best = held
+        if best is not None and best.deviation <= FLAT * wish.ripple:
+            break
+    return best
+
+
+def pushed_linkage(wish: Wish, lengths: Proportions, crank: float, first: float) -> Candidate | float:
+    """Return a linkage with springs at its pins, for a force from some travel on.
+
+    Or the largest force that springs can hold, where that is less than what is wished [N].
+    """
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
+            "unloaded_offset": 4e-4, "springs": {}, **_plates(wish),
+        },
+        "analysis": pushed_analysis((first, lengths.reach * crank)),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    most = max(map(largest_effort, _pushing(spec, wish)))
+    if most < WEAK * wish.low:
+        return most
+    return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, wish))
+
+
+def pushed_analysis(travel: tuple[float, float]) -> dict[str, Any]:
+    """Return the block `analysis` of a slider that is pushed up to the end of a window of its travel [m]."""
+    return {
+        "drive": "force", "travel": (0.0, travel[1]), "window": tuple(Place(end, "length") for end in travel),
+        "points": 241,
+    }  # fmt: skip
+
+
+def largest_first(crank: float, wish: Wish) -> float:
+    """Return how soon a size is tried: the largest first, which is the flattest and needs the least depth."""
+    return -crank / wish.room[1]
