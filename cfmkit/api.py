@@ -160,12 +160,13 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
     run = run or Run()
-    found = record.design(spec, run)
     asked = getattr(spec, "design", None)
-    if getattr(asked, "yield", None) is not None:
+    margins = getattr(asked, "yield", None) is not None
+    found = record.design(spec, run.part(0.0, 0.5) if margins else run)
+    if margins:
         from cfmkit.studies.redesign_for_yield import with_design_margins
 
-        found = with_design_margins(spec, found, run)
+        found = with_design_margins(spec, found, run.part(0.5, 1.0))
     if getattr(asked, "verify", None) is not None:
         from cfmkit.studies.correction_by_solid_model import verified
 

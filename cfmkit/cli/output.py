@@ -214,10 +214,12 @@ class Bar:
         """Show nothing yet."""
         self._progress: Any = None
         self._task: Any = None
+        self._most = 0
 
     def report(self, fraction: float, text: str) -> None:
-        """Show how far a run is, by the share that is done."""
-        self.show(round(100 * fraction), 100, text)
+        """Show how far a run is, by the share that is done; a search that looks again does not move it back."""
+        self._most = max(self._most, round(100 * fraction))
+        self.show(self._most, 100, text)
 
     def show(self, done: int, total: int, text: str) -> None:
         """Show how many of how many things are done."""

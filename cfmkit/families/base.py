@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
@@ -90,6 +90,14 @@ class Run:
     def wants(self, names: Iterable[str]) -> bool:
         """Tell whether any of these metrics is looked at."""
         return self.wanted is None or not self.wanted.isdisjoint(names)
+
+    def part(self, begun: float, ended: float) -> Run:
+        """Return a run that is part of this one: what it calls done lies between two shares of the whole."""
+        return replace(self, progress=partial(_scaled, self.progress, begun, ended))
+
+
+def _scaled(progress: Callable[[float, str], None], begun: float, ended: float, fraction: float, text: str) -> None:
+    progress(begun + (ended - begun) * fraction, text)
 
 
 @dataclass(frozen=True)

@@ -264,7 +264,12 @@ def analysed(spec: Spec, run: Run) -> Report:
 
 def designed(spec: Spec, run: Run) -> Report:
     """Return the report on the designed mechanism, with the yield of its parts, or on why there is none."""
-    design = api.design(spec, run)
+    from cfmkit.specs.spec import DesignKeys
+    from cfmkit.studies.stated_or_assumed_tolerances import is_made
+
+    block = getattr(spec, "design", None)
+    many = isinstance(block, DesignKeys) and is_made(spec, block)
+    design = api.design(spec, run.part(0.0, 0.6) if many else run)
     result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
     found = run_outcome.report_on(result, design)
@@ -272,7 +277,7 @@ def designed(spec: Spec, run: Run) -> Report:
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part
-    return _of_many_parts(found, replace(result, spec=design.spec), spec, run)
+    return _of_many_parts(found, replace(result, spec=design.spec), spec, run.part(0.6, 1.0))
 
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:

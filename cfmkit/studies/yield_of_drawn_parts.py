@@ -392,14 +392,14 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     if made is None:
         return None
     values = made.drawn()
-    judged = judge(made, values, design, run)
+    judged = judge(made, values, design, run.part(0.0, 0.4))
     shared = common(made, design, run)
     frozen = None
     if shared:
         still = values.copy()
         still[:, shared] = made.nominal[list(shared)]
-        frozen = judge(made, still, design, run, "parts without common errors").share()
-    before, why = _before(given, block, run)
+        frozen = judge(made, still, design, run.part(0.4, 0.7), "parts without common errors").share()
+    before, why = _before(given, block, run.part(0.7, 1.0))
     each = tuple(judged.share(judged.met[:, [k]]) for k in range(judged.met.shape[1]))
     paths = tuple(made.paths[k] for k in shared)
     return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why, judged.lacking)

@@ -9,6 +9,7 @@ import sys
 
 import pytest
 
+from cfmkit.cli import output
 from cfmkit.cli.output import Terminal
 
 ESCAPE = "\x1b["
@@ -146,6 +147,15 @@ def test_points_that_are_drawn_again_are_counted_with_those_before(monkeypatch, 
 
 def test_progress_is_shown_where_somebody_watches(monkeypatch):
     assert "solving" in reported(monkeypatch, Watched(), Terminal())
+
+
+def test_a_bar_does_not_go_back(monkeypatch):
+    shown = []
+    bar = output.Bar()
+    monkeypatch.setattr(bar, "show", lambda done, total, text: shown.append((done, total, text)))
+    for fraction, text in ((0.2, "starts"), (1.0, "starts"), (0.75, "refinements")):
+        bar.report(fraction, text)
+    assert shown == [(20, 100, "starts"), (100, 100, "starts"), (100, 100, "refinements")]
 
 
 @pytest.mark.parametrize(

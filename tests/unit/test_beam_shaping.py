@@ -15,7 +15,7 @@ from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
-from cfmkit.families.beam.shaping import search
+from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
@@ -353,6 +353,63 @@ def test_the_widest_designs_are_widened_again_in_finer_orders_and_none_gets_narr
     ended = search.refined(task, begun, StartBudget())
     assert (ended.start, ended.order) == (3.5e-3, 4)
     assert search.refined(task, replace(begun, objective=0.5), StartBudget()).start == 4e-3
+
+
+def test_the_progress_of_a_search_never_goes_back_and_ends_at_one(monkeypatch) -> None:
+    """It had gone from 1 to 0.75 where the widest designs are refined."""
+    flat = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
+    for name in ("searched", "searched_far"):
+        monkeypatch.setattr(multistart, name, lambda _task, _seed, _index, plan: flat)
+    for name in ("widened", "nearer", "refined"):
+        monkeypatch.setattr(multistart, name, lambda _task, found, _plan: found)
+    monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
+    told: list[float] = []
+    for orders in ((1, 3), (1, 3, 4)):
+        told.clear()
+        task = replace(lan("range"), orders=orders)
+        explored(task, StartBudget(), (4, 2), "x", Run(progress=lambda share, _text: told.append(share)))
+        assert told == sorted(told)
+        assert told[-1] == pytest.approx(1.0)
+        assert len(set(told)) > 8
+
+
+def test_of_two_designs_of_a_start_the_wider_one_is_kept(monkeypatch) -> None:
+    """One is of the requested window, one of a window that begins farther; the three flattest of these are led on."""
+    near, far = (Found(np.zeros(17), 3, start, 0.02, 0.0, "", 0) for start in (4e-3, 3.4e-3))
+    bands = {0: 0.05, 1: 0.024, 2: 0.04, 3: 0.03, 4: 0.06}
+    led = {0.05: 5e-3, 0.024: 3.8e-3, 0.04: 4.5e-3, 0.03: 3.9e-3, 0.06: 1e-3}
+
+    def searched_far(_task: Task, _seed: int, index: int, plan: StartBudget) -> Found:
+        return replace(far, objective=bands[index])
+
+    def nearer(_task: Task, found: Found, _plan: StartBudget) -> Found:
+        return replace(found, start=led[found.objective], objective=0.02)
+
+    monkeypatch.setattr(multistart, "searched", lambda _task, _seed, _index, plan: near)
+    monkeypatch.setattr(multistart, "widened", lambda _task, found, _plan: found)
+    monkeypatch.setattr(multistart, "audited", lambda _variables, _found: None)
+    monkeypatch.setattr(multistart, "searched_far", searched_far)
+    monkeypatch.setattr(multistart, "nearer", nearer)
+    task = replace(lan("range"), orders=(1, 3))
+    ended = explored(task, StartBudget(), (5, 5), "x", Run())
+    assert {index: one.start for index, one in ended.found.items()} == {0: 4e-3, 1: 3.8e-3, 2: 4e-3, 3: 3.9e-3, 4: 4e-3}
+
+
+def test_a_widening_that_more_poses_refute_keeps_the_window_that_they_confirm(monkeypatch) -> None:
+    """Of one whose repair fails all was given up, though what they refuted kept the band over nearly its window."""
+    task = lan("range")
+    good = Found(np.zeros(17), 3, 6.8e-3, 0.02, 0.0, "", 0)
+    wide = replace(good, start=3.4e-3, objective=task.half_band)
+    monkeypatch.setattr(search, "_widest", lambda _task, _found, _plan: wide)
+    monkeypatch.setattr(search, "_repaired", lambda _task, _wide, kept, _plan: kept)
+    monkeypatch.setattr(search, "rounded", lambda _task, found: found)
+    monkeypatch.setattr(search, "looked_at", lambda _task, _network: object())
+    monkeypatch.setattr(search, "_shows_all", lambda _task, found, _view: found.start == good.start)
+    monkeypatch.setattr(
+        search, "_as_seen", lambda _task, found, _view: replace(found, start=3.6e-3) if found.start < 4e-3 else found
+    )
+    ended = search.widened(task, good, StartBudget())
+    assert (ended.start, ended.feasible) == (3.6e-3, True)
 
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:

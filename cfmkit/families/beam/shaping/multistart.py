@@ -1,24 +1,52 @@
-"""All starts of a design: each searched, the best of them widened, and what orders them."""
+"""All starts of a design: each searched, the best of them widened, and what orders them.
+
+For the widest window each start is searched twice: over the requested window, and over one that begins farther. Most
+starts end in one family of shapes, and what is flattest over the requested window seldom is in another one whose window
+can be widened farther.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.designing.run_many_starts import OneStart, Stage, done, restored
-from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, refined, searched, widened
+import numpy as np
+
+from cfmkit.designing.run_many_starts import Done, OneStart, Stage, done, restored
+from cfmkit.families.beam.shaping.search import (
+    VIOLATION,
+    Found,
+    StartBudget,
+    nearer,
+    refined,
+    searched,
+    searched_far,
+    widened,
+)
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.task import Task
 
 
 _REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little
+
+_LEADERS = 3  # of the flattest over a wider window: finishing one takes as long as a start
+
+_LASTS = {
+    "starts": 9.0,
+    "widenings": 5.0,
+    "starts over a wider window": 4.0,
+    "widenings of the flattest of these": 2.0,
+    "refinements": 5.0,
+}
+"""How long the stages of a search for the widest window last, one in units of another; where they are done in turn."""
 
 
 @dataclass(frozen=True)
@@ -61,53 +89,95 @@ def explored(task: Task, plan: StartBudget, counts: tuple[int, int], identity: s
         Seed, progress, processes, notes.
     """
     starts, wide = counts
-    widens = task.objective == "range"
-    share = 0.75 if widens else 1.0
-    one = OneStart(partial(searched, task.started, run.seed, plan=plan), plan.clock)
-    first = Stage(one, tuple(range(starts)), identity)
-    begun = done(first, run, plan.clock, partial(_tell, run, "starts", starts, (0.0, share)))
-    found, lost = {index: _found(begun.records[index]["found"]) for index in sorted(begun.records)}, begun.lost
-    if widens:
+    jobs = _Jobs(task, plan, identity, run)
+    begun = jobs.done("starts", partial(searched, task.started, run.seed, plan=plan), range(starts))
+    found, missing = _found_in(begun), starts - len(begun.records)
+    if task.objective == "range":
         best = dict(list(ranked(task, found))[:wide])
-        wider = OneStart(partial(_widened, task.started, best, plan), plan.clock)
-        second = Stage(wider, tuple(best), f"{identity} widened")
-        more = done(second, run, plan.clock, partial(_tell, run, "widenings", len(best), (share, 1.0)))
-        lost += more.lost
-        found |= {index: _found(record["found"]) for index, record in more.records.items()}
+        found |= _found_in(jobs.done("widenings", partial(_widened, task.started, best, plan), best))
+        distant = partial(searched_far, task.started, run.seed, plan=plan)
+        far = _found_in(jobs.done("starts over a wider window", distant, range(starts)))
+        leaders = dict(sorted(_within_limits(far), key=lambda item: item[1].objective)[:_LEADERS])
+        work = partial(_nearer, task.started, leaders, plan)
+        led = _found_in(jobs.done("widenings of the flattest of these", work, leaders))
+        found |= {index: one for index, one in led.items() if _better(task, one, found.get(index))}
     if task.orders != task.started.orders:
         widest = dict(list(ranked(task, found))[:_REFINED])
-        finer = OneStart(partial(_refined, task, widest, plan), plan.clock)
-        third = Stage(finer, tuple(widest), f"{identity} refined")
-        last = done(third, run, plan.clock, partial(_tell, run, "refinements", len(widest), (share, 1.0)))
-        lost += last.lost
-        found |= {index: _found(record["found"]) for index, record in last.records.items()}
+        found |= _found_in(jobs.done("refinements", partial(_refined, task, widest, plan), widest))
     audits = {index: audited(Variables(task, one.order), one) for index, one in ranked(task, found)}
-    return Explored(found, begun.reused, starts - len(found), lost, audits)
+    return Explored(found, begun.reused, missing, tuple(jobs.lost), audits)
 
 
-def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: Mapping[int, dict[str, Any]]) -> None:
-    found = [record["found"] for record in records.values() if record["found"]]
-    feasible = sum(one["violation"] <= VIOLATION for one in found)
-    text = f"{len(records)} of {count} {what}, {feasible} meet all limits"
-    run.progress(share[0] + (share[1] - share[0]) * len(records) / max(1, count), text)
+@dataclass
+class _Jobs:
+    """What does the stages of a search one after the other, tells how far it is, and keeps why processes died."""
+
+    task: Task
+    plan: StartBudget
+    identity: str
+    run: Run
+    lost: list[str] = field(default_factory=list)
+
+    def done(self, what: str, search: Callable[[int], Found | None], numbers: Iterable[int]) -> Done:
+        """Return what the jobs of a stage led to; it is called by what its jobs are."""
+        numbers = tuple(numbers)
+        stage = Stage(OneStart(search, self.plan.clock), numbers, f"{self.identity} {what}")
+        begun, ended = _shares(self.task)[what]
+
+        def tell(records: Mapping[int, dict[str, Any]]) -> None:
+            found = [record["found"] for record in records.values() if record["found"]]
+            feasible = sum(one["violation"] <= VIOLATION for one in found)
+            text = f"{len(records)} of {len(numbers)} {what}, {feasible} meet all limits"
+            self.run.progress(begun + (ended - begun) * len(records) / max(1, len(numbers)), text)
+
+        outcome = done(stage, self.run, self.plan.clock, tell)
+        self.lost += outcome.lost
+        return outcome
+
+
+def _shares(task: Task) -> dict[str, tuple[float, float]]:
+    """Return between which shares of the whole search each stage of a task lies."""
+    lasts = dict(_LASTS)
+    if task.objective != "range":
+        lasts = {"starts": 1.0}
+    elif task.orders == task.started.orders:
+        del lasts["refinements"]
+    ends = np.cumsum([0.0, *lasts.values()]) / sum(lasts.values())
+    return dict(zip(lasts, pairwise(ends.tolist()), strict=True))
 
 
 def _widened(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
     return widened(task, designs[index], plan)
 
 
+def _nearer(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
+    return nearer(task, designs[index], plan)
+
+
 def _refined(task: Task, designs: dict[int, Found], plan: StartBudget, index: int) -> Found:
     return refined(task, designs[index], plan)
 
 
-def _found(record: dict[str, Any]) -> Found | None:
-    return restored(Found, record) if record else None
+def _found_in(stage: Done) -> dict[int, Found | None]:
+    """Return the designs of a stage by the number of the start; None where nothing could be followed."""
+    records = {index: stage.records[index]["found"] for index in sorted(stage.records)}
+    return {index: restored(Found, record) if record else None for index, record in records.items()}
 
 
-def ranked(task: Task, found: dict[int, Found | None]) -> Iterator[tuple[int, Found]]:
+def _better(task: Task, one: Found | None, other: Found | None) -> bool:
+    """Tell whether one design of a start takes the place of the other."""
+    if one is None or not one.feasible:
+        return False
+    return other is None or not other.feasible or rank_of(task, one) < rank_of(task, other)
+
+
+def ranked(task: Task, found: Mapping[int, Found | None]) -> Iterator[tuple[int, Found]]:
     """Yield the designs that meet all limits, the best first."""
-    feasible = [(index, one) for index, one in found.items() if one is not None and one.feasible]
-    yield from sorted(feasible, key=lambda item: rank_of(task, item[1]))
+    yield from sorted(_within_limits(found), key=lambda item: rank_of(task, item[1]))
+
+
+def _within_limits(found: Mapping[int, Found | None]) -> list[tuple[int, Found]]:
+    return [(index, one) for index, one in found.items() if one is not None and one.feasible]
 
 
 def rank_of(task: Task, one: Found) -> tuple[bool, float, float]:

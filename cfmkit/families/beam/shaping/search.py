@@ -55,6 +55,8 @@ _TOLERANCE = 1e-5  # of the objective
 _FLAT = 0.05  # a random network with this half band is flat enough to begin with
 _ENOUGH = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
 _FAR = 3.0  # times that band: so far from it, what bends only is not taken on
+_FAR_START = 0.5  # of the start of the requested window: where the window begins that starts are compared over
+_FEW = 9  # poses in that window
 _ROUNDS = 6  # towards the limits
 _HOPELESS = 0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
 _STIFF = 0.2  # one with this is a spring, and not looked at further
@@ -156,6 +158,37 @@ def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | No
     if found.violation > _HOPELESS or (task.objective == "range" and found.objective > _FAR * task.half_band):
         return found
     return finished(task, found if found.feasible else met(task, found, found.order, plan), plan)
+
+
+def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
+    """Return the random network of a start flattened in the finest order at once, over a window that begins farther.
+
+    It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
+    requested one: order by order a start ends in another family of shapes. None where nothing could be followed.
+
+    Parameters
+    ----------
+    task, seed, index, plan : Task, int, int, StartBudget
+        As of `searched`.
+    """
+    task = replace(task, orders=task.orders[-1:], points=_FEW)
+    first, far = task.first, _FAR_START * task.window[0]
+    begun = _begun(first, np.random.default_rng([seed, index]), replace(plan, tries=1))
+    if begun is None:
+        return None
+    found = improved(first, modelled(first, replace(begun, start=far)), plan)
+    if first is task:
+        return found
+    found = modelled(task, found)
+    hopeless = found.violation > _HOPELESS or found.objective > _FAR * task.half_band
+    return found if hopeless else improved(task, found, plan)
+
+
+def nearer(task: Task, found: Found, plan: StartBudget) -> Found:
+    """Return a design that was flattened over a window that begins farther, flattened and widened as any other."""
+    far = modelled(task, found)
+    flat = far.feasible and far.objective <= task.half_band
+    return widened(task, finished(task, far if flat else replace(far, start=task.window[0]), plan), plan)
 
 
 def _begun(task: Task, rng: np.random.Generator, plan: StartBudget) -> Found | None:
@@ -376,14 +409,18 @@ def widened(task: Task, found: Found, plan: StartBudget) -> Found:
     if task.objective != "range" or not (found.feasible and found.objective <= task.half_band):
         return found
     good, task = found, replace(task, points=found.points)
-    wide = _widest(task, good, plan)
+    refuted: list[Found] = []
 
     def again(finer: Task, design: Found) -> Found:
+        refuted.append(design)
         return _repaired(finer, design, replace(good, evaluations=design.evaluations), plan)
 
-    wide = confirmed(task, wide, plan, again)
-    kept = wide.feasible and wide.start < good.start and wide.objective <= task.half_band
-    return wide if kept else replace(good, evaluations=wide.evaluations)
+    wide = confirmed(task, _widest(task, good, plan), plan, again)
+    # what more poses refute keeps the band over a narrower window, which may be wider than what the repair came to
+    narrower = (_as_seen(task, one, looked_at(task, Variables(task, one.order).build(one.x))) for one in refuted)
+    kept = [one for one in (good, *narrower, wide) if one.feasible and one.objective <= task.half_band]
+    widest = min(reversed(kept), key=lambda one: one.start)
+    return replace(widest, evaluations=wide.evaluations + len(refuted))
 
 
 def refined(task: Task, found: Found, plan: StartBudget) -> Found:
