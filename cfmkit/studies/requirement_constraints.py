@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -290,19 +290,19 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
 
     Where its curve ends a little earlier they are those at its end; None where it does not get to what must be reached.
     """
-    found = _quickly(spec, places)
+    found = quickly_sampled(spec, places)
     if found is not None:
         return found
-    return _on_curves(family(spec.family).analyze(spec, replace(run, wanted=frozenset())), places, reached)
+    return sampled_on_curves(family(spec.family).analyze(spec, replace(run, wanted=frozenset())), places, reached)
 
 
-def _quickly(spec: Spec, places: FloatArray) -> Sampled | None:
+def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
     """Return effort and stress of a part at places by the family's quick way; None where it has none."""
     quick = family(spec.family).sampled
     return None if quick is None else function_named(quick)(spec, places)
 
 
-def _on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
+def sampled_on_curves(result: Result, places: FloatArray, reached: tuple[float, ...]) -> Sampled | None:
     """Return effort and stress at places of the curves of a part, as `sampled_of` does."""
     if result.status is not Status.COMPLETE or not result.curves:
         return None
@@ -333,11 +333,11 @@ def numbers_in(seen: Sampled) -> FloatArray:
 
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
     """Return what rows look at of a part, (q,); None where it has no such numbers; `reached`: see `sampled_of`."""
-    found, result = _quickly(spec, rows.places), None
+    found, result = quickly_sampled(spec, rows.places), None
     if found is None:
         result = _looked_at(spec, rows, run)
-        found = _on_curves(result, rows.places, reached)
-    if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
+        found = sampled_on_curves(result, rows.places, reached)
+    if not _has_columns(found, rows):
         return None
     numbers = [numbers_in(found)]
     if rows.metrics:
@@ -346,6 +346,29 @@ def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float
             return None
         numbers.append(metrics)
     return np.concatenate(numbers)
+
+
+def numbers_of_known(result: Result, quick: Sampled | None, rows: RequirementRows) -> FloatArray | None:
+    """Return `numbers_of` a part that was analysed and looked at the quick way already: nothing is solved again.
+
+    Parameters
+    ----------
+    result : Result
+        Its analysis, with all metrics.
+    quick : Sampled or None
+        From `quickly_sampled`, at the places of the rows; None of a family without a quick way.
+    rows : RequirementRows
+        What is looked at; windows that are stated in its specification must be reached.
+    """
+    found = sampled_on_curves(result, rows.places, stated_places(result.spec)) if quick is None else quick
+    if not _has_columns(found, rows):
+        return None
+    return np.concatenate([numbers_in(found), metrics_in(result, rows)]) if rows.metrics else numbers_in(found)
+
+
+def _has_columns(found: Sampled | None, rows: RequirementRows) -> TypeGuard[Sampled]:
+    """Return whether a part was seen, with the branches and stresses that rows look at."""
+    return found is not None and tuple(found.effort) == rows.branches and len(found.stress) == rows.stresses
 
 
 def _looked_at(spec: Spec, rows: RequirementRows, run: Run) -> Result:

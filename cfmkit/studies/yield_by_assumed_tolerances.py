@@ -15,13 +15,14 @@ from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.requirement_constraints import (
-    metrics_in,
     metrics_of_part,
     numbers_in,
     numbers_of,
+    numbers_of_known,
     places_of,
+    quickly_sampled,
     rows_of,
-    sampled_of,
+    sampled_on_curves,
     stated_places,
 )
 from cfmkit.studies.stated_or_assumed_tolerances import MODULUS, assumed
@@ -112,21 +113,22 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     spec = result.spec
     paths = [*found.deviations, *([MODULUS] if found.modulus else [])]
     places = places_of(result)
-    first = sampled_of(spec, places, run)
-    rows = None if first is None else rows_of(result, first, places)
-    middle = None if rows is None else _numbers(spec, rows, run)
-    if rows is None or middle is None:
+    quick = quickly_sampled(spec, places)
+    first = sampled_on_curves(result, places, ()) if quick is None else quick
+    if first is None:
         raise YieldUnknown("the design cannot be followed at a few poses")
+    rows = rows_of(result, first, places)
+    middle = _complete(numbers_of_known(result, quick, rows))
     exact = {path: numbers_in(one) for path, one in exact_slopes(spec, places, paths).items()}
     by_looks = bool(rows.metrics) or len(exact) < len(paths)
     if by_looks and 2 * len(paths) > most_parts(spec, by_looks=not rows.metrics):
-        quick = family(spec.family).sampled is not None and not rows.metrics
-        raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
+        looks = family(spec.family).sampled is not None and not rows.metrics
+        raise YieldUnknown(f"it needs {2 * len(paths)} {'parts' if looks else 'analyses'}, and takes a while")
     if rows.metrics and (thin := _thinned(result)) is not None:
-        numbers = _numbers(thin, rows, run)
         count = len(rows.metrics)
-        if np.allclose(numbers[-count:], metrics_in(result, rows), rtol=ALIKE, atol=0.0):
-            spec, middle = thin, numbers
+        numbers = _numbers(thin, rows, run, whole=quick is None)
+        if np.allclose(numbers[-count:], middle[-count:], rtol=ALIKE, atol=0.0):
+            spec, middle = thin, np.concatenate([middle[: len(middle) - len(numbers)], numbers])
     generator = np.random.default_rng([run.seed, 17])
     moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
     nominal = {path: float(spec.at(path)) for path in paths}
@@ -186,6 +188,11 @@ def _numbers(spec: Spec, rows: RequirementRows, run: Run, whole: bool = True) ->
         found = numbers_of(spec, rows, run, stated_places(spec)) if whole else metrics_of_part(spec, rows, run)
     except CfmError as error:
         raise YieldUnknown(str(error)) from None
+    return _complete(found)
+
+
+def _complete(found: FloatArray | None) -> FloatArray:
+    """Return numbers of a part, if it has them all: else the estimate ends."""
     if found is None or not np.isfinite(found).all():
         raise YieldUnknown(
             "a part near the design has no curve, or it ends within a window of the requirements (windows in shares of "

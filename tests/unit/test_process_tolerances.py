@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cfmkit
+from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.processes import PROCESSES
+from cfmkit.studies import requirement_constraints
 from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances_of
 from cfmkit.studies.yield_by_assumed_tolerances import expected, first_order_shares
 from cfmkit.studies.yield_of_drawn_parts import judge
@@ -56,3 +60,31 @@ def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does
     toleranced = cam.replace({"design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}})
     found = designed(toleranced.replace({"design.samples": 20}), Run())
     assert "made" not in dict(found.supplement.lines)
+
+
+def test_the_estimate_does_not_solve_the_design_again(monkeypatch):
+    """Its analysis is known, and what was seen of it at a few poses: only its neighbours are solved."""
+    spec = cfmkit.load("configs/beam_design_arch.yaml").replace(
+        {"design": None, "requirements": ({"metric": "range_95_fraction", "min": "20 %"},)}
+    )
+    result = cfmkit.analyze(spec)
+    record, solved, looked = family(spec.family), [], []
+    analyze, sampled = record.analyze, requirement_constraints.function_named(record.sampled)
+
+    def analysed(part, run):
+        solved.append(part)
+        return analyze(part, run)
+
+    def seen(part, places):
+        looked.append(part)
+        return sampled(part, places)
+
+    changed = SimpleNamespace(analyze=analysed, sampled=record.sampled)
+    monkeypatch.setattr(requirement_constraints, "family", lambda _name: changed)
+    monkeypatch.setattr(requirement_constraints, "function_named", lambda _name: seen)
+    first_order_shares(result, assumed(spec), Run())
+    nominal = spec.mechanism.model_dump()
+    assert sum(part.mechanism.model_dump() == nominal for part in looked) == 1
+    again = [part for part in solved if part.mechanism.model_dump() == nominal]
+    assert all(part.analysis.points < spec.analysis.points for part in again)  # once with fewer points, if any
+    assert len(again) <= 1 < len(solved)
