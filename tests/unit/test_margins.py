@@ -288,6 +288,21 @@ def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path
     assert 60 <= float(found["nearest_feasible"]["design.yield"].removesuffix(" %")) <= 85
 
 
+def test_a_tolerance_that_no_beam_design_meets_ends_with_4_and_names_it(monkeypatch):
+    for name, value in (("CHECKED", 40), ("ROUNDS", 1), ("LOWER", 0)):
+        monkeypatch.setattr(redesign_for_yield, name, value)
+    spec = cfmkit.load(LAN)
+    wide = {**spec.design.tolerances, "mechanism.nodes.n3.at.0": {"normal": "2 mm"}}
+    given = spec.replace({"design.tolerances": wide, "design.robust": None})
+    design = with_design_margins(given, cfmkit.results.Design(given, cfmkit.results.Status.COMPLETE), Run())
+    assert design.spec is None
+    assert design.status.exit_code == 4
+    assert "the tolerance that costs most is that of mechanism.nodes.n3.at.0:" in design.message
+    # 400 parts of the same command: 34 % at most
+    assert 10 <= float(design.nearest_feasible["design.yield"].removesuffix(" %")) <= 60
+    assert "% at most, of 40 that were solved" in design.message
+
+
 def with_three_springs(elongation):
     springs = [
         {"name": name, "stiffness": f"{rate} N/mm", "max_elongation": "300 mm", "counts": [2]}
