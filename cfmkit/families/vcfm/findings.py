@@ -359,14 +359,12 @@ def _imperfect(solution: Solution) -> Iterator[Finding]:
     push = solution.nominal
     if not push.leaves.stable.all():
         lost = push.travel[~push.leaves.stable]
-        reported = (
-            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
-        )
+        text = f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
         if solution.spec.analysis.branch == "stable":
-            yield finding("unstable_branch", f"{reported}, which was not found")
+            yield finding("unstable_branch", f"{text}, which was not found")
         else:
             follow = "analysis.branch: stable follows them"
-            yield finding("unstable_branch", f"{reported}: {follow}", "analysis.branch=stable")
+            yield finding("unstable_branch", f"{text}: {follow}", "analysis.branch=stable")
 
 
 def _range(solution: Solution) -> Iterator[Finding]:
@@ -428,17 +426,15 @@ def _spring_range(solution: Solution) -> Iterator[Finding]:
     worst = max(ends, key=lambda end: end / PRESSED if end > 0 else -end / STRETCHED)
     share = abs(worst) / (2.0 * length)
     if angle > STEEP:
-        reported = (
-            f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
-        )
+        text = f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
     elif share > (PRESSED if worst > 0 else STRETCHED):
         what = "compressed" if worst > 0 else "stretched"
-        reported = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
+        text = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
     else:
         return
     yield finding(
         "theory_range",
-        f"{reported}; the closed form's constant stiffness is off by several per cent: verify with "
+        f"{text}; the closed form's constant stiffness is off by several per cent: verify with "
         "'analysis.fidelity: exact'",
         "analysis.fidelity=exact",
     )
