@@ -159,14 +159,13 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
-    run = run or Run()
-    asked = getattr(spec, "design", None)
-    margins = getattr(asked, "yield", None) is not None
-    found = record.design(spec, run.part(0.0, 0.5) if margins else run)
-    if margins:
+    run, asked = run or Run(), getattr(spec, "design", None)
+    if getattr(asked, "yield", None) is None:
+        found = record.design(spec, run)
+    else:
         from cfmkit.studies.redesign_for_yield import with_design_margins
 
-        found = with_design_margins(spec, found, run.part(0.5, 1.0))
+        found = with_design_margins(spec, record.design(spec, run.part(0.0, 0.5)), run.part(0.5, 1.0))
     if getattr(asked, "verify", None) is not None:
         from cfmkit.studies.correction_by_solid_model import verified
 

@@ -19,7 +19,8 @@ from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
-from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, looked_at, searched
+from cfmkit.families.beam.shaping.response import looked_at
+from cfmkit.families.beam.shaping.search import Found, StartBudget, confirmed, improved, searched
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
     NetworkScatter,
     audited,
