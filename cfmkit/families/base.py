@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
+    from cfmkit.specs.units import Ends
 
 
 def _silent(_fraction: float, _text: str) -> None:
@@ -108,12 +110,13 @@ class Measure:
     ----------
     name : str
         ``force_ripple``, ``theoretical_force``; never with a branch in brackets.
-    window : tuple of (float, float), optional
-        Ends of the window [m or rad]; None: the full travel.
+    window : tuple of WindowEnd, optional
+        Ends of the window [m or rad], or shares of each variant's own travel, where the family's blocks take
+        them (`Family.block_shares`); None: the full travel.
     """
 
     name: str
-    window: tuple[float, float] | None = None
+    window: Ends | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,11 @@ class Block:
     values: Mapping[str, NDArray[Any]]
     measures: tuple[Measure, ...]
     size: int
+
+    def in_places(self, travel: tuple[float, float]) -> Block:
+        """Return the block with places for shares of a travel that all variants have, from its start to its end."""
+        measures = (Measure(one.name, between(one.window, travel) if one.window else None) for one in self.measures)
+        return Block(self.values, tuple(measures), self.size)
 
 
 @dataclass(frozen=True)
@@ -349,9 +357,8 @@ class Family:
     analyze_block : callable, optional
         ``analyze_block(spec, block) -> answer``: many variants of a specification at once;
         None where the model cannot vary these paths or measure these metrics.
-    block_travel : callable, optional
-        ``block_travel(spec, paths) -> (start, end) or None``: the travel that every variant of a block over these
-        paths has, so that windows in shares of it are places; None where each has its own.
+    block_shares : bool
+        Whether `analyze_block` takes windows whose ends are shares of the travel, which each variant has of its own.
     gradient : callable, optional
         ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
         metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
@@ -415,7 +422,7 @@ class Family:
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
-    block_travel: Callable[[Any, Sequence[str]], tuple[float, float] | None] | None = None
+    block_shares: bool = False
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     sampled: str | None = None
     sampled_slopes: str | None = None

@@ -10,7 +10,7 @@ from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.requirements import ROUNDING, Bounds
-from cfmkit.specs.units import Share, between
+from cfmkit.specs.units import Share
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import BlockAnswer
     from cfmkit.metrics import Definition
+    from cfmkit.specs.units import Ends
     from cfmkit.studies.plan import Plan
     from cfmkit.studies.point_evaluation import Study
 
@@ -76,13 +77,10 @@ def _warned(answer: BlockAnswer, singly: list[int], rest: ResultRows) -> dict[st
 
 def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:
     record = family(study.spec.family)
-    model, travel = record.analyze_block, None
-    if model is not None and _follows_the_travel(study):
-        travel = record.block_travel and record.block_travel(study.spec, plan.paths)
-        model = travel and model
-    if model is None:
+    model = record.analyze_block
+    if model is None or (_follows_the_travel(study) and not record.block_shares):
         return None
-    values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study, travel)
+    values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study)
     renamed = tuple(Measure(other_name(one.name), one.window) for one in asked)
     with np.errstate(all="ignore"):
         found = model(study.spec, Block(values, asked, stop - start))
@@ -92,28 +90,24 @@ def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | No
 
 
 def _follows_the_travel(study: Study) -> bool:
-    """Return whether some window is a share of the travel: blocks have places, which are the same for all points."""
+    """Return whether some window is a share of the travel, which each point may have of its own."""
     windows = [*(ends for _, ends in study.spec.windows()), *(one.over for one in study.metrics if one.over)]
     return any(isinstance(end, Share) for ends in windows for end in ends)
 
 
-def measures(study: Study, travel: tuple[float, float] | None = None) -> tuple[Measure, ...]:
-    """Return what is asked of each point: the metrics, then the requirements.
-
-    travel: by which shares of it become places; they have none without it.
-    """
+def measures(study: Study) -> tuple[Measure, ...]:
+    """Return what is asked of each point: the metrics, then the requirements."""
     asked = [(one.name, one.over) for one in study.metrics]
     asked += [(one.metric, one.over) for one in study.spec.part_requirements]
-    return tuple(Measure(split_name(name)[0], _places(study, over, travel)) for name, over in asked)
+    return tuple(Measure(split_name(name)[0], _window(study, over)) for name, over in asked)
 
 
-def _places(
-    study: Study, over: tuple[float, float] | None, travel: tuple[float, float] | None
-) -> tuple[float, float] | None:
+def _window(study: Study, over: Ends | None) -> Ends | None:
     ends = over or getattr(getattr(study.spec, "analysis", None), "window", None)
     if ends is None:
         return None
-    return (float(ends[0]), float(ends[1])) if travel is None else between(ends, travel)
+    start, stop = (end if isinstance(end, Share) else float(end) for end in ends)
+    return start, stop
 
 
 def _columns(study: Study, answer: BlockAnswer) -> FloatArray:

@@ -273,6 +273,14 @@ HEAVY = {
     "mechanism.masses": {"slider": "0.068 kg", "brace": "0.077 kg", "roller": "0.38 kg"},
     "analysis.gravity": True,
 }
+SHARES = {
+    "analysis.window": ("2 mm", "100 %"),
+    "requirements": [
+        {"metric": "deviation_from_target", "max": "5 %", "over": ("2.1 %", "97.7 %")},
+        {"metric": "band_range_1pct", "min": "100 mm", "over": ("10 %", "180 mm")},
+        {"metric": "force_mean[load]", "min": "49.6 N", "max": "51.8 N", "over": ("5 mm", "235 mm")},
+    ],
+}
 PRESSED = {"mechanism.contact": {"width": "8 mm"}}
 
 
@@ -283,6 +291,8 @@ PRESSED = {"mechanism.contact": {"width": "8 mm"}}
         (WINDOW | PRESSED, AROUND | {"mechanism.contact.width": "6 mm:10 mm"}),
         (HEAVY | PRESSED, AROUND | {"mechanism.masses.roller": "0.2 kg:0.5 kg"}),
         ({"analysis.travel": None, "analysis.window": ("2 mm", "240 mm")}, AROUND),
+        ({"analysis.travel": None} | SHARES, AROUND),
+        (PRESSED | SHARES, AROUND),
         (WINDOW | BARE, SMALL),
         (WINDOW | BARE | HEAVY, SMALL),
         (WINDOW | BARE, {"mechanism.rolling_friction": "0:0.01"}),
@@ -291,7 +301,21 @@ PRESSED = {"mechanism.contact": {"width": "8 mm"}}
         (WINDOW | PRESSED | {"mechanism.profile.offset": "-0.1 mm"}, AROUND),
         (WINDOW, AROUND | {"mechanism.brace_length": "190 mm:260 mm", "mechanism.rolling_friction": "0:0.1"}),
     ],
-    ids=("plain", "contact", "weights", "stroke", "bare", "heavy", "jams", "friction", "carrying", "offset", "wide"),
+    ids=(
+        "plain",
+        "contact",
+        "weights",
+        "stroke",
+        "shares",
+        "shares of a travel",
+        "bare",
+        "heavy",
+        "jams",
+        "friction",
+        "carrying",
+        "offset",
+        "wide",
+    ),
 )
 def test_every_metric_of_one_cut_cam_with_other_parts_is_that_of_each(changes, ranges):
     spec = cfmkit.load("configs/studies/cam_tolerance.yaml").replace(changes)
@@ -319,6 +343,27 @@ def test_every_metric_of_one_cut_cam_with_other_parts_is_that_of_each(changes, r
         assert not wrong.any(), [
             (metrics[m].name, together.row(k).values[0, m], expected[m]) for m in wrong.nonzero()[0]
         ]
+
+
+def test_shares_of_the_travel_are_those_of_each_stroke_in_a_block():
+    shares = {"analysis.window": ("1 %", "95 %"), "requirements": []}
+    many = work(SPEC.replace(shares), {"mechanism.profile.stroke": "150 mm:245 mm"}, 16, BUILT_NAMES)
+    answer = vectorised_blocks._answer(many.study, many.plan, 0, 16)
+    assert answer.done.all()
+    rows = run(many)
+    for k in range(16):
+        alone = many.study.evaluate(many.plan.point(k)).values
+        np.testing.assert_allclose(rows.row(k).values[0], np.array(alone, float), rtol=1e-12, err_msg=str(k))
+
+
+def test_a_window_that_some_travels_leave_no_width_is_refused_as_each_mechanism_refuses_it():
+    spec = cfmkit.load("configs/studies/cam_tolerance.yaml").replace(
+        {"analysis.travel": None, "analysis.window": ("240 mm", "100 %"), "requirements": []}
+    )
+    many = work(spec, {"mechanism.springs.stiffness.0": "0.65 N/mm:0.73 N/mm"}, 4, ("force_mean",))
+    assert {run(many).row(k).status(0) for k in range(4)} == {
+        (alone.status, alone.message) for alone in (many.study.evaluate(many.plan.point(k)) for k in range(4))
+    }
 
 
 def test_forces_on_the_corner_of_an_undercut_cam_do_not_depend_on_the_number_of_points():

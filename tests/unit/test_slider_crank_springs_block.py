@@ -207,3 +207,13 @@ def test_a_sensitivity_of_a_word_is_refused():
     block = {"metrics": ("stiffness_class",), "parameters": {"mechanism.springs.slider": ("0.09 N/mm", "0.11 N/mm")}}
     with pytest.raises(cfmkit.SpecError, match="is a word"):
         prepare(config("li2019", sensitivity=block))
+
+
+def test_a_block_takes_windows_that_are_shares_of_the_travel():
+    spec = config("bilancia2019").replace({"analysis.window": ("10 %", "77 %"), "requirements": []})
+    block = Block({PATHS[1]: np.array([0.03, 0.04])}, (Measure("force_mean", spec.analysis.window),), 2)
+    found = analyze_block(spec, block)
+    assert found.done.all()
+    alone = [cfmkit.analyze(spec.replace({PATHS[1]: rate})) for rate in (0.03, 0.04)]
+    expected = [api.evaluate(one, ["force_mean"])["force_mean"].value for one in alone]
+    assert found.values[0]["load"].tolist() == pytest.approx(expected, rel=1e-12)

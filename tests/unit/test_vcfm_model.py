@@ -485,3 +485,21 @@ def test_a_travel_of_nanometres_behind_a_preload_needs_no_billion_points(config)
     )
     found = cfmkit.analyze(spec)
     assert all(len(curve) <= 30 * spec.analysis.points for curve in found.curves)
+
+
+def test_a_block_takes_windows_that_are_shares_of_the_travel():
+    spec = table_i().replace(
+        {
+            "analysis.fidelity": "analytic",
+            "analysis.travel": "8 mm",
+            "analysis.window": ("30 %", "80 %"),
+            "requirements": [],
+        }
+    )
+    widths = np.array([6e-3, 7e-3])
+    block = Block({"mechanism.bistable.width": widths}, (Measure("force_mean", spec.analysis.window),), 2)
+    found = analyze_block(spec, block)
+    assert found.done.all()
+    alone = [cfmkit.analyze(spec.replace({"mechanism.bistable.width": width})) for width in widths]
+    expected = [evaluate(one, ["force_mean"])["force_mean"].value for one in alone]
+    assert found.values[0]["load"].tolist() == pytest.approx(expected, rel=1e-12)

@@ -30,6 +30,7 @@ FAMILY = Family(
     propose="cfmkit.families.vcfm.proposals_for_wish:propose",
     room="cfmkit.families.vcfm.bounding_box:room",
     analyze_block=when_called("cfmkit.families.vcfm.many_designs:analyze_block"),
+    block_shares=True,
     headline=(
         "constant_force",
         "window_force",

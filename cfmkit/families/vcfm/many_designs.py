@@ -69,6 +69,9 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         The variants and the measures.
     """
     names = {measure.name for measure in block.measures}
+    if spec.analysis.travel is None:
+        return None
+    block = block.in_places((0.0, spec.travel))
     if not _applies(spec, block) or not names <= set(SCALARS) | set(METRICS):
         return None
     values = [np.full(block.size, np.nan) for _ in block.measures]
@@ -94,7 +97,6 @@ def _applies(spec: VcfmSpec, block: Block) -> bool:
         and mechanism.kinds == ("diamond", "v-beam")
         and mechanism.bistable.flexure_length is None  # which bounds the length
         and analysis.preloads[0] == 0
-        and analysis.travel is not None
     )
     ends = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
     inside = all(low >= 0 and high <= spec.travel for low, high in ends)

@@ -18,6 +18,7 @@ from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.families.cam.statics import levers
 from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.ranges_many import ManyBranches
+    from cfmkit.specs.units import Ends
 
 
 @dataclass(frozen=True)
@@ -340,11 +342,24 @@ class Slab:
         corner = np.minimum(self.corner_travel, self.travel[:, -1])
         return corner[:, None] * ON_CORNER if corner.any() else None
 
-    def inside(self, branch: str, window: Any) -> CutWindows:
+    @property
+    def requested(self) -> FloatArray:
+        """Travel of which windows may be shares, (d,) [m]."""
+        return self.designs.stroke
+
+    def ends(self, window: Ends | None) -> tuple[FloatArray, FloatArray] | None:
+        """Return where a window starts and ends on the travel of each design, (d,) each [m]; None: all of it."""
+        if window is None:
+            return None
+        whole = np.ones(len(self.designs))
+        first, second = (float(end) * (self.requested if isinstance(end, Share) else whole) for end in window)
+        return np.minimum(first, second), np.maximum(first, second)
+
+    def inside(self, branch: str, window: Ends | None) -> CutWindows:
         """Return the forces of one branch inside a window."""
         if (branch, window) not in self.cut_windows:
             sampled = self._loading if branch == "load" else self._unloading
-            self.cut_windows[branch, window] = CutWindows(sampled, window)
+            self.cut_windows[branch, window] = CutWindows(sampled, self.ends(window))
         return self.cut_windows[branch, window]
 
     @cached_property

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
     Exact = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
+    Places = tuple[FloatArray, FloatArray] | None
+    """Where the window of each cam starts and ends, (d,) each [m]; None: the whole travel."""
 
 _SLACK = 1e-9
 
@@ -67,8 +69,8 @@ class SampledBranch:
 class CutWindows(ManyWindows):
     """What one branch of many cams has inside a window: each cam its own samples, those alike worked on together."""
 
-    def __init__(self, sampled: SampledBranch, window: tuple[float, float] | None) -> None:
-        """Cut the window out."""
+    def __init__(self, sampled: SampledBranch, window: Places) -> None:
+        """Cut the window of each cam out."""
         self.count = len(sampled.values)
         ways = _ways(sampled, window)
         _, first, which = np.unique(ways, axis=0, return_index=True, return_inverse=True)
@@ -76,7 +78,7 @@ class CutWindows(ManyWindows):
             self.parts = [(np.arange(self.count), _part(sampled, window, ways[0]))]
             return
         groups = [np.flatnonzero(which.ravel() == k) for k in range(len(first)) if ways[first[k], 1]]
-        self.parts = [(rows, _part(sampled.take(rows), window, ways[rows[0]])) for rows in groups]
+        self.parts = [(rows, _part(sampled.take(rows), _of(window, rows), ways[rows[0]])) for rows in groups]
 
     def _each(self, number: Callable[[ManyWindows], FloatArray]) -> FloatArray:
         found = np.full(self.count, np.nan)
@@ -105,7 +107,11 @@ class CutWindows(ManyWindows):
         return self._each(lambda part: part.work)
 
 
-def _ways(sampled: SampledBranch, window: tuple[float, float] | None) -> NDArray[np.intp]:
+def _of(window: Places, rows: NDArray[np.intp]) -> Places:
+    return None if window is None else (window[0][rows], window[1][rows])
+
+
+def _ways(sampled: SampledBranch, window: Places) -> NDArray[np.intp]:
     """Return how the window cuts each cam's samples: first and past the last inside, ends added, peaks inside.
 
     Nothing is inside a window that is not covered.
@@ -116,18 +122,18 @@ def _ways(sampled: SampledBranch, window: tuple[float, float] | None) -> NDArray
     if window is None:
         ways[:, 1] = travel.shape[1]
     else:
-        ends = np.array(window)
-        slack = _SLACK * (ends[1] - ends[0])
+        low, high = window
         # The curves of one cam, or of many with one stroke, are cut alike: one of them tells it of all.
-        some = travel[:1] if (travel == travel[:1]).all() else travel
-        start, stop = (some < ends[0] - slack).sum(axis=1), (some <= ends[1] + slack).sum(axis=1)
+        alike = all((each == each[:1]).all() for each in (travel, low, high))
+        some, first, final = (each[:1] if alike else each for each in (travel, low, high))
+        slack = _SLACK * (final - first)
+        start, stop = (some < (first - slack)[:, None]).sum(axis=1), (some <= (final + slack)[:, None]).sum(axis=1)
         every, last = np.arange(len(some)), travel.shape[1] - 1
-        outside = (some[:, 0] > ends[0] + slack) | (some[:, -1] < ends[1] - slack)
+        outside = (some[:, 0] > first + slack) | (some[:, -1] < final - slack)
         ways[:, 0], ways[:, 1] = start, np.where(outside, 0, stop)
-        ways[:, 2] = (start < stop) & (some[every, np.minimum(start, last)] > ends[0] + slack)
-        before = some[every, np.maximum(stop - 1, 0)] < ends[1] - slack
+        ways[:, 2] = (start < stop) & (some[every, np.minimum(start, last)] > first + slack)
+        before = some[every, np.maximum(stop - 1, 0)] < final - slack
         ways[:, 3] = (start < stop) & before & (stop <= last)
-        low, high = np.full(count, ends[0]), np.full(count, ends[1])
     if sampled.peaks is None:
         return ways
     between = (sampled.peaks > low[:, None]) & (sampled.peaks < high[:, None])
@@ -136,13 +142,12 @@ def _ways(sampled: SampledBranch, window: tuple[float, float] | None) -> NDArray
     return np.column_stack([ways, between.astype(np.intp)])
 
 
-def _part(sampled: SampledBranch, window: tuple[float, float] | None, way: NDArray[np.intp]) -> ManyWindows:
-    """Return what lies in a window that cuts the samples of all these cams alike."""
+def _part(sampled: SampledBranch, window: Places, way: NDArray[np.intp]) -> ManyWindows:
+    """Return what lies in windows that cut the samples of all these cams alike."""
     rows, (start, stop, before, after) = np.arange(len(sampled.values)), way[:4].tolist()
 
-    def at(place: float) -> tuple[FloatArray, FloatArray]:
-        places = np.full((len(rows), 1), place)
-        return places, sampled.exact(places, rows)
+    def at(places: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return places[:, None], sampled.exact(places[:, None], rows)
 
     parts = [(sampled.travel[:, start:stop], sampled.values[:, start:stop])]
     if window is not None and before:

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Measure
     from cfmkit.families.cam.many_designs.forces import Slab
+    from cfmkit.specs.units import Ends
 
-    Window = tuple[float, float] | None
+    Window = Ends | None
 
 BRANCHES = ("load", "unload")
 
@@ -42,18 +43,15 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     if measure.name == RMS:
         return {branch: _rms(cams, branch, measure.window) for branch in BRANCHES}
     both = RANGES[measure.name](_everywhere(cams, measure.window))
-    if measure.window is not None:
-        reached = np.tile(cams.travel[:, -1], 2) * (1 + 1e-9)
-        asked = sum(measure.window) / 2 if measure.name.startswith("band") else measure.window[1]
-        both = np.where(asked <= reached, both, np.nan)
+    if (ends := cams.ends(measure.window)) is not None:
+        asked = (ends[0] + ends[1]) / 2 if measure.name.startswith("band") else ends[1]
+        both = np.where(np.tile(asked <= cams.travel[:, -1] * (1 + 1e-9), 2), both, np.nan)
     return dict(zip(BRANCHES, np.split(both, 2), strict=True))
 
 
 def _rms(cams: Slab, branch: str, window: Window) -> FloatArray:
     effort = (cams.up if branch == "load" else cams.down).slider
-    low, high = cams.travel[:, 0], cams.travel[:, -1]
-    if window is not None:
-        low, high = (np.full(len(cams.designs), end) for end in window)
+    low, high = cams.ends(window) or (cams.travel[:, 0], cams.travel[:, -1])
     many = ManyBranches(cams.travel, effort, low, high, lambda at, _rows: cams.exact(branch, at))
     # Where a sample has no force, nothing inside the window is measured.
     known = np.isfinite(cams.inside(branch, window).mean)
@@ -64,10 +62,9 @@ def _everywhere(cams: Slab, window: Window) -> ManyBranches:
     """Return both branches, one below the other, at every place: metrics that are places do not depend on samples."""
     if window not in cams.known:
         count, places = len(cams.designs), np.concatenate([cams.places, cams.places])
-        ends = window if window is not None else (0.0, np.inf)
-        low = np.full(2 * count, ends[0])
-        high = np.minimum(np.full(2 * count, ends[1]), places[:, -1])
-        pose = np.minimum(np.full(2 * count, sum(ends) / 2), places[:, -1]) if window is not None else None
+        first, last = cams.ends(window) or (np.zeros(count), np.full(count, np.inf))
+        low, high = np.tile(first, 2), np.minimum(np.tile(last, 2), places[:, -1])
+        pose = np.minimum(np.tile((first + last) / 2, 2), places[:, -1]) if window is not None else None
 
         def exact(travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
             return cams.somewhere(np.where(rows < count, 1.0, -1.0)[:, None], travel, rows % count)

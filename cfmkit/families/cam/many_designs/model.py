@@ -35,7 +35,7 @@ from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -86,18 +86,6 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
     return None
 
 
-def block_travel(spec: CamSpec, paths: Sequence[str]) -> tuple[float, float] | None:
-    """Return the travel of all variants over some paths; None where parts around one cam may end it before.
-
-    A cam that is cut for its own roller and brace runs over the whole of its path, or is left to the model of one cam.
-    """
-    profile = spec.mechanism.profile
-    own = profile.brace_length is None and profile.rest_half_width is None and profile.roller_radius is None
-    if not own or spec.analysis.travel is not None or "mechanism.profile.stroke" in paths or profile.stroke is None:
-        return None
-    return 0.0, profile.stroke
-
-
 def _answer(
     spec: CamSpec, block: Block, designs: Designs, slabs: Iterable[tuple[NDArray[np.intp], Slab]]
 ) -> BlockAnswer:
@@ -107,13 +95,22 @@ def _answer(
     warnings: dict[str, NDArray[np.bool_]] = {}
     limit = spec.mechanism.springs.max_elongation
     for chosen, cams in slabs:
-        done[chosen] = cams.solved
+        done[chosen] = cams.solved & _wide(spec, block, cams)
         for name, warned in cams.warned(limit):
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = warned
         for measure, found in zip(block.measures, values, strict=True):
             for branch, numbers in measured(cams, measure).items():
                 found[branch][chosen] = numbers
     return BlockAnswer(done, tuple(values), designs.target, "force", warnings)
+
+
+def _wide(spec: CamSpec, block: Block, cams: Slab) -> NDArray[np.bool_]:
+    """Return for which designs all windows have a width, wherever their travels end."""
+    asked = {*(window for _, window in spec.windows()), *(one.window for one in block.measures if one.window)}
+    wide = np.ones(len(cams.designs), dtype=bool)
+    for first, last in filter(None, map(cams.ends, asked)):
+        wide &= first < last
+    return wide
 
 
 def _plain(designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:
@@ -161,15 +158,11 @@ def _applies(spec: CamSpec, block: Block) -> bool:
         return False
     if isinstance(mechanism.springs.each, tuple) or (spec.design is None and "design.force" in block.values):
         return False
-    # A window cuts every curve at the same samples only if all have the same travel.
-    windowed = any(measure.window for measure in block.measures if measure.name in WINDOWED)
-    return not windowed or ("mechanism.profile.stroke" not in block.values and _covered(spec, block))
-
-
-def _covered(spec: CamSpec, block: Block) -> bool:
-    stroke = spec.mechanism.profile.stroke or 0.0
     windows = [measure.window for measure in block.measures if measure.window and measure.name in WINDOWED]
-    return all(low >= 0 and high <= stroke for low, high in windows)
+    places = [end for window in windows for end in window if not isinstance(end, Share)]
+    # Places are covered by all curves or by none only if all have the same travel.
+    stroke = mechanism.profile.stroke or 0.0
+    return not places or ("mechanism.profile.stroke" not in block.values and 0 <= min(places) <= max(places) <= stroke)
 
 
 def _designs(spec: CamSpec, block: Block) -> Designs:
@@ -217,7 +210,7 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
     fixed = (profile.brace_length, profile.rest_half_width, profile.roller_radius)
     stroke = profile.stroke or analysis.travel or (spec.design.stroke if spec.design else None)
     windows = [*(ends for _, ends in spec.windows()), *(one.window for one in block.measures if one.window)]
-    if any(isinstance(end, Share) or end < 0 for ends in windows for end in ends):
+    if any(end < 0 for ends in windows for end in ends):
         return False
     if None in (*fixed, stroke) or mechanism.left or mechanism.errors or profile.file:
         return False
@@ -307,7 +300,7 @@ def _around(
     except CannotBuild:
         return
     law, asked = cam.profile.path.law, spec.analysis.travel
-    windows = [(float(low), float(high)) for _, (low, high) in spec.windows()]
+    windows = [window for _, window in spec.windows()]
     masses = np.minimum.reduce([values["slider"], values["brace_mass"], values["roller"]])
     shortest = np.minimum(designs.brace, law.brace_length)
     sound = (designs.radius > 0) & (designs.brace > 0) & (designs.x0 > 0) & (designs.stiffness > 0)

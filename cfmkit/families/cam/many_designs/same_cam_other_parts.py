@@ -18,6 +18,7 @@ from cfmkit.families.cam.geometry.many_tracks_one_cam import Poses, sign_changes
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
+from cfmkit.families.cam.mechanism_from_spec import CLOSE
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.many_tracks_one_cam import ManyTracks
     from cfmkit.families.cam.solution import Assembly
+    from cfmkit.specs.units import Ends
 
     Rows = NDArray[np.intp]
 
@@ -78,10 +80,10 @@ class BuiltSlab(Slab):
     """Some mechanisms around one cam at all their samples; `designs.x0` is where their springs are at rest."""
 
     around: Around
-    windows: Sequence[tuple[float, float]]
+    windows: Sequence[Ends]
 
-    def built(self, around: Around, windows: Sequence[tuple[float, float]]) -> BuiltSlab:
-        """Return the slab itself, with what its mechanisms are built of, and the windows of the specification [m]."""
+    def built(self, around: Around, windows: Sequence[Ends]) -> BuiltSlab:
+        """Return the slab itself, with what its mechanisms are built of, and the windows of the specification."""
         self.around, self.windows = around, windows
         return self
 
@@ -105,6 +107,14 @@ class BuiltSlab(Slab):
         tracks, kinds = self.around.tracks, self._kinds[0]
         available = (tracks.end - tracks.start)[kinds, 0]
         return available if self.around.asked is None else np.full(len(kinds), self.around.asked)
+
+    @cached_property
+    def requested(self) -> FloatArray:
+        """Travel of which windows may be shares, (d,) [m]: as `Result.travel` has it."""
+        reached, stroke = self.travel[:, -1], self.around.cam.spec.mechanism.profile.stroke or 0.0
+        if self.around.asked is not None:
+            return np.full(len(reached), self.around.asked)
+        return np.where(np.abs(reached - stroke) <= CLOSE * np.maximum(np.abs(reached), stroke), stroke, reached)
 
     def _of_kinds(self, travel: FloatArray) -> Poses:
         """Return the poses of all mechanisms at travels of the different tracks, (k, n) [m]."""
@@ -320,9 +330,9 @@ class BuiltSlab(Slab):
         yield from ((name, found[name]) for name in ("spring_overstretched", "slack_cable") if name in found)
         if self._allowable is not None:
             yield "overstressed", self.pressure_max > YIELD_PRESSURE * self._allowable * (1 + 1e-9)
-        ends = self.travel[:, -1]
-        short = [ends < high - TOLERANCE * (high - low) for low, high in self.windows]
-        yield WINDOW_OUTSIDE, np.logical_or.reduce(short) if short else np.zeros(len(ends), dtype=bool)
+        reached, windows = self.travel[:, -1], [self.ends(window) for window in self.windows]
+        short = [reached < found[1] - TOLERANCE * (found[1] - found[0]) for found in windows if found is not None]
+        yield WINDOW_OUTSIDE, np.logical_or.reduce(short) if short else np.zeros(len(reached), dtype=bool)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -382,7 +392,9 @@ class BuiltSlab(Slab):
         values = self._pressure(self._poses, self._every, forces.contact) / YIELD_PRESSURE
         exact = self._exact_stress(way)
         known = np.isfinite(self.inside(branch, window).mean)
-        return np.where(known, CutWindows(SampledBranch(self.travel, values, exact), window).extremes[0], np.nan)
+        return np.where(
+            known, CutWindows(SampledBranch(self.travel, values, exact), self.ends(window)).extremes[0], np.nan
+        )
 
     def _exact_stress(self, way: float) -> Callable[[FloatArray, Rows], FloatArray]:
         return lambda travel, rows: self.stress_at(way, travel, rows)

@@ -65,7 +65,10 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     ):
         return None
     base = _base(spec) if set(block.values) <= {*RATES, LEGS} else None
-    if base is None or not all(base.knows(measure) for measure in block.measures):
+    if base is None:
+        return None
+    block = block.in_places(asked_motion(base.spec, base.assembly))
+    if not all(base.knows(measure) for measure in block.measures):
         return None
 
     rates, legs, done = _rates(spec, block)
