@@ -41,8 +41,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     path : path-like
         The file; ``-`` is standard input.
     changes : iterable of str
-        Values that replace those of the file, as ``--set`` takes them:
-        ``["mechanism.roller_radius=10 mm"]``.
+        Values that replace those of the file, as ``--set`` takes them: ``["mechanism.roller_radius=10 mm"]``.
 
     Raises
     ------

@@ -30,6 +30,9 @@ WINDOW_OUTSIDE = "window_outside"
 OLD_KEY = "old_key"
 """Name of the finding that the specification uses a key by its old name."""
 
+OVERWRITTEN = "overwritten"
+"""Finding that a design replaces a value that was stated."""
+
 
 class Status(Enum):
     """How a solve ended."""

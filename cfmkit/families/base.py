@@ -7,7 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cfmkit.results import OLD_KEY, WINDOW_OUTSIDE
+from cfmkit.results import OLD_KEY, OVERWRITTEN, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -280,8 +280,9 @@ def article(word: str) -> str:
 SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
     OLD_KEY: "a key has been renamed; this version still reads the old name",
+    OVERWRITTEN: "the design replaces a stated value with its own",
 }
-"""Findings that are made of any family's result."""
+"""Findings that are made of any family's result or design."""
 
 
 @dataclass(frozen=True)

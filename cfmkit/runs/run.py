@@ -8,13 +8,14 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
+from math import inf, isclose
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit import api
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
-from cfmkit.results import Status
+from cfmkit.results import OVERWRITTEN, Finding, Status
 from cfmkit.runs import run_outcome
 from cfmkit.runs.files_a_run_writes import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
@@ -164,7 +165,7 @@ def carry_out(
     with RunFolder(wanted.out) as folder:
         folder.check(*FIRST, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
-            found = _computed(verb, spec, run, document)
+            found = _options_judged(_computed(verb, spec, run, document), spec, document)
         command = shlex.join(["cfmkit", *arguments])
         for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate):
             folder.write(name, data)
@@ -234,6 +235,40 @@ def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
     if found.result.status is Status.INVALID:
         raise SpecError([placed(document, verb.name, found.result.message)])
     return found
+
+
+def _options_judged(found: Report, given: Spec, document: Document) -> Report:
+    """Return a report that warns of values of ``--set`` that a design has replaced."""
+    made = found.design.spec if found.design else None
+    if made is None:
+        return found
+    before, after = dict(given.leaves()), dict(made.leaves())
+    stated, written = given.model_dump(mode="json", exclude_unset=True), made.model_dump(mode="json")
+    told = " ".join(warning.message for warning in found.warnings)
+    warnings = [
+        Finding(
+            OVERWRITTEN,
+            f"'{path}' ({_text_at(stated, path)}), which --set states, is replaced by "
+            f"{_text_at(written, path) or 'none'}: the design determines it",
+        )
+        for path in before
+        if any(f"{path}.".startswith(f"{option}.") for option in document.set_by_options)
+        and _text_at(stated, path)
+        and not isclose(before[path], after.get(path, inf), rel_tol=1e-9)
+        and f"'{path}'" not in told
+    ]
+    return found.beside({}, run_outcome.Supplement(warnings=tuple(warnings))) if warnings else found
+
+
+def _text_at(content: Any, path: str) -> str:
+    """Return the value at a dotted path of what a specification is written as, to six digits; "" if it is absent."""
+    for part in path.split("."):
+        inside = content[int(part)] if isinstance(content, list) else content.get(part)
+        if inside is None:
+            return ""
+        content = inside
+    number, space, unit = str(content).partition(" ")
+    return f"{float(number):.6g}{space}{unit}"
 
 
 def family_package(name: str) -> dict[str, Any]:

@@ -86,3 +86,18 @@ def test_what_cannot_be_is_exit_code_4_and_what_ends_early_6(cli):
     partial = cli("analyze", "slider_crank_li2019.yaml", *short, "-q", "--no-plots")
     assert partial.code == 6
     assert "the crank reaches" in partial.err
+
+
+@pytest.mark.usefixtures("specs")
+def test_a_design_says_which_value_of_an_option_it_replaces(cli):
+    """A start that the user sets, and the design does not keep, had been dropped without a word."""
+    springs = ("--set", "mechanism.springs={pivot: 20 N*mm/rad}")
+    done = cli("design", "slider_crank_bilancia2019.yaml", *springs, "--no-plots", "-o", "out", "--json")
+    assert done.code == 0, done.err
+    (one,) = [item["message"] for item in done.document["warnings"] if item["name"] == "overwritten"]
+    assert one.startswith("'mechanism.springs.pivot' (20 N*mm/rad), which --set states, is replaced by ")
+    made = re.search(r"pivot: (\S+) N", (cli.folder / "out/design.yaml").read_text())
+    assert f"{float(made[1]):.6g} N*mm/rad" in one
+    kept = ("--set", "analysis.points=71", "--set", "mechanism.crank_length=54 mm")
+    other = cli("design", "slider_crank_bilancia2019.yaml", *kept, "--no-plots", "-o", "other", "--json")
+    assert "overwritten" not in {item["name"] for item in other.document["warnings"]}

@@ -39,7 +39,7 @@ from cfmkit.families.cam.statics import forces
 from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
-from cfmkit.results import Design, Status
+from cfmkit.results import OVERWRITTEN, Design, Finding, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
     from cfmkit.families.cam.statics import Loads
-    from cfmkit.results import Finding
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 
@@ -447,8 +446,8 @@ def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
         if old is not None and old != now and not (isinstance(old, float) and isclose(old, now or 0.0, rel_tol=1e-12)):
             values = [f"{item:g}" if name in ("friction", "slope_factor") else _length(item) for item in (old, now)]
             source = _SOURCES.get(name, f"mechanism.{name}")
-            yield finding(
-                "overwritten",
+            yield Finding(
+                OVERWRITTEN,
                 f"'mechanism.profile.{name}' ({values[0]}) is replaced by {values[1]}: the designed profile "
                 + (f"follows '{source}'; change that one" if source else "is as drawn, without errors of cutting"),
             )

@@ -59,7 +59,6 @@ FINDINGS = {
     "end_stop": "the end stops of the slider allow less travel than requested",
     "parts_touch": "the clearance between moving parts, or from them to the plate or its screws, is less than required",
     "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
-    "overwritten": "the design replaces a stated value of the profile with its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "an old word in the specification, which the next version will not accept",
     "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or needs a vertical path",

@@ -56,6 +56,11 @@ class Document:
     _spoilt: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     _options: tuple[tuple[Path, str], ...] = field(default=(), repr=False, compare=False)
 
+    @property
+    def set_by_options(self) -> tuple[str, ...]:
+        """Paths that options have set, dotted, in their order."""
+        return tuple(".".join(map(str, path)) for path, _ in self._options)
+
     def place(self, path: str | Path) -> tuple[int, int]:
         """Return (line, column) of the value at a path, or of the nearest block above it; (0, 0) in an option."""
         return self._place(self._path(path), self._reading.values)[:2]
