@@ -409,8 +409,8 @@ def drawn_files(
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
     formats: str | Sequence[str] | None = None,
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Return the files of `export`, and what they do not show: how often a part is to be made."""
+) -> tuple[dict[str, bytes], Drawing]:
+    """Return the files of `export`, and the drawing with its notes and warnings."""
     from cfmkit.export import TOLERANCE, USUAL, files
 
     wanted = _formats(formats, USUAL)
@@ -418,7 +418,7 @@ def drawn_files(
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
     drawn = drawing(spec, near)
-    return files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {}), drawn.notes
+    return files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {}), drawn
 
 
 def _decks(spec: Spec) -> dict[str, bytes]:

@@ -30,6 +30,9 @@ WINDOW_OUTSIDE = "window_outside"
 OLD_KEY = "old_key"
 """Name of the finding that the specification uses a key by its old name."""
 
+PART_NOT_DRAWN = "part_not_drawn"
+"""Name of the finding that a design has no part that can be cut as it is."""
+
 OVERWRITTEN = "overwritten"
 """Finding that a design replaces a value that was stated."""
 

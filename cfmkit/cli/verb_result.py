@@ -45,7 +45,8 @@ def reported_for(skipped: Sequence[str], answer: Answer) -> Answer:
     """Return an answer that also tells of the families that were skipped: one line each, and in the document."""
     if not skipped:
         return answer
-    data = {"warnings": [{"name": "family_skipped", "message": line} for line in skipped]}
+    others = answer.data.get("warnings", ())
+    data = {"warnings": [*others, *({"name": "family_skipped", "message": line} for line in skipped)]}
     lines = tuple(f"warning  {line}; skipped (see `cfmkit doctor`)" for line in skipped)
     return replace(answer, data={**answer.data, **data}, complaints=(*answer.complaints, *lines))
 

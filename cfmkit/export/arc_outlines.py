@@ -24,6 +24,8 @@ from cfmkit.specs.units import format_short, to_border
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.arrays import FloatArray
+
 
 _LEAN = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
 _GAP = 1e-9  # two ends closer than this are one point [m]
@@ -167,6 +169,19 @@ def check_outlines(outlines: Sequence[Outline]) -> None:
             cuts.append((name, outline, shape))
     _check_apart(cuts)
     _check_holes(cuts)
+
+
+def check_simple(points: FloatArray, name: str) -> None:
+    """Refuse a closed outline (n, 2) [m] that crosses or touches itself.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        With the place.
+    """
+    from shapely import Polygon
+
+    _check_simple(Polygon(points), name)
 
 
 def _check_simple(shape: Any, name: str) -> None:

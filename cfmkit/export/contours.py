@@ -20,6 +20,7 @@ from cfmkit.export.layers import DRIVEN, HELD
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.results import Finding
 
 TOLERANCE = 5e-6
 """How far outlines may be from the exact ones by default [m]."""
@@ -272,7 +273,7 @@ class Drawing:
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands
     and what is moved. `notes` say what the contours do not show: how often a part is to be made. `dimensions` and
     `facts` are what a sheet of paper says beside the outline: main lengths, and what it is made of in (word, text).
-    `labels` are engraved.
+    `labels` are engraved. `warnings` say what is wrong with the part as drawn.
     """
 
     name: str
@@ -283,6 +284,7 @@ class Drawing:
     dimensions: tuple[DrawnDimension, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
     labels: tuple[EngravedText, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
     @property
     def extents(self) -> tuple[float, float, float, float]:

@@ -7,7 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cfmkit.results import OLD_KEY, OVERWRITTEN, WINDOW_OUTSIDE
+from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -279,6 +279,7 @@ def article(word: str) -> str:
 
 SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
+    PART_NOT_DRAWN: "the part of a design cannot be cut as it is: nothing is drawn",
     OLD_KEY: "a key has been renamed; this version still reads the old name",
     OVERWRITTEN: "the design replaces a stated value with its own",
 }

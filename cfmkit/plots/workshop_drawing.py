@@ -280,7 +280,10 @@ def _words(
             y = _written(ax, 4.0, y, f"{number}   \u2300 {format_short(hole.diameter, 'length')}   {place}")
         if len(found) > MOST_HOLES:
             y = _written(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
-    for heading, lines in (("tolerances", tolerances), ("notes", drawing.notes)):
+    for heading, lines in (
+        ("tolerances", tolerances),
+        ("notes", (*drawing.notes, *(one.message for one in drawing.warnings))),
+    ):
         if lines:
             y = _written(ax, 4.0, y - 2.0, heading, NORMAL)
             for line in lines:

@@ -10,10 +10,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
-from cfmkit.errors import SolutionError
+from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.families import family
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.plots.figures import moving_of
+from cfmkit.results import PART_NOT_DRAWN, Finding
 from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
@@ -93,15 +94,34 @@ def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
 
 
 def part_of(spec: Spec) -> Drawing | None:
-    """Return what is to be cut or printed; None where there is no part."""
+    """Return what is to be cut or printed; None where there is no part, or none that can be cut."""
+    try:
+        return _checked_part(spec)
+    except (SolutionError, GeometryError):  # the analysis, or `warnings_of_part`, has a warning that says why
+        return None
+
+
+def warnings_of_part(spec: Spec) -> tuple[Finding, ...]:
+    """Return what is wrong with the part as drawn, or why there is none."""
+    try:
+        drawing = _checked_part(spec)
+    except SolutionError:  # the analysis has a warning
+        return ()
+    except GeometryError as problem:
+        return (Finding(PART_NOT_DRAWN, str(problem)),)
+    return () if drawing is None else drawing.warnings
+
+
+def _checked_part(spec: Spec) -> Drawing | None:
+    """Return the part of a family that has one; GeometryError where it cannot be cut as it is."""
+    from cfmkit.export.arc_outlines import outlines
     from cfmkit.families import family
 
     if not family(spec.family).outline:
         return None
-    try:
-        return api.drawing(spec)
-    except SolutionError:  # the analysis has a curve all the same, and a warning that says why
-        return None
+    drawing = api.drawing(spec)
+    outlines(drawing)
+    return drawing
 
 
 def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:

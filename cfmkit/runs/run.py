@@ -17,7 +17,7 @@ from cfmkit.families.base import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import OVERWRITTEN, Finding, Status
 from cfmkit.runs import run_outcome
-from cfmkit.runs.files_a_run_writes import files
+from cfmkit.runs.files_a_run_writes import files, warnings_of_part
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
@@ -308,7 +308,10 @@ def designed(spec: Spec, run: Run) -> Report:
     result = api.analyze(design.spec, run) if design.spec is not None else run_outcome.undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
     found = run_outcome.report_on(result, design)
-    found = found.beside({}, run_outcome.Supplement(files=tables, lines=design.notes))
+    drawn = warnings_of_part(result.spec) if design.spec is not None and result.status.usable else ()
+    known = {one.name for one in result.warnings}
+    more = tuple(one for one in drawn if one.name not in known)
+    found = found.beside({}, run_outcome.Supplement(files=tables, lines=design.notes, warnings=more))
     if design.spec is None or result.status is not Status.COMPLETE:
         return found
     # as it was written: what follows from other values follows from those of each part

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import OneSpec, Quiet, option
-from cfmkit.cli.page_block_types import Paragraph, Written
+from cfmkit.cli.page_block_types import BAD, Paragraph, Written
 from cfmkit.cli.verb_result import Answer
 
 if TYPE_CHECKING:
@@ -46,11 +46,14 @@ def run(options: ExportOptions, terminal: Terminal) -> Answer:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        drawn, notes = api.drawn_files(spec, options.kerf, options.tolerance, options.format)
+        drawn, drawing = api.drawn_files(spec, options.kerf, options.tolerance, options.format)
         for name, data in drawn.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal.arguments)
         manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})
     written = Written(out, (*manifest.files, "manifest.json"))
-    page = (*(Paragraph("note", note) for note in notes), written.block(terminal.verbose > 0))
-    return Answer(written.data | {"notes": list(notes)}, page)
+    notes = [Paragraph("note", note) for note in drawing.notes]
+    warnings = [Paragraph("warning", f"{one.name}: {one.message}", BAD) for one in drawing.warnings]
+    as_json = [{"name": one.name, "message": one.message} for one in drawing.warnings]
+    page = (*notes, *warnings, written.block(terminal.verbose > 0))
+    return Answer(written.data | {"notes": list(drawing.notes), "warnings": as_json}, page)

@@ -53,6 +53,9 @@ FINDINGS = {
     "thick_beam": "a beam is short for its thickness: beam theory is inaccurate",
     "wide_beam": "a beam is so wide that it cannot curl across its width: it is stiffer than in beam theory",
     "beams_touch": "two beams touch, or cross: contact is not modelled",
+    "joined_away_from_nodes": "the part as drawn is one piece where the mechanism has beams, pads or bars apart: they "
+    "cross, touch or lie on one another, or fillets fill the gap between them",
+    "pins_not_drawn": "beams turn on pins in the mechanism, but are one piece in the drawing",
     "gap_small": "two beams are closer than can be cut",
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
     "mesh_coarse": "results on two meshes of the part differ by more than the limit",

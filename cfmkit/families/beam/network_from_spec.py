@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
+_ON_AXIS = 0.5  # thicknesses from the mirror axis within which a node is on it
 _SMOOTH = 0.07  # the same where every step is a point of the curve
 
 
@@ -199,6 +200,21 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
     if copies is None or copies.mirror is None:
         return None
     return complex(*copies.mirror), assembly.direction
+
+
+def on_axis(assembly: Assembly, node: str) -> bool:
+    """Tell whether a node is on the mirror axis."""
+    found, axis = assembly.network.nodes[node], mirror_axis(assembly)
+    if axis is None:
+        return False
+    away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
+    return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
+
+
+def moving_nodes(assembly: Assembly) -> set[str]:
+    """Return the nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
+    first = assembly.spec.mechanism.drive.node
+    return {node for node in assembly.network.nodes if node.split(".")[0] == first}
 
 
 def allowable_stress(spec: BeamSpec) -> float | None:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.network_from_spec import mirror_axis
-from cfmkit.families.beam.outline import on_axis
+from cfmkit.families.beam.network_from_spec import mirror_axis, on_axis
 
 if TYPE_CHECKING:
     from collections.abc import Callable

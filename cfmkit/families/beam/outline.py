@@ -26,9 +26,11 @@ from cfmkit.export.contours import (
     circle,
     mark,
 )
+from cfmkit.export.joined_strips import DrawnBlock
 from cfmkit.export.union import quarter_pieces
+from cfmkit.families.beam.joined_unasked import joined_unasked, pins_drawn_solid
 from cfmkit.families.beam.network_elements.spec import PartSpec
-from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, thickest
+from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
 from cfmkit.specs.units import format_short
 
@@ -53,7 +55,6 @@ SWEPT = 25
 """Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
 
 _CORNERS = 64
-_ON_AXIS = 0.5
 
 
 SHARE = 0.2
@@ -103,7 +104,7 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
 
 def _held_places(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> Iterator[HeldPlace]:
     network, axis = assembly.network, mirror_axis(assembly)
-    moving = _moving(assembly)
+    moving = moving_nodes(assembly)
     bars = _bars(assembly, beams, *axis) if axis is not None else {}
     for node, about in network.nodes.items():
         ends = _ends(assembly, beams, node)
@@ -156,19 +157,21 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
     beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
-    pieces, holes = _pieces(assembly, beams, SHARE * tolerance)
+    pieces, blocks, holes = _pieces(assembly, beams, SHARE * tolerance)
     frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for found in beams.values() for strip in found]
     if (axis := mirror_axis(assembly)) is not None:
-        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis).values()]
+        bars = _bars(assembly, beams, *axis)
+        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *bars.values()]
         holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
         lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
+        blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
     part = spec.mechanism.part or PartSpec()
     pieces = [*pieces, *frame]
     contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
-    moving = _moving(assembly)
+    moving = moving_nodes(assembly)
     places = _held_places(assembly, beams, tolerance)
     marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
     marks += [mark(shape, False) for shape in frame]
@@ -177,7 +180,14 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
     dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, part.fillet))
     return Drawing(
-        "beams", (*contours, *paths, *marks), tables, notes, _sheet(assembly, beams), dimensions=dimensions, facts=facts
+        "beams",
+        (*contours, *paths, *marks),
+        tables,
+        notes,
+        _sheet(assembly, beams),
+        dimensions=dimensions,
+        facts=facts,
+        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, blocks, contours, part.fillet)),
     )
 
 
@@ -197,7 +207,7 @@ def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: flo
     part = assembly.spec.mechanism.part or PartSpec()
     if part.frame is None or part.frame.ground is None:
         return ()
-    nodes, moving = assembly.network.nodes, _moving(assembly)
+    nodes, moving = assembly.network.nodes, moving_nodes(assembly)
     pads: dict[str, FloatArray] = {}
     covered: list[FloatArray] = []
     places = tuple(_held_places(assembly, beams, tolerance))
@@ -310,11 +320,17 @@ def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:
 
 def _pieces(
     assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the polygons of one half: strips, joints, pads, eyes, bars; and the holes in eyes."""
+) -> tuple[list[FloatArray], list[DrawnBlock], list[FloatArray]]:
+    """Return the polygons of one half, those of them that are pads, eyes and bars by name, and the holes in eyes."""
     network = assembly.network
     pieces = [part for found in beams.values() for strip in found for part in strip.polygons]
+    blocks: list[DrawnBlock] = []
     holes = []
+
+    def add(name: str, shape: FloatArray, *nodes: str) -> None:
+        pieces.append(shape)
+        blocks.append(DrawnBlock(name, nodes, shape))
+
     for name, found in beams.items():
         beam = network.beams[name]
         for one, two in itertools.pairwise(found):
@@ -325,17 +341,18 @@ def _pieces(
             pieces.append(_disc(at, 0.5 * size, bulge))
             support = network.nodes[node].support
             if _padded(assembly, node):
-                pieces.append(_pad(assembly, strip, last, _moves(assembly, node)))
+                add(f"the pad of {name} at {node}", _pad(assembly, strip, last, _moves(assembly, node)), node)
             elif support.across and not support.rotation:
-                pieces.append(_disc(at, EYE * size, bulge))
+                add(f"the eye of {name} at {node}", _disc(at, EYE * size, bulge), node)
                 holes.append(_disc(at, HOLE * size, bulge))
-            pieces += _arm(network, node, at, PAD * size)
+            for arm in _arm(network, node, at, PAD * size):
+                add(f"the arm of {name} at {node}", arm, node)
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     for link in network.links:
         a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
         if np.hypot(*(b - a)) > 0:
-            pieces.append(_bar(a, b, PAD * thick))
-    return pieces, holes
+            add(f"the bar from {link.master} to {link.node}", _bar(a, b, PAD * thick), link.master, link.node)
+    return pieces, blocks, holes
 
 
 def _padded(assembly: Assembly, node: str) -> bool:
@@ -350,25 +367,10 @@ def _padded(assembly: Assembly, node: str) -> bool:
     return (found.support.rotation and found.support.across) or node in linked
 
 
-def on_axis(assembly: Assembly, node: str) -> bool:
-    """Tell whether a node is on the mirror axis."""
-    found, axis = assembly.network.nodes[node], mirror_axis(assembly)
-    if axis is None:
-        return False
-    away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
-    return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
-
-
-def _moving(assembly: Assembly) -> set[str]:
-    """Return the nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
-    first = assembly.spec.mechanism.drive.node
-    return {node for node in assembly.network.nodes if node.split(".")[0] == first}
-
-
 def _moves(assembly: Assembly, node: str) -> bool:
     """Tell whether a pad at a node moves: it is driven, guided or linked."""
     about = assembly.network.nodes[node].support
-    return node in _moving(assembly) or not (about.along and about.across and about.rotation)
+    return node in moving_nodes(assembly) or not (about.along and about.across and about.rotation)
 
 
 def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
@@ -430,7 +432,7 @@ def _bars(
     """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     found: dict[str, FloatArray] = {}
-    for node in sorted(_moving(assembly)):
+    for node in sorted(moving_nodes(assembly)):
         ends = _ends(assembly, beams, node)
         if not ends or on_axis(assembly, node):
             continue

@@ -440,6 +440,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding(
             "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
         )
+    yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
     thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())

@@ -167,8 +167,35 @@ def _notes(spec: VcfmSpec) -> Iterator[str]:
         yield f"two sheets: leaves with shuttle and walls are {mm(leaves)} thick, the spring {mm(spring)}"
 
 
+def _check_levels(spec: VcfmSpec) -> None:
+    """Refuse leaves of neighbouring levels that overlap.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        With the place where they are closest, and the spacing at which they just touch.
+    """
+    frame, about = spec.mechanism.frame, spec.mechanism.bistable
+    x, y, slope = _centre_line(spec)
+    steepest = int(np.abs(slope).argmax())
+    least = max(about.profile[1]) * float(np.hypot(1.0, slope[steepest]))
+    if about.half_beams > 2 and frame.spacing <= least:
+        at = (0.5 * frame.shuttle_width + float(x[steepest]), float(y[steepest]) + 0.5 * frame.spacing)
+        raise GeometryError(
+            f"the leaves of neighbouring Vs overlap, at ({mm(at[0])}, {mm(at[1])}): {mm(frame.spacing)} apart, they "
+            f"touch at {mm(least)}; use a larger 'mechanism.frame.spacing'"
+        )
+
+
 def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
-    """Return the outline of shuttle, leaves and walls with the holes between them, and its lowest point [m]."""
+    """Return the outline of shuttle, leaves and walls with the holes between them, and its lowest point [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If leaves overlap.
+    """
+    _check_levels(spec)
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
     levels, sizes = -(-about.half_beams // 2), _sizes(spec)
     half, bottom, wall, out = 0.5 * frame.shuttle_width, -frame.clearance, sizes.wall, sizes.out

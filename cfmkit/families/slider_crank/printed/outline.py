@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.export.arc_outlines import check_simple
 from cfmkit.export.contours import (
     TOLERANCE,
     Contour,
@@ -181,6 +182,8 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     outline, *others = drawn.contours
     rounded, sharp = filleted(outline, part.fillet)
     frame = _frame(spec, drawn)
+    if frame:  # the union with a frame would hide it
+        check_simple(rounded.points(0.2 * TOLERANCE), "the outline of the leg")
     made = merged([rounded.points(0.2 * TOLERANCE), *frame], part.fillet) if frame else (rounded,)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True)]

@@ -1,0 +1,284 @@
+"""Where a drawn part is one piece although its mechanism has the places apart: strips that cross, touch, lie together.
+
+The outline is the union of all strips and blocks. At a node they are meant to be one piece; elsewhere they are joined
+unasked, and the part is stiffer than its beams. Two places are apart if the way from one to the other, along strips and
+through rigid bodies, is long beside the line between them; they are joined if that line runs through the material.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.export.contours import Contour
+
+APART = 6.0
+"""Shortest way between places that are apart, in thicknesses with a fillet on either side: beams that leave a node with
+less than 19 degrees between them are still one piece that far from it."""
+FINE = 4.0
+"""Points along a strip in each thickness with its fillets: two that touch have points close to the place."""
+MOST = 2000
+"""Points of a strip at most; those of more windings are farther apart."""
+TOUCHING = 1e-6
+"""Gaps that are rounding, and are closed when the outline is made [m]."""
+TRIED = 200
+"""Lines between two strips that are looked at, the shortest ones."""
+SAGITTA = 1e-6
+"""How far arcs of the outline may be from their lines [m]."""
+ROUNDING = 1e-8
+"""Lines run through the material if less than this lies outside [m]: outlines are simplified."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnStrip:
+    """A beam as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+    points : (n, 2) array
+        Of its centre line [m].
+    thickness : (n,) array
+        There [m].
+    ends : tuple of two str
+        Nodes that it joins.
+    """
+
+    name: str
+    points: FloatArray
+    thickness: FloatArray
+    ends: tuple[str, str]
+
+    def sampled(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return points (k, 2), the way to them from the start (k,) and half thicknesses (k,) there, closely [m]."""
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
+        step = (float(self.thickness.min()) + 2.0 * fillet) / FINE
+        places = np.linspace(0.0, way[-1], min(MOST, math.ceil(way[-1] / step) + 1))
+        at = np.column_stack([np.interp(places, way, self.points[:, k]) for k in (0, 1)])
+        return at, places, 0.5 * np.interp(places, way, self.thickness)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnBlock:
+    """A pad, an eye or a bar as it is drawn: rigid beside beams.
+
+    Attributes
+    ----------
+    name : str
+        In words, for messages.
+    nodes : tuple of str
+        Those that it holds together, of one rigid body.
+    shape : (n, 2) array
+        Polygon [m].
+    """
+
+    name: str
+    nodes: tuple[str, ...]
+    shape: FloatArray
+
+
+@dataclass(frozen=True)
+class Join:
+    """Two parts of a drawing that are one piece.
+
+    Attributes
+    ----------
+    one, other : str
+        Names.
+    at : (2,) array
+        Where [m].
+    gap : float
+        Between them before the outline was made [m]; negative where they overlap.
+    """
+
+    one: str
+    other: str
+    at: FloatArray
+    gap: float
+
+
+@dataclass(frozen=True, eq=False)
+class NodesAndBodies:
+    """Nodes, and which of them belong to one rigid body.
+
+    Attributes
+    ----------
+    places : mapping of str to (2,) array
+        Nodes [m].
+    bodies : mapping of str to str
+        The body of a node, where it has one.
+    """
+
+    places: Mapping[str, FloatArray]
+    bodies: Mapping[str, str]
+
+    def ways(self, strips: Sequence[DrawnStrip]) -> tuple[dict[str, int], FloatArray]:
+        """Return the number of each node, and the shortest ways between all, (m, m) [m]; inf where there is none."""
+        number = {name: k for k, name in enumerate(self.places)}
+        at = np.array([self.places[name] for name in number]).reshape(-1, 2)
+        ways = np.full((len(number), len(number)), np.inf)
+        np.fill_diagonal(ways, 0.0)
+        for one, other in itertools.combinations(self.bodies, 2):
+            if self.bodies[one] == self.bodies[other]:
+                i, j = number[one], number[other]
+                ways[i, j] = ways[j, i] = float(np.hypot(*(at[i] - at[j])))
+        for strip in strips:
+            i, j = (number[end] for end in strip.ends)
+            length = float(np.hypot(*np.diff(strip.points, axis=0).T).sum())
+            ways[i, j] = ways[j, i] = min(ways[i, j], length)
+        for k in range(len(number)):
+            ways = np.minimum(ways, ways[:, k, None] + ways[None, k])
+        return number, ways
+
+
+def joined_away_from_nodes(
+    strips: Sequence[DrawnStrip],
+    blocks: Sequence[DrawnBlock],
+    nodes: NodesAndBodies,
+    contours: Sequence[Contour],
+    fillet: float,
+) -> tuple[Join, ...]:
+    """Return which parts of a drawing are joined unasked, each pair once, where they are closest.
+
+    Parameters
+    ----------
+    strips : sequence of DrawnStrip
+    blocks : sequence of DrawnBlock
+    nodes : NodesAndBodies
+    contours : sequence of Contour
+        What was made of them: closed outlines and holes.
+    fillet : float
+        Radius of inside corners [m]; gaps narrower than twice of it are filled.
+    """
+    import shapely
+
+    look = _Look(strips, nodes, fillet)
+    found = [*look.between_strips(), *look.beside_blocks(blocks), *look.between_blocks(blocks)]
+    if not found:
+        return ()
+    whole = _material(contours)
+    shapely.prepare(whole)
+    joins: dict[tuple[str, str], Join] = {}
+    for one, other, starts, ends, gaps in found:
+        order = np.argsort(gaps, kind="stable")[:TRIED]
+        lines = shapely.linestrings(np.stack([starts[order], ends[order]], axis=1))
+        inside = np.flatnonzero(shapely.covers(whole, lines))
+        if len(inside) and (one, other) not in joins:
+            k = order[inside[0]]
+            joins[one, other] = Join(one, other, 0.5 * (starts[k] + ends[k]), float(gaps[k]))
+    return tuple(joins.values())
+
+
+def _material(contours: Sequence[Contour]) -> Any:
+    """Return the area within outlines and outside of holes, a little larger for rounding."""
+    from shapely import Polygon, union_all
+
+    closed = [one for one in contours if one.closed]
+    areas = [union_all([Polygon(one.points(SAGITTA)).buffer(0.0) for one in closed if one.hole is hole])
+             for hole in (False, True)]  # fmt: skip
+    return areas[0].difference(areas[1]).buffer(ROUNDING)
+
+
+Candidates = tuple[str, str, "FloatArray", "FloatArray", "FloatArray"]
+"""Two names, both ends of lines between their parts (k, 2) each [m], and the gap on each line (k,) [m]."""
+
+
+class _Look:
+    """Where parts come so close that they may be joined."""
+
+    def __init__(self, strips: Sequence[DrawnStrip], nodes: NodesAndBodies, fillet: float) -> None:
+        self.nodes, self.fillet = nodes, fillet
+        self.filled = 2.0 * fillet + TOUCHING
+        self.names = [strip.name for strip in strips]
+        sampled = [strip.sampled(fillet) for strip in strips]
+        self.points, self.way, self.half = (
+            np.concatenate([one[k] for one in sampled]) if sampled else np.zeros((0, 2) if k == 0 else 0)
+            for k in range(3)
+        )
+        self.strip = np.repeat(np.arange(len(strips)), [len(one[1]) for one in sampled])
+        self.number, self.ways = nodes.ways(strips)
+        # how far each point is from both nodes of its strip, and which they are
+        length = np.array([one[1][-1] for one in sampled])[self.strip]
+        self.to_ends = np.stack([self.way, length - self.way])
+        self.ends = (
+            np.array([[self.number[end] for end in strip.ends] for strip in strips]).reshape(-1, 2)[self.strip].T
+        )
+
+    def between_strips(self) -> Iterator[Candidates]:
+        """Yield strips that come close to each other, or to themselves, although they are apart."""
+        from scipy.spatial import cKDTree
+
+        if not len(self.points):
+            return
+        reach = 2.0 * float(self.half.max()) + self.filled
+        one, other = cKDTree(self.points).query_pairs(reach, output_type="ndarray").T
+        gap = np.hypot(*(self.points[one] - self.points[other]).T) - self.half[one] - self.half[other]
+        near = gap < self.filled
+        one, other, gap = one[near], other[near], gap[near]
+        apart = self._way_between(one, other) > APART * (self.half[one] + self.half[other] + 2.0 * self.fillet)
+        one, other, gap = one[apart], other[apart], gap[apart]
+        pair = self.strip[one] * len(self.names) + self.strip[other]
+        for which in np.unique(pair).tolist():
+            a, b = (self.names[k] for k in divmod(which, len(self.names)))
+            own = pair == which
+            if not _found_in_other_half(a, b):
+                yield *_ordered(a, b), self.points[one[own]], self.points[other[own]], gap[own]
+
+    def _way_between(self, one: Any, other: Any) -> FloatArray:
+        """Return the shortest way along strips and through bodies between points (k,) [m]."""
+        along = np.where(self.strip[one] == self.strip[other], np.abs(self.way[one] - self.way[other]), np.inf)
+        for i, j in itertools.product((0, 1), repeat=2):
+            through = self.ways[self.ends[i, one], self.ends[j, other]]
+            along = np.minimum(along, self.to_ends[i, one] + through + self.to_ends[j, other])
+        return np.asarray(along)
+
+    def beside_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
+        """Yield strips that come close to a rigid block although they are apart from it."""
+        import shapely
+
+        places = shapely.points(self.points)
+        for block in blocks:
+            to_node = self.ways[:, [self.number[node] for node in block.nodes]].min(axis=1)
+            way = np.minimum(*(self.to_ends[k] + to_node[self.ends[k]] for k in (0, 1)))
+            shape = shapely.Polygon(block.shape)
+            gap = shapely.distance(places, shape) - self.half
+            near = (gap < self.filled) & (way > APART * 2.0 * (self.half + self.fillet))
+            for which in np.unique(self.strip[near]).tolist():
+                own = np.flatnonzero(near & (self.strip == which))
+                if _found_in_other_half(self.names[which], block.name):
+                    continue
+                ends = shapely.get_coordinates(shapely.shortest_line(places[own], shape)).reshape(-1, 2, 2)
+                yield self.names[which], block.name, ends[:, 0], ends[:, 1], gap[own]
+
+    def between_blocks(self, blocks: Sequence[DrawnBlock]) -> Iterator[Candidates]:
+        """Yield blocks of different bodies that come close to each other."""
+        import shapely
+
+        body = {block.name: self.nodes.bodies.get(block.nodes[0], block.nodes[0]) for block in blocks}
+        for one, other in itertools.combinations(blocks, 2):
+            if body[one.name] == body[other.name] or _found_in_other_half(one.name, other.name):
+                continue
+            line = shapely.shortest_line(shapely.Polygon(one.shape), shapely.Polygon(other.shape))
+            if line.length < self.filled:
+                ends = shapely.get_coordinates(line)
+                yield *_ordered(one.name, other.name), ends[:1], ends[1:], np.array([line.length])
+
+
+def _found_in_other_half(one: str, other: str) -> bool:
+    """Tell whether both are of the mirrored half: what they do, the described half does."""
+    return one.endswith("'") and other.endswith("'")
+
+
+def _ordered(one: str, other: str) -> tuple[str, str]:
+    """Return two names in one order, whichever of both is the mirrored one: b1 and b2' as well as b1' and b2."""
+    plain, second = sorted((one.rstrip("'"), other.rstrip("'")))
+    image = "'" if one.endswith("'") != other.endswith("'") else ""
+    return plain, second + image
