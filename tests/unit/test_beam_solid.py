@@ -75,9 +75,38 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
 @pytest.mark.parametrize(
     ("config", "said", "changes"),
     [
-        ("beam_lee_frame", "does not know drive.follows", {"mechanism.drive.follows": True}),
-        ("beam_v_bifurcation", "does not know analysis.modes", {}),
-        ("beam_lan2010", "does not know analysis.through_folds of a motion", {"analysis.through_folds": True}),
+        ("beam_lee_frame", "mechanism.drive.follows is not known to it: its", {"mechanism.drive.follows": True}),
+        ("beam_v_bifurcation", "analysis.modes is not known to it: it has no masses; leave", {}),
+        (
+            "beam_lan2010",
+            "analysis.through_folds is not known to it: a motion is followed to its first fold; leave",
+            {"analysis.through_folds": True},
+        ),
+        (
+            "beam_lan2010",
+            "mechanism.loads is not known to it: nothing but the drive acts on the part; leave",
+            {"mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N"}]},
+        ),
+        (
+            "beam_lan2010",
+            "mechanism.springs is not known to it: only the .*; mechanism.beams is not .* must have one width; leave",
+            {
+                "mechanism.springs": {
+                    "s": {"kind": "slide", "node": "n3", "direction": "0 deg", "stiffness": "1 N/mm"}
+                },
+                "mechanism.beams.b1.width": "5 mm",
+            },
+        ),
+        (
+            "beam_lan2010",
+            r"mechanism\.nodes\.n2\.moved is not known to it: the part is solved as drawn",
+            {"mechanism.nodes.n2.moved": {"along": "1 mm"}},
+        ),
+        (
+            "beam_lan2010",
+            r"mechanism\.beams\.b3\.start_joint is not known to it: the outline is one piece",
+            {"mechanism.beams.b3.start_joint": "pin"},
+        ),
     ],
 )
 def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said, changes):

@@ -287,7 +287,9 @@ class BeamSpec(Spec):
         verified = self.design is not None and self.design.verify == "solid"
         found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
         place = ("design", "verify") if verified else ("analysis", "fidelity")
-        refuse("BeamSpec", {place: f"'solid' {'; '.join(found)}"} if found else {})
+        # no word in quotes: long lists between two would be shortened like a long quotation
+        message = f"the model solid has limits: {'; '.join(found)}; leave that out, or take the beams: reissner"
+        refuse("BeamSpec", {place: message} if found else {})
         return self
 
     @property
@@ -364,29 +366,48 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
 
 
 def _solid_faults(spec: BeamSpec) -> Iterator[str]:
-    """Yield what the model of the part as a solid cannot do."""
-    mechanism, analysis = spec.mechanism, spec.analysis
+    """Yield what the model of the part as a solid cannot do: the key, and why."""
+    mechanism, analysis, beams = spec.mechanism, spec.analysis, spec.mechanism.beams
     by_load = mechanism.drive.kind in ("force", "moment")
-    if mechanism.drive.kind == "loads":
-        yield "follows one node that is moved or loaded: several loads that grow together have no such node"
-    things: dict[str, object] = {"springs": mechanism.springs, "loads": mechanism.loads}
-    things["nodes that are moved"] = [name for name, node in mechanism.nodes.items() if node.moved is not None]
-    things["pins between beams"] = [
-        name for name, beam in mechanism.beams.items() if "pin" in (beam.start_joint, beam.end_joint)
+    moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
+    pins = [
+        f"mechanism.beams.{name}.{joint}"
+        for name, beam in beams.items()
+        for joint in ("start_joint", "end_joint")
+        if getattr(beam, joint) == "pin"
     ]
-    things["analysis.modes"], things["drive.follows"] = analysis.modes, getattr(mechanism.drive, "follows", False)
-    things["analysis.outputs.cross_stiffness"] = analysis.outputs.cross_stiffness
-    things["analysis.imperfection"] = analysis.imperfection
-    things["analysis.through_folds of a motion"] = analysis.through_folds and not by_load
-    unknown = [name for name, thing in things.items() if thing]
-    if unknown:
-        yield f"does not know {', '.join(unknown)}: leave that out, or take the beams, 'reissner'"
-    if mechanism.closure == "raw":
-        yield "needs beams that end at their nodes: closure 'rotscale' or 'chain'"
-    if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:
-        yield "needs one material for all beams"
-    if len({beam.width or mechanism.width for beam in mechanism.beams.values()}) > 1:
-        yield "needs one width for all beams"
+    things: tuple[tuple[str, object, str], ...] = (
+        (
+            "mechanism.drive",
+            mechanism.drive.kind == "loads",
+            "one node is moved or loaded, and no path of loads followed",
+        ),
+        ("mechanism.drive.follows", getattr(mechanism.drive, "follows", False), "its loads keep their direction"),
+        ("mechanism.loads", mechanism.loads, "nothing but the drive acts on the part"),
+        ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and a spring is not of it"),
+        (", ".join(moved), moved, "the part is solved as drawn, and supports stay where they are"),
+        (", ".join(pins), pins, "the outline is one piece at every node"),
+        (
+            "mechanism.closure",
+            mechanism.closure == "raw",
+            "beams that are forced into place are drawn as if they fitted",
+        ),
+        ("analysis.modes", analysis.modes, "it has no masses"),
+        ("analysis.imperfection", analysis.imperfection, "the part is meshed as drawn"),
+        ("analysis.outputs.cross_stiffness", analysis.outputs.cross_stiffness, "the driven piece is held across"),
+        ("analysis.through_folds", analysis.through_folds and not by_load, "a motion is followed to its first fold"),
+        ("mechanism.beams", _several(spec, "material"), "all beams must be of one material"),
+        ("mechanism.beams", _several(spec, "width"), "all beams must have one width"),
+    )
+    for key, given, reason in things:
+        if given:
+            yield f"{key} is not known to it: {reason}"
+
+
+def _several(spec: BeamSpec, key: str) -> bool:
+    """Tell whether beams differ in a value that they may take from the mechanism."""
+    usual = getattr(spec.mechanism, key)
+    return len({getattr(beam, key) or usual for beam in spec.mechanism.beams.values()}) > 1
 
 
 def _no_density(spec: BeamSpec) -> str:
