@@ -140,6 +140,41 @@ def test_stiffness_across_is_a_metric_and_a_column():
     assert value(result, "cross_stiffness") == pytest.approx(wanted, rel=1e-5)
 
 
+STRAIGHT_COLUMN = """
+cfmkit: 1
+family: beam
+name: column
+mechanism:
+  material: {youngs_modulus: 200 GPa}
+  thickness: 2 mm
+  width: 10 mm
+  axial: true
+  nodes:
+    root: {at: [0 mm, 0 mm], support: clamped}
+    tip: {at: [100 mm, 0 mm]}
+  beams:
+    beam: {start: root, end: tip}
+  drive: {kind: displacement, node: tip, direction: 180 deg}
+analysis:
+  travel: 0.1 mm
+  points: 41
+  branch: primary
+  outputs: {cross_stiffness: true}
+"""
+
+
+def test_stiffness_across_an_unstable_column_has_a_pole_where_it_would_buckle_with_its_tip_held():
+    """Under a thrust P it is P / (tan(n L)/n - L), n^2 = P/EI: unbounded at n L = 4.4934, Euler's third case."""
+    result = cfmkit.analyze(cfmkit.loads(STRAIGHT_COLUMN))
+    bending, length = 200e9 * 10e-3 * 2e-3**3 / 12, 0.1
+    thrust, column = result.curve.effort[4:24], result.curve.extra["cross_stiffness"].values[4:24]
+    n = np.sqrt(thrust / bending)
+    np.testing.assert_allclose(column, thrust / (np.tan(n * length) / n - length), rtol=2e-2)
+    assert value(result, "cross_stiffness") is None
+    below = cfmkit.analyze(cfmkit.loads(f"{STRAIGHT_COLUMN}  window: [0.01 mm, 0.05 mm]\n"))
+    assert -27e3 < value(below, "cross_stiffness") < -25e3
+
+
 def test_the_metric_of_stiffness_across_is_the_smallest_in_the_window():
     window = ("points: 21", "points: 21\n  window: [20 mm, 60 mm]\n  outputs: {cross_stiffness: true}")
     result = cfmkit.analyze(cantilever(window))

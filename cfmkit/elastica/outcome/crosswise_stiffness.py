@@ -19,7 +19,10 @@ from cfmkit.elastica.model.network import Network, Support
 from cfmkit.elastica.model.network_under_drive import Layout
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import Any
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
@@ -48,6 +51,30 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
         Negative where the node would leave sideways; nan where nothing gives way.
     """
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
+    found = [_condensed(each, across, kept) for each, across, kept in _tangents(path, node, direction, chosen)]
+    scales = path.layout.scales
+    return read_only(np.concatenate([np.empty(0), *found]) * scales.force / scales.length)
+
+
+def poles(path: Path, node: str, direction: float) -> NDArray[np.bool_]:
+    """Return between which neighbouring points of a path `cross_stiffness` is unbounded, (p - 1,).
+
+    It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
+    sign, one mode of the part with its node held across passes neutral stability, and the stiffness has a pole.
+    """
+    every = np.arange(len(path))
+    signs, values = [np.empty(0)], [np.empty(0)]
+    for stiffness, across, kept in _tangents(path, node, direction, every):
+        signs.append(np.linalg.slogdet(stiffness[:, kept[:, None], kept])[0])
+        values.append(_condensed(stiffness, across, kept))
+    held, value = np.concatenate(signs), np.concatenate(values)
+    return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
+
+
+def _tangents(
+    path: Path, node: str, direction: float, chosen: NDArray[np.int64]
+) -> Iterator[tuple[FloatArray, int, NDArray[np.int64]]]:
+    """Yield tangents of the released network at points (m, n, n), the unknown across, and those that follow it."""
     layout, solver = path.layout, path.solver
     loose = Solver(_released(layout, node, direction), solver.mesh, solver.tolerance)
     slots = loose.layout.plan.slot
@@ -55,13 +82,9 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
     ys = np.concatenate([_unknowns(path, loose.layout, node), path.points.y[:, solver.n_free :]], axis=1)
     kept = np.array([k for k in range(loose.n) if k not in (along, across)])
     together = 1 if len(kept) >= _MANY else max(1, len(chosen))  # large matrices one by one: all of them fill gigabytes
-    found = np.empty(len(chosen))
     for first in range(0, len(chosen), together):
         some = chosen[first : first + together].tolist()
-        stiffness = np.array([loose.tangent_at(ys[k], float(path.points.drive[k]))[0] for k in some])
-        found[first : first + together] = _condensed(-stiffness, across, kept)
-    scales = layout.scales
-    return read_only(found * scales.force / scales.length)
+        yield -np.array([loose.tangent_at(ys[k], float(path.points.drive[k]))[0] for k in some]), across, kept
 
 
 def _released(layout: Layout, node: str, direction: float) -> Layout:
@@ -127,4 +150,4 @@ def _followed(block: FloatArray, column: FloatArray) -> FloatArray:
     return np.full(len(column), np.nan) if open_force else np.asarray(follow)
 
 
-__all__ = ["cross_stiffness"]
+__all__ = ["cross_stiffness", "poles"]

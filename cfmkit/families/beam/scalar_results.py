@@ -255,12 +255,28 @@ def _across(solution: Solution) -> dict[str, float | None]:
     def gives(path: Path) -> FloatArray:
         return -replace(solution, path=path, keep=np.arange(len(path)), ends=()).cross_stiffness[None]
 
-    least = None if _has_pole(solution, gives, window) else largest(solution, gives, window)
+    unbounded = _passes_pole(solution, drive.direction, window) or _has_pole(solution, gives, window)
+    least = None if unbounded else largest(solution, gives, window)
     return total | {
         "parasitic_motion": largest(solution, across, window),
         "parasitic_rotation": largest(solution, turned, window),
         "cross_stiffness": None if least is None else -least,
     }
+
+
+def _passes_pole(solution: Solution, direction: float, window: tuple[float, float]) -> bool:
+    """Tell whether the stiffness across the drive has a pole between two points of a path in a window.
+
+    Such is that of a node without a guide, on a part of the path where even a guide would not make it stable.
+    """
+    from cfmkit.elastica.outcome.crosswise_stiffness import poles
+
+    path = solution.path
+    x, y, _ = path.motion(solution.spec.mechanism.drive.node).T
+    along = np.cos(direction) * x + np.sin(direction) * y
+    inside = (along >= window[0]) & (along <= window[1])
+    found = poles(path, solution.assembly.driven, solution.assembly.direction)
+    return bool((found & inside[1:] & inside[:-1]).any())
 
 
 BESIDE = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
