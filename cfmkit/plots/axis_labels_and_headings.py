@@ -28,6 +28,9 @@ POLE = 3.0
 LEFT = 3.0
 """Distance of headings from the edge of the print [mm], about one letter."""
 
+LEAST_OF_NAME = 4
+"""Letters of a name that a heading keeps: with fewer it says nothing, and the subject stands alone."""
+
 KEY_GAP = 3.0
 """Between the entries of a colour key [mm]: twice the space between words."""
 
@@ -110,17 +113,27 @@ def write_heading(figure: Figure, heading: Heading) -> None:
 
 
 def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: dict[str, Any]) -> None:
-    """Write two parts on one line, the first cut with an ellipsis as far as the width demands."""
+    """Write two parts on one line, the first cut with an ellipsis as far as the width demands.
+
+    Where too little of the first would be left to be recognised, the second stands alone, smaller if it must be.
+    """
     width, height = size_mm(figure)
     room = (width - 2.0 * LEFT) * MM * figure.dpi
     text = figure.text(LEFT / width, 1.0 - down_mm / height, "", ha="left", va="top", **look)
     first, last = (" ".join(part.split(" ")) for part in (" ".join(parts[0].split()), parts[1]))
+    least = min(LEAST_OF_NAME, len(first)) if last else 1
     text.set_text(first + last)
     while (extent := text.get_window_extent().width) > room and len(first) > 1:
         # by the excess at the mean width of a letter, so that two or three rounds do
         excess = (extent - room) / extent * len(first + last)
         first = first[: max(len(first) - 1 - max(int(0.8 * excess), 1), 1)].rstrip()
+        if len(first) < least:
+            break
         text.set_text(f"{first}…{last}")
+    if extent > room and last:
+        text.set_text(last.removeprefix(": "))
+        extent = text.get_window_extent().width
+        text.set_fontsize(look["size"] * min(1.0, room / extent))
 
 
 @styled

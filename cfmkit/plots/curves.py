@@ -19,7 +19,7 @@ from cfmkit.plots.axis_labels_and_headings import axis_label, finite_range, show
 from cfmkit.plots.bands_from_requirements import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.stacked_line_diagrams import Limit, MarkedRange, level, padded, shade
-from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, styled
+from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, size_mm, styled
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
 
@@ -39,6 +39,11 @@ than a line is thick."""
 NAME_ROOM = 0.2
 """Where several curves are named at their ends, the axes are longer by this fraction: room for a value with its unit,
 chosen by eye on the shipped studies."""
+
+
+USUAL = 120.0
+"""Width of axes for which `NAME_ROOM` was chosen [mm]; in narrower ones names, whose letters keep their size, take a
+larger share."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,7 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
     wanted = _target_line(source) if isinstance(source, Result) else None
     _limit(ax, (lines if wanted is None else [*lines, wanted], bands), look, kind)
     if len(curves) > 1 and look.names and look.window is None:
-        ax.set_xlim(right=ax.get_xlim()[1] + NAME_ROOM * float(np.ptp(ax.get_xlim())))
+        ax.set_xlim(right=ax.get_xlim()[1] + _name_room(ax) * float(np.ptp(ax.get_xlim())))
     region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
     level_names = [level(ax, float(to_border(item.value, kind)), item.text) for item in look.levels]
     band_names = [_draw_band(ax, band, curves[0]) for band in bands]
@@ -117,6 +122,12 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
             [*_name_lines(ax, lines), *target_names, *_unstable_name(lines), *level_names, *band_names, *region_names],
         )
     return ax
+
+
+def _name_room(ax: Axes) -> float:
+    """Return the share of the axes by which they are longer for the names at the ends of curves."""
+    width = ax.get_position().width * size_mm(ax.figure)[0]
+    return NAME_ROOM * min(max(USUAL / width, 1.0), 2.0)
 
 
 def _curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:

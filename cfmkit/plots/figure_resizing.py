@@ -29,6 +29,9 @@ LEAST, MOST = 0.8, 1.1
 LETTER = 0.55
 """Width of a letter, on the average, in sizes of its type."""
 
+EDGE = 4.0
+"""Least distance of the name of an axis from the edge of the paper [pt]: half a letter."""
+
 SIDE_BY_SIDE = 0.6
 """Boxes that would become narrower than this share of their width stand below each other instead: names beside lines,
 in letters of a fixed size, overlap in less."""
@@ -194,6 +197,7 @@ def laid_out(make: Callable[[], Figure], layout: FigureLayout) -> Figure:
         ax.tick_params(labelleft=True, labelbottom=True)  # a neighbour had the numbers of an axis for both
     for ax in figure.axes:
         _break_label(ax, layout.size[1] / 25.4 * 72.0)
+        _keep_on_paper(ax)
     return figure
 
 
@@ -203,3 +207,20 @@ def _break_label(ax: Axes, paper: float) -> None:
     name, bracket, unit = label.get_text().rpartition(" [")
     if name and len(label.get_text()) * LETTER * float(label.get_fontsize()) > ax.get_position().height * paper:
         label.set_text(f"{name}\n{bracket.strip()}{unit}")
+
+
+def _keep_on_paper(ax: Axes) -> None:
+    """Bring the name of a vertical axis nearer to its numbers where it would leave the paper at the left."""
+    label = ax.yaxis.label
+    if not label.get_text():
+        return
+    ax.yaxis.get_tightbbox()  # puts the label where it will be drawn
+    scale = 72.0 / label.figure.dpi
+    outside = EDGE - label.get_window_extent().x0 * scale
+    if outside <= 0.0:
+        return
+    ax.yaxis.labelpad -= min(outside, ax.yaxis.labelpad)
+    ax.yaxis.get_tightbbox()
+    box = label.get_window_extent()
+    if box.x0 * scale < EDGE:  # in smaller letters, then
+        label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - EDGE) / (box.width * scale), 0.7))

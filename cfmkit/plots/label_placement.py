@@ -30,6 +30,12 @@ GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
 """Distances from the line that are tried [pt]: from a third of the size of the letters on, farther apart the farther
 away they are, where a place need not be found as exactly."""
 
+FINER = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0)
+"""The same where every place of those covers a line, as in a narrow figure: nearer, closer together, and farther."""
+
+COVERING = 40.0
+"""What it costs to cover a line over the height of a name [pt]: more than any distance that is tried."""
+
 MARGIN = 1.5
 """Least distance of a name from the edge of the axes [pt]: one cell."""
 
@@ -95,7 +101,17 @@ def _write(ground: _Ground, label: Label, size: float) -> Text | None:
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
     box = ground.size_of(text)
-    center = _best(ground, label, points, box)
+    center, cost = _best(ground, label, points, box)
+    covered = float(ground.covered(center[None, :], box)[0])
+    if covered > 0:
+        chosen, cost = label.text, cost + 2.0 * COVERING * covered
+        for words in (label.text, _in_two_lines(label.text)):
+            text.set_text(words)
+            other = ground.size_of(text)
+            place, price = _best(ground, label, points, other, FINER)
+            if price < cost:
+                center, cost, box, chosen = place, price, other, words
+        text.set_text(chosen)
     text.set_transform(ground.ax.transAxes)
     text.set_position(tuple(center / ground.extent))
     text.set_zorder(6)
@@ -109,6 +125,24 @@ def _write(ground: _Ground, label: Label, size: float) -> Text | None:
     return text
 
 
+def _in_two_lines(text: str) -> str:
+    """Return a text broken at the space that is nearest to its middle; a text of one line and one word as it is.
+
+    Examples
+    --------
+    >>> _in_two_lines("ripple 6.86 % ≤ 6.9 %")
+    'ripple 6.86 %\\n≤ 6.9 %'
+    """
+    # a number stays beside its unit, and behind its sign
+    spaces = [
+        at for at, letter in enumerate(text) if letter == " " and not (text[at - 1].isdigit() or text[at - 1] in "≤≥=")
+    ]
+    if not spaces or "\n" in text:
+        return text
+    middle = min(spaces, key=lambda at: abs(2 * at - len(text)))
+    return f"{text[:middle]}\n{text[middle + 1 :]}"
+
+
 def _thinned(points: FloatArray, most: int = 80) -> FloatArray:
     if len(points) <= most:
         return points
@@ -116,27 +150,44 @@ def _thinned(points: FloatArray, most: int = 80) -> FloatArray:
     return thinned
 
 
-def _best(ground: _Ground, label: Label, points: FloatArray, box: FloatArray) -> FloatArray:
-    """Return the cheapest centre for a box [pt] beside the points."""
-    gaps = np.array(GAPS)
-    offsets = (_SIDES[:, None, :] * (box / 2 + gaps[:, None, None].transpose(1, 0, 2))).reshape(-1, 2)
-    away = np.tile(gaps, len(_SIDES))
+def _best(
+    ground: _Ground, label: Label, points: FloatArray, box: FloatArray, tried: tuple[float, ...] = GAPS
+) -> tuple[FloatArray, float]:
+    """Return the cheapest centre for a box [pt] beside the points, and what it costs."""
+    sides, gaps = _ways(tried)
+    offsets, away = sides * (box / 2 + gaps), gaps.max(axis=1)
     centers = (points[:, None, :] + offsets[None, :, :]).reshape(-1, 2)
     share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
-    slanted = np.tile(np.repeat(np.abs(_SIDES).sum(axis=1) > 1, len(gaps)), len(points))
+    slanted = np.tile(np.abs(sides).sum(axis=1) > 1, len(points))
+    weight = 3.0 * COVERING if tried is FINER else COVERING
     covered = ground.covered(centers, box)
     near = ground.covered(centers, box + 5.0)
     cost = (
-        40.0 * covered + 2.0 * near + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
+        weight * covered + 2.0 * near + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
     )
     if label.toward:
         wanted = np.array(label.toward) / np.hypot(*label.toward)
-        sides = _SIDES / np.hypot(_SIDES[:, 0], _SIDES[:, 1])[:, None]
-        cost = cost + np.tile(np.repeat(25.0 * (1.0 - sides @ wanted), len(gaps)), len(points))
+        unit = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
+        cost = cost + np.tile(25.0 * (1.0 - unit @ wanted), len(points))
     cost = cost + _between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
-    center: FloatArray = centers[int(np.argmin(cost))]
-    return center
+    cheapest = int(np.argmin(cost))
+    center: FloatArray = centers[cheapest]
+    return center, float(cost[cheapest])
+
+
+def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return on which sides of a point a name may stand (n, 2), and how far away in both directions (n, 2) [pt].
+
+    In a narrow figure a corner of the name may also stand above or below the point, not on a diagonal alone.
+    """
+    away = np.array(tried)
+    sides, gaps = np.repeat(_SIDES, len(away), axis=0), np.tile(away, len(_SIDES))[:, None] * [1.0, 1.0]
+    if tried is not FINER:
+        return sides, gaps
+    corners = np.repeat(_SIDES[4:], len(away), axis=0)
+    upright = np.column_stack([np.full(len(corners), FINER[0]), np.tile(away, 4)])
+    return np.concatenate([sides, corners]), np.concatenate([gaps, upright])
 
 
 def _between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:

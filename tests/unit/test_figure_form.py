@@ -13,6 +13,7 @@ from cfmkit.plots import style
 from cfmkit.plots.axis_labels_and_headings import Heading, write_heading
 from cfmkit.plots.figure_options import PLAIN, FigureForm, form_of
 from cfmkit.plots.figure_resizing import FigureLayout
+from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.parts import to_scale
 
 SIZE = style.MM
@@ -183,3 +184,33 @@ def test_panels_side_by_side_below_a_wide_diagram_stand_below_each_other_in_a_co
     assert all(lows[above] > highs[below] for above, below in itertools.pairwise(order))
     assert found.boxes[0][2:] == pytest.approx((43.5, 30.0))
     assert max(left + wide for left, _, wide, _ in found.boxes) <= 84.0
+
+
+def test_a_heading_stays_on_a_narrow_paper():
+    figure = style.new_figure(84.0, 60.0)
+    write_heading(figure, Heading("sanchez-salinas-2022", "force over travel of the shuttle, from the as-made pose"))
+    (text,) = figure.texts
+    assert text.get_window_extent().x1 <= figure.bbox.width
+    assert text.get_text() == "force over travel of the shuttle, from the as-made pose"
+
+
+def test_names_of_axes_and_lines_stay_on_a_narrow_paper_and_off_the_curve():
+    result = cfmkit.analyze(cfmkit.load("configs/slider_crank_li2019.yaml"))
+    figure = form_of(width="84 mm").draw(api.figures(result)["joints"])
+    figure.canvas.draw()
+    assert all(ax.yaxis.label.get_window_extent().x0 > 0.0 for ax in figure.axes)
+
+
+def test_a_name_that_would_cover_its_line_is_broken():
+    figure = style.new_figure(84.0, 60.0)
+    ax = style.axes_mm(figure, (17.0, 12.0, 60.0, 30.0))
+    across = np.linspace(0.0, 1.0, 60)
+    points = np.column_stack([across, 0.5 + 0.45 * np.sin(7.0 * across)])
+    ax.plot(*points.T)
+    ax.set_xlim(0, 1)
+    ax.set_ylim(0, 1)
+    (text,) = place_labels(ax, [Label("a name of four words, rather long", "black", points)])
+    box = text.get_window_extent()
+    dots = ax.transData.transform(points)
+    inside = (dots > [box.x0, box.y0]) & (dots < [box.x1, box.y1])
+    assert not inside.all(axis=1).any()

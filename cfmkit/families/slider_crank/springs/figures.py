@@ -251,7 +251,7 @@ def _name_wells(ax: Axes, solution: Solution) -> None:
     dimension, found = motion_scale(solution).dimension, []
     for item in solution.character.equilibria:
         place = float(to_border(item.motion, dimension)), float(to_border(item.energy, "energy"))
-        text = f"{'stable' if item.stable else 'unstable'}, {value_text(item.motion, dimension)}"
+        text = f"{'stable' if item.stable else 'unstable'} pose at {value_text(item.motion, dimension)}"
         found.append(Label(text, INK if item.stable else GREY, np.array([place]), toward=(0.0, 1.0)))
     place_labels(ax, found)
 
