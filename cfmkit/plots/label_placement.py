@@ -30,7 +30,7 @@ GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
 """Distances from the line that are tried [pt]: from a third of the size of the letters on, farther apart the farther
 away they are, where a place need not be found as exactly."""
 
-FINER = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0)
+FINER = (1.0, 2.5, 4.0, 6.0, 8.5, 11.0, 14.0, 18.0, 23.0, 28.0, 36.0, 46.0, 58.0, 72.0)
 """The same where every place of those covers a line, as in a narrow figure: nearer, closer together, and farther."""
 
 COVERING = 40.0
@@ -186,7 +186,8 @@ def _ways(tried: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     if tried is not FINER:
         return sides, gaps
     corners = np.repeat(_SIDES[4:], len(away), axis=0)
-    upright = np.column_stack([np.full(len(corners), FINER[0]), np.tile(away, 4)])
+    # a point on the edge of the axes, as where a curve begins, leaves the name its margin
+    upright = np.column_stack([np.full(len(corners), FINER[0] + MARGIN), np.tile(away, 4)])
     return np.concatenate([sides, corners]), np.concatenate([gaps, upright])
 
 
