@@ -625,6 +625,12 @@ def test_elastica_that_are_pulled_taut_have_no_limit_point(support):
     assert freed.curve.motion[-1] == pytest.approx(8 * MM)
 
 
+def test_elastica_that_are_pulled_taut_after_the_last_point_of_a_coarse_curve_are_said_to_be():
+    result = cfmkit.analyze(cfmkit.loads(TAUT.replace("points: 61", "points: 5")))
+    assert result.message.startswith("the beams are taut at 2.")
+    assert "limit point" not in result.message
+
+
 def test_elastica_that_a_force_pulls_taut_before_the_first_point_are_said_to_be():
     drive = (("kind: displacement", "kind: force"), ("travel: 8 mm", "force: 1e6 N"))
     result = cfmkit.analyze(cfmkit.loads(functools.reduce(lambda text, change: text.replace(*change), drive, TAUT)))

@@ -21,6 +21,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.elastica.outcome.path import Path
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import BeamSpec
@@ -117,16 +118,21 @@ def ending_of(solution: Solution) -> PathEnding:
     path = solution.path
     said = in_units(solution.assembly, path.message or path.status.value)
     rigid = solution.spec.fidelity == "inextensible"
-    taut = list(_taut(solution)) if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) else []
+    taut: list[str] = []
+    kept = len(solution.keep) > 1
+    if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) and len(path):
+        taut = list(_taut(path, int(solution.keep[-1]))) if kept else []
+        # points of the curve may be so far apart that they are pulled straight after the last of them, or the first
+        if not taut:
+            taut, kept = list(_taut(path, len(path) - 1)), False
     if not taut and len(solution.keep) < 2:
         return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
     if not taut:
         return PathEnding(said)
-    # a load may pull them straight before the first point of the curve, of which there is none then
-    if len(solution.keep) < 2:
-        where = drive_text(solution.assembly, float(path.drive[-1]))
-    else:
+    if kept:
         where = format_short(float(solution.motion[-1]), solution.motion_dimension)
+    else:
+        where = drive_text(solution.assembly, float(path.drive[-1]))
     return PathEnding(
         f"the beams are taut at {where} ({', '.join(taut)}), and inextensible beams cannot follow: allow stretching "
         "('mechanism.axial: true')",
@@ -134,11 +140,8 @@ def ending_of(solution: Solution) -> PathEnding:
     )
 
 
-def _taut(solution: Solution) -> Iterator[str]:
-    """Yield the beams that are pulled straight at the last point, each with its length and the way between its ends."""
-    path, last = solution.path, int(solution.keep[-1]) if len(solution.keep) > 1 else len(solution.path) - 1
-    if last < 0:
-        return
+def _taut(path: Path, last: int) -> Iterator[str]:
+    """Yield the beams that are pulled straight at a point, each with its length and the way between its ends."""
     for name, beam in path.layout.network.beams.items():
         line = path.shape(name, last)
         chord = line[-1] - line[0]
