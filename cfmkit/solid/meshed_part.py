@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 ACROSS, SHARE = 2.5, 0.2
 """Elements across the thinnest place, and side of an element on a fillet in radii, of the finer mesh: the force of
 Lan's part at 2 mm is then within 3e-4 of that of elements of 0.6 times the size (4.94735 N)."""
+LEAST_ACROSS = 2.0
+"""Elements across the thickness, whatever size is asked for: fewer are too stiff."""
 COARSER = 1.5
 """Sides of the coarser mesh in those of the finer one: half as many nodes, so that the check costs a third more."""
 TURN = math.radians(1.0)
@@ -118,8 +120,10 @@ class Part:
     largest: float = 1.0
     obstacles: tuple[FloatArray, ...] = ()
 
-    def meshed(self, size: float) -> Meshed:
-        """Return the part with elements of a size [m].
+    def meshed(self, size: float, across: float = LEAST_ACROSS) -> Meshed:
+        """Return the part with elements of a size [m], and of so many across the thickness at least.
+
+        A part with blocks has as many across as the size leaves.
 
         Raises
         ------
@@ -127,7 +131,7 @@ class Part:
             If the outline cannot be meshed so, or no node is where the part is held.
         """
         share = SHARE * size / (self.thinnest / ACROSS)
-        across = self.thinnest / size if self.largest > 1.0 else 2.0
+        across = self.thinnest / size if self.largest > 1.0 else across
         seams = [seam for place in self.places for seam in place.seams]
         grid = mesh(self.rings, self.largest * size, share, across, seams, ON)
         groups, held = self._groups(grid.nodes)

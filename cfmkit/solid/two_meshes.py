@@ -56,10 +56,13 @@ class DrivenPart:
         cfmkit.errors.GeometryError
             If the outline cannot be meshed so, or no node is where the part is held.
         """
-        from cfmkit.solid.meshed_part import COARSER
+        from cfmkit.solid.meshed_part import COARSER, LEAST_ACROSS
 
         second = (*self.stops[:-1:2], self.stops[-1])
-        coarse = self.part.meshed(COARSER * self.size).followed(
+        # of sizes that leave the finer mesh no fewer elements across, the coarser one must not be the same mesh again
+        limited = self.size * LEAST_ACROSS >= self.part.thinnest
+        across = LEAST_ACROSS / COARSER if limited else LEAST_ACROSS
+        coarse = self.part.meshed(COARSER * self.size, across).followed(
             second, lambda share: report(FIRST * share, "coarser mesh")
         )
         fine = self.part.meshed(self.size).densely(

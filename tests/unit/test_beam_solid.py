@@ -334,3 +334,15 @@ def test_stages_in_series_share_the_travel_and_carry_one_force():
     held = supports.reactions(last.unknowns, 1e-3, solved.problem.elements.forces(solved.moved(last)))
     ground = sum(held[k, 1] for k, name in enumerate(names) if name.rstrip("'") in ("n1", "n2"))
     assert ground == pytest.approx(last.effort, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_mesh_that_is_as_coarse_as_can_be_is_not_compared_with_itself(tmp_path):
+    """Elements of 5 mm in a leaf of 0.5 mm: both meshes had been the same one, and the error told a hundredth of it."""
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE.replace("travel: 5 mm", "travel: 0.3 mm"), encoding="utf-8")
+    spec = cfmkit.load(path)
+    coarse, fine = (cfmkit.analyze(spec.replace({"analysis.solid.mesh": mesh})) for mesh in ("5 mm", "0.1 mm"))
+    off = np.abs(coarse.curve.effort - fine.curve.effort).max() / fine.curve.effort.max()
+    assert off < coarse.values["mesh_force_error"].value
+    assert coarse.values["mesh_force_difference"].value > 1e-4

@@ -35,12 +35,12 @@ def test_lans_part_is_too_soft_by_what_its_energy_says_and_the_cure_counts_it():
 
 def test_narrow_beams_are_not_told_of():
     assert reported(LAN, "mechanism.width=1 mm", "analysis.points=11") == []
-    assert reported(DING) == []
+    assert reported(DING, "analysis.preloads=[0 mm]") == []
 
 
 def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
     wide = "mechanism.bistable.width=20 mm"
-    (one,) = reported(DING, wide)
+    (one,) = reported(DING, wide, "analysis.preloads=[0 mm]")
     assert "4.74 % more energy in the leaves at 4.263 mm" in one.message
     assert "only 'analysis.fidelity: exact' accounts for it" in one.message
     with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
@@ -94,3 +94,12 @@ def test_a_root_that_does_not_curl_has_the_deflection_of_a_solid_in_three_dimens
     path.write_text(FLAT_ROOT, encoding="utf-8")
     result = cfmkit.analyze(cfmkit.load(path).replace({"analysis.force": force}))
     assert result.curve.motion[-1] / 24e-3 == pytest.approx(solid, rel=0.01)
+
+
+def test_wide_leaves_are_looked_at_under_every_preload():
+    """A spring of 1.5 x 10 mm is bent little without a preload, and by 7.5 mm more with the largest."""
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.fidelity": "exact"})
+    named = {preload: {one.name for one in cfmkit.analyze(spec.replace({"analysis.preloads": preloads})).warnings}
+             for preload, preloads in (("none", ["0 mm"]), ("all", ["0 mm", "7.5 mm"]))}  # fmt: skip
+    assert "wide_beam" not in named["none"]
+    assert "wide_beam" in named["all"]

@@ -168,18 +168,22 @@ class Solution(ShortRepr):
     def hindered_curling(self) -> Iterator[tuple[str, float, float]]:
         """By what share leaves and spring are too soft at most, as wide strips, and at which travel [m].
 
-        Their curvature is taken from the stress, as if they were bent to half a sine.
+        Their curvature is taken from the stress at any preload, as if they were bent to half a sine.
         """
-        about, push = self.spec.mechanism, self.nominal
+        about = self.spec.mechanism
         if about.wide_beams or self.spec.analysis.fidelity in ("truss", "solid"):
             return
         own, nu = about.material.modulus, about.material.poisson
-        parts = (("leaves", about.bistable, push.leaves.stress), ("spring", about.positive, push.spring_stress))
-        for name, leaf, stress in parts:
+        travel = np.concatenate([push.travel for push in self.pushes])
+        leaves, spring = (
+            np.concatenate([np.asarray(one) for one in found])
+            for found in zip(*((push.leaves.stress, push.spring_stress) for push in self.pushes), strict=True)
+        )
+        for name, leaf, stress in (("leaves", about.bistable, leaves), ("spring", about.positive, spring)):
             if leaf is not None:  # a bought spring is none
                 worst = int(np.nanargmax(stress))
                 curvature = 2.0 * float(stress[worst]) / (own * leaf.thickness)
-                yield name, float(hindered_share(leaf.width, leaf.thickness, nu, curvature)), float(push.travel[worst])
+                yield name, float(hindered_share(leaf.width, leaf.thickness, nu, curvature)), float(travel[worst])
 
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:
