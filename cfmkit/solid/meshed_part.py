@@ -44,7 +44,7 @@ ACROSS, SHARE = 2.5, 0.2
 """Elements across the thinnest place, and side of an element on a fillet in radii, of the finer mesh: the force of
 Lan's part at 2 mm is then within 3e-4 of that of elements of 0.6 times the size (4.94735 N)."""
 LEAST_ACROSS = 2.0
-"""Elements across the thickness, whatever size is asked for: fewer are too stiff."""
+"""Elements across the thickness, whatever the requested size: fewer are too stiff."""
 COARSER = 1.5
 """Sides of the coarser mesh in those of the finer one: half as many nodes, so that the check costs a third more."""
 TURN = math.radians(1.0)
