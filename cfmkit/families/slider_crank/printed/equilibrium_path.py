@@ -109,8 +109,8 @@ class Pressed(ShortRepr):
         return force
 
 
-@dataclass(frozen=True)
-class Chain:
+@dataclass(frozen=True, repr=False)
+class Chain(ShortRepr):
     """A chain ready to be pressed.
 
     Attributes

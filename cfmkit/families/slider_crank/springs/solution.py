@@ -74,8 +74,8 @@ def grid_over(assembly: Assembly, low: float, high: float) -> FloatArray:
     return places
 
 
-@dataclass(frozen=True)
-class Character:
+@dataclass(frozen=True, repr=False)
+class Character(ShortRepr):
     """What kind of mechanism it is over an interval of its motion.
 
     Attributes

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
     UnitCurves,
@@ -70,8 +71,8 @@ class Rubbing:
         return bool(self.pin or self.guide or self.drag)
 
 
-@dataclass(frozen=True)
-class Assembly:
+@dataclass(frozen=True, repr=False)
+class Assembly(ShortRepr):
     """A slider-crank put together.
 
     Attributes
