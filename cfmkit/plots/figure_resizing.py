@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 NARROW = 8.0
 """Boxes that are narrower keep their size when a figure is stretched [mm]: keys of colours."""
@@ -31,6 +32,9 @@ LETTER = 0.55
 
 EDGE = 4.0
 """Least distance of the name of an axis from the edge of the paper [pt]: half a letter."""
+
+SMALLEST = 0.7
+"""Share of their size to which letters are made smaller: 5 to 6 pt, which print still shows."""
 
 SIDE_BY_SIDE = 0.6
 """Boxes that would become narrower than this share of their width stand below each other instead: names beside lines,
@@ -198,6 +202,9 @@ def laid_out(make: Callable[[], Figure], layout: FigureLayout) -> Figure:
     for ax in figure.axes:
         _break_label(ax, layout.size[1] / 25.4 * 72.0)
         _keep_on_paper(ax)
+        _keep_name_below_on_paper(ax)
+    for text in figure.texts:
+        _keep_note_on_paper(text, figure)
     return figure
 
 
@@ -224,3 +231,32 @@ def _keep_on_paper(ax: Axes) -> None:
     box = label.get_window_extent()
     if box.x0 * scale < EDGE:  # in smaller letters, then
         label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - EDGE) / (box.width * scale), 0.7))
+
+
+def _keep_note_on_paper(text: Text, figure: Figure) -> None:
+    """Break a note whose parts are parted by semicolons where it would leave the paper, and make it smaller then."""
+    room = figure.bbox.width - EDGE / 72.0 * figure.dpi - text.get_window_extent().x0
+    parts = text.get_text().split(";  ")
+    if text.get_window_extent().width > room and len(parts) > 1:
+        half = (len(parts) + 1) // 2
+        text.set_text(";  ".join(parts[:half]) + ";\n" + ";  ".join(parts[half:]))
+    _shrink(text, text.get_window_extent().width, room)
+
+
+def _keep_name_below_on_paper(ax: Axes) -> None:
+    """Move the name of a horizontal axis sideways where it would leave the paper, smaller where it is wider."""
+    label, paper = ax.xaxis.label, ax.figure.bbox.width
+    edge = EDGE / 72.0 * ax.figure.dpi
+    if not label.get_text():
+        return
+    _shrink(label, label.get_window_extent().width, paper - 2.0 * edge)
+    ax.xaxis.get_tightbbox()  # puts the label where it will be drawn
+    box, room = label.get_window_extent(), ax.get_window_extent().width
+    shift = max(edge - box.x0, 0.0) - max(box.x1 - (paper - edge), 0.0)
+    label.set_x(label.get_position()[0] + shift / room)
+
+
+def _shrink(text: Text, width: float, room: float) -> None:
+    """Write a text in letters so small that it has the room, but not smaller than can be read."""
+    if width > room > 0.0:
+        text.set_fontsize(float(text.get_fontsize()) * max(room / width, SMALLEST))

@@ -214,3 +214,21 @@ def test_a_name_that_would_cover_its_line_is_broken():
     dots = ax.transData.transform(points)
     inside = (dots > [box.x0, box.y0]) & (dots < [box.x1, box.y1])
     assert not inside.all(axis=1).any()
+
+
+def test_notes_and_names_below_axes_stay_on_a_narrow_paper():
+    def drawn():
+        figure = style.new_figure()
+        ax = style.axes_mm(figure, (60.0, 20.0, 95.0, 60.0))
+        ax.set_xlabel("change of the yield when the tolerance is halved,\n95 % interval [percentage points]")
+        figure.text(
+            0.02, 0.9, "200 parts;  mean 50.758, sd 0.553;  95 % in 49.623 ... 51.863;  94.0 % within limits", size=8
+        )
+        return figure
+
+    figure = form_of(width="84 mm").draw(drawn)
+    figure.canvas.draw()
+    for text in (figure.axes[0].xaxis.label, *figure.texts):
+        box = text.get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= figure.bbox.width
