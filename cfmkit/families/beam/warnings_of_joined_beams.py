@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.joined_strips import DrawnBlock, DrawnStrip, NodesAndBodies, joined_away_from_nodes
+from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock, DrawnStrip, NodesAndBodies, joined_away_from_nodes
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.export.contours import Contour
-    from cfmkit.export.joined_strips import Join
+    from cfmkit.export.strips_joined_away_from_nodes import Join
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.beam.strips_and_gaps import BeamStrip
