@@ -6,6 +6,7 @@ search for new ones is requested: ``CFMKIT_TEST_SEARCH=1 pytest`` draws new exam
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -41,3 +42,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid in listed:
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish() -> None:
+    """Hide what collecting left, ten thousand tests, from the garbage collector, which walks all it sees again."""
+    gc.collect()
+    gc.freeze()
