@@ -21,7 +21,7 @@ from cfmkit.elastica.continuation import (
     points_at_bifurcation,
 )
 from cfmkit.elastica.continuation.branch_rejoins_path import end_at, predicted_end
-from cfmkit.elastica.continuation.path_and_moves import PRIMARY, Leg, Resume, Stop, fine_spot
+from cfmkit.elastica.continuation.path_and_moves import MOST_SEGMENTS, PRIMARY, Leg, Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.points_at_bifurcation import NEAR_BIFURCATION
 from cfmkit.elastica.continuation.switch_to_uncondensed_solver import uncondensed
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
@@ -52,6 +52,8 @@ _SHORTER = 0.25  # of a step that passed what was not resolved, for the next
 def decided(problem: PathProblem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
     trail, requested = leg.trail, leg.trail.requested
+    if problem.mesh.segments > MOST_SEGMENTS and leg.code in (INERTIA, NO_START, STALLED, DENIED):
+        return ending_messages.too_long_to_look_into(trail, problem.unit)
     away = critical_start.left_again(problem, trail) if fresh else None
     if away is not None:
         return away

@@ -42,6 +42,13 @@ def stop(problem: PathProblem, trail: Trail, code: int) -> Stop:
     return Stop(_stopped(problem, trail, code))
 
 
+def too_long_to_look_into(trail: Trail, unit: float) -> Stop:
+    """Stop where stability is lost, or no step leads on, and the beams have too many segments to see what it is."""
+    where = f"at {trail.drive * unit:.6g}" if len(trail.points) else "at rest"
+    message = f"a beam is pulled so hard {where} that what happens there cannot be looked into: it is too thin for it"
+    return Stop(trail.stopped(PathStatus.LOST, message))
+
+
 def _stopped(problem: PathProblem, trail: Trail, code: int) -> Trail:
     where = f"at {trail.drive * problem.unit:.6g}" if len(trail.points) else "at rest"
     if code == LONG:

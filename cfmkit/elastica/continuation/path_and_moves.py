@@ -26,6 +26,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.drive import Control
     from cfmkit.elastica.model.network_under_drive import Layout
 
+MOST_SEGMENTS = 512
+"""Segments of a beam up to which singular points are looked for.
+
+That is done with nothing condensed out: with 2000 segments it takes minutes a solution.
+"""
+
 PRIMARY = "primary"  # name of the branch that a path from rest is on until it leaves it
 _FINE_STEPS = ((1e-5, 16), (1e-6, 24), (0.0, 48))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method: it converges quadratically, so that less would save nothing
