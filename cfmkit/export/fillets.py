@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Line, Smooth
+from cfmkit.numerics.biarcs import cubic, slope
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from cfmkit.export.contours import Edge
 
@@ -115,10 +116,17 @@ def _onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tupl
     if not len(beyond):
         return None
     k = int(beyond[0])
-    share = float(over[k] / (over[k] - over[k + 1]))
-    center = centers[k] + share * (centers[k + 1] - centers[k])
-    tangent = tangents[k] + share * (tangents[k + 1] - tangents[k])
-    tangent /= abs(tangent)
+
+    def touching(share: float) -> tuple[complex, complex, float]:
+        """Return the centre of the arc that touches the edge so far behind a point, the tangent, how far it is over."""
+        pair = (points[k], tangents[k], points[k + 1], tangents[k + 1], np.array([share]))
+        along = complex(slope(*pair)[0])
+        along /= abs(along)
+        center = complex(cubic(*pair)[0]) - 1j * side * radius * along
+        return center, along, ((center - start) / way).imag + side * radius
+
+    share = _zero(lambda share: touching(share)[2])
+    center, tangent, _ = touching(share)
     touch = start + way * ((center - start) / way).real
     if ((touch - start) / way).real < 0:
         return None
@@ -129,6 +137,19 @@ def _onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tupl
     if len(kept) < 2:
         return None
     return Line(line.start, _pair(first)), arc, Smooth(kept, np.vstack([_pair(tangent), smooth.tangents[rest]]))
+
+
+def _zero(over: Callable[[float], float]) -> float:
+    """Return where a function changes its sign between 0 and 1, by halving.
+
+    A straight line between the points of the edge would leave a corner beside the arc, as high as the chord's sagitta.
+    """
+    low, high = 0.0, 1.0
+    rises = over(high) > over(low)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if (over(middle) > 0) == rises else (middle, high)
+    return 0.5 * (low + high)
 
 
 def _arc(center: complex, radius: float, first: complex, last: complex, side: float) -> Arc:
