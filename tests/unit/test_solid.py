@@ -114,6 +114,17 @@ def test_a_part_that_is_thinner_than_elements_can_resolve_is_named_with_the_plac
         mesh((Ring.of(1e-3 * np.array(outline), False),), 1e-3)
 
 
+@pytest.mark.parametrize("rise", [0.6e-6, -0.6e-6])
+def test_a_step_of_the_drawings_rounding_is_no_place_to_be_resolved(rise):
+    """Left over between the disc at a node and the end of a beam, it had been the thinnest place of the part."""
+    step = np.array([[0, 0], [9e-3, 0], [9e-3, 1e-3], [4e-3, 1e-3], [4e-3, 1e-3 + rise], [0, 1e-3 + rise]])
+    plain, stepped = (mesh((Ring.of(one, False),), 0.6e-3) for one in (box(0, 0, 9e-3, 1e-3), step))
+    assert len(stepped.triangles) < 2 * len(plain.triangles)
+    ring = Ring.of(step, False)
+    assert len(ring.points) == 5
+    assert ring.area == pytest.approx(9e-6 + 4e-3 * rise, rel=1e-4)
+
+
 def test_a_hole_that_is_cut_beside_the_part_is_named():
     rings = (Ring.of(box(0, 0, 10e-3, 4e-3), False), Ring.of(circle(1e-3) + np.array([20e-3, 2e-3]), True))
     with pytest.raises(GeometryError, match=r"the hole round \(20 mm, 2 mm\) is not inside the outline"):
