@@ -9,6 +9,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cfmkit.arrays import Named
 from cfmkit.errors import UsageError
 from cfmkit.families import family, origin
 from cfmkit.families.base import Run
@@ -366,7 +367,7 @@ def export(
     ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
     """
     spec = spec_of(spec)
-    drawn, _ = drawn_files(spec, kerf, tolerance, format)
+    drawn = Named(drawn_files(spec, kerf, tolerance, format)[0])
     if out is not None:
         from cfmkit.store import RunFolder, stable_hash
 

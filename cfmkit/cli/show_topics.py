@@ -258,7 +258,12 @@ def found(name: str) -> Answer | None:
             sections.append((kind, known, fields or SPEC_KEY_FIELDS))
     if not sections and (drawn := _symbols(name)):
         sections.append(("symbols", drawn, SYMBOL_FIELDS))
-    return _page(name, "", sections, {kind: known for kind, known, _ in sections}) if sections else None
+    if not sections:
+        return None
+    page = _page(name, "", sections, {kind: known for kind, known, _ in sections})
+    entries = [text for kind, known, _ in sections if kind == "references" for one in known if (text := _bibtex(one))]
+    more = (block for text in entries for block in (line(""), Verbatim(text + "\n")))
+    return Answer({**page.data, **({"bibtex": entries} if entries else {})}, (*page.page, *more))
 
 
 def _symbols(name: str) -> list[Record]:
@@ -286,6 +291,14 @@ def references() -> list[dict[str, str]]:
         for record in families.records()
         for text in record.references
     ]
+
+
+def _bibtex(reference: Record) -> str:
+    """Return the BibTeX entry of a paper, whose key begins with its first author and ends with its year."""
+    author, _, year = reference["name"].rpartition("-")
+    entries = re.split(r"\n(?=@)", families.family(reference["family"]).bibtex.strip())
+    key = re.compile(rf"@\w+\{{{author.replace('-', '')}[a-z]*{year},", re.IGNORECASE)
+    return next((entry.strip() for entry in entries if key.match(entry)), "")
 
 
 def _tag(reference: str) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS
@@ -59,8 +60,8 @@ FINDINGS = {
 }
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(ShortRepr):
     """A fitted specification.
 
     Attributes

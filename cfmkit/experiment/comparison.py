@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
@@ -82,8 +83,8 @@ class Zeros:
     drift: float = 0.0
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(ShortRepr):
     """A model and a measurement, over a common window.
 
     Attributes

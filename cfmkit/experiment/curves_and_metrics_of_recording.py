@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
@@ -61,8 +62,8 @@ FINDINGS = {
 }
 
 
-@dataclass(frozen=True)
-class MeasuredCurves:
+@dataclass(frozen=True, repr=False)
+class MeasuredCurves(ShortRepr):
     """A recording as curves.
 
     Attributes

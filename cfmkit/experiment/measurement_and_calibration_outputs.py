@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import table
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding, Quantity
 
 
-@dataclass(frozen=True)
-class MeasureReport:
+@dataclass(frozen=True, repr=False)
+class MeasureReport(ShortRepr):
     """A measured mechanism with everything that is read off it.
 
     Attributes

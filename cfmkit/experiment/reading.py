@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, read_only
+from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.errors import DataError, UsageError
 from cfmkit.specs.units.number_reading import shown
 from cfmkit.tables.lab_file import (
@@ -158,8 +158,8 @@ class Decisions:
         return reported + ([f"not used: {', '.join(self.unused)}"] if self.unused else [])
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(ShortRepr):
     """A measured curve as recorded: SI, in the order of the file.
 
     Attributes

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.arrays import FloatArray, read_only
+from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.export.layers import DRIVEN, HELD
 
 if TYPE_CHECKING:
@@ -266,8 +266,8 @@ class EngravedText:
     angle: float = 0.0
 
 
-@dataclass(frozen=True)
-class Drawing:
+@dataclass(frozen=True, repr=False)
+class Drawing(ShortRepr):
     """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV, thickness for STL.
 
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands

@@ -46,6 +46,13 @@ name could stand between them."""
 SIGHT = 12
 """So many places between a name and its line are looked at: over the farthest distance they are 2.5 pt apart."""
 
+TOGETHER = 60.0
+"""What it costs to stand at a point where the lines of other names are within a cell or two: it would name any of them.
+As much as another name between the two."""
+
+APART = 6.0
+"""From this distance on lines are told apart [pt]: four cells, the height of small letters."""
+
 _SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
 
 
@@ -89,10 +96,15 @@ def place_labels(ax: Axes, labels: list[Label], size: float = SMALL) -> list[Tex
         Font size [pt].
     """
     ground = _Ground(ax)
-    return [text for label in labels if (text := _write(ground, label, size)) is not None]
+    lines = [ground.to_points(label.points) for label in labels]
+    written = (
+        _write(ground, label, size, [line for other, line in enumerate(lines) if other != number])
+        for number, label in enumerate(labels)
+    )
+    return [text for text in written if text is not None]
 
 
-def _write(ground: _Ground, label: Label, size: float) -> Text | None:
+def _write(ground: _Ground, label: Label, size: float, others: list[FloatArray]) -> Text | None:
     if not label.text:
         return None
     points = ground.to_points(label.points)
@@ -101,14 +113,15 @@ def _write(ground: _Ground, label: Label, size: float) -> Text | None:
         return None
     text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
     box = ground.size_of(text)
-    center, cost = _best(ground, label, points, box)
+    together = _together(points, others)
+    center, cost = _best(ground, label, (points, together), box)
     covered = float(ground.covered(center[None, :], box)[0])
     if covered > 0:
         chosen, cost = label.text, cost + 2.0 * COVERING * covered
         for words in (label.text, _in_two_lines(label.text)):
             text.set_text(words)
             other = ground.size_of(text)
-            place, price = _best(ground, label, points, other, FINER)
+            place, price = _best(ground, label, (points, together), other, FINER)
             if price < cost:
                 center, cost, box, chosen = place, price, other, words
         text.set_text(chosen)
@@ -150,10 +163,24 @@ def _thinned(points: FloatArray, most: int = 80) -> FloatArray:
     return thinned
 
 
+def _together(points: FloatArray, others: list[FloatArray]) -> NDArray[np.bool_]:
+    """Return at which points [pt] another named line is so near that a name there would be taken for that of either."""
+    found = np.zeros(len(points), dtype=bool)
+    for line in others:
+        away = points[:, None, :] - _thinned(line, 200)[None, :, :]
+        found |= (np.hypot(away[..., 0], away[..., 1]) < APART).any(axis=1)
+    return found
+
+
 def _best(
-    ground: _Ground, label: Label, points: FloatArray, box: FloatArray, tried: tuple[float, ...] = GAPS
+    ground: _Ground,
+    label: Label,
+    named: tuple[FloatArray, NDArray[np.bool_]],
+    box: FloatArray,
+    tried: tuple[float, ...] = GAPS,
 ) -> tuple[FloatArray, float]:
-    """Return the cheapest centre for a box [pt] beside the points, and what it costs."""
+    """Return the cheapest centre for a box [pt] beside points, some together with other lines, and what it costs."""
+    points, together = named
     sides, gaps = _ways(tried)
     offsets, away = sides * (box / 2 + gaps), gaps.max(axis=1)
     centers = (points[:, None, :] + offsets[None, :, :]).reshape(-1, 2)
@@ -170,6 +197,7 @@ def _best(
         unit = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
         cost = cost + np.tile(25.0 * (1.0 - unit @ wanted), len(points))
     cost = cost + _between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
+    cost = cost + TOGETHER * np.repeat(together, len(offsets))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
     cheapest = int(np.argmin(cost))
     center: FloatArray = centers[cheapest]

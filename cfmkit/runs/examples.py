@@ -6,8 +6,10 @@ In the tree they are the folder `configs`; a wheel has the same files as the pac
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError, UsageError, visible
@@ -32,12 +34,18 @@ class Example:
         What it is: the first sentence of the file's comment.
     path : Path
         The file.
+    searches : bool
+        Whether `design` searches for its shape from many starts, which takes minutes; all others take seconds.
     """
 
     name: str
     family: str
     about: str
     path: Path
+    searches: bool = False
+
+
+ABBREVIATED = ("sec.", "eqs.", "figs.")
 
 
 def folder() -> Path:
@@ -72,7 +80,8 @@ def _example(path: Path, root: Path) -> Example:
     comment = " ".join(line.removeprefix("#").strip() for line in lines[: _comment(lines)])
     family = "figure" if is_figure else next(named, "")
     name = path.relative_to(root).with_suffix("").as_posix()
-    return Example(name, family, _first_sentence(comment), path)
+    searches = any(line.strip() == "optimise:" for line in lines)
+    return Example(name, family, _first_sentence(comment), path, searches)
 
 
 def _comment(lines: list[str]) -> int:
@@ -81,12 +90,21 @@ def _comment(lines: list[str]) -> int:
 
 
 def _first_sentence(text: str) -> str:
-    """Return a text up to its first full stop or colon that ends a sentence; initials and "Eq." end none."""
-    words: list[str] = []
-    for word in text.split():
-        words.append(word)
-        if word[-1] == "." and len(word) > 3 and word[:-1].isalpha() and word[:-1].islower():
-            break
+    """Return a text up to its first full stop that ends a sentence; initials, "Eq." and "sec." end none.
+
+    Examples
+    --------
+    >>> _first_sentence("Li, B. and Hao 2019, sec. 4: a spring. `cfmkit sweep x.yaml` draws it.")
+    'Li, B. and Hao 2019, sec. 4: a spring.'
+    """
+    words = text.split()
+    for at, word in enumerate(words[:-1]):
+        if word[-1] != "." or len(word) < 4 or word in ABBREVIATED:
+            continue
+        plain = word[:-1].isalpha() and word.islower()
+        after_number = (word[-2].isdigit() or word[-2] == ")") and words[at + 1][0] in ascii_uppercase
+        if plain or after_number or words[at + 1][0] == "`":
+            return " ".join(words[: at + 1])
     return " ".join(words)
 
 
@@ -136,7 +154,9 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
         data = [(panel.run, chosen.path.parent / panel.run) for panel in read(str(chosen.path)).panels]
     else:
         data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
-    wanted = {target: chosen.path, **{target.parent / text: path for text, path in data}}
+    # what is there already and says the same stays: a figure finds the studies that were copied one by one
+    missing = [(text, path) for text, path in data if not _same(target.parent / text, path)]
+    wanted = {target: chosen.path, **{target.parent / text: path for text, path in missing}}
     _refuse_taken(wanted)
     written: list[Path] = []
     made: list[Path] = []
@@ -157,12 +177,24 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
 
 
 def _text(chosen: Example, schema: bool) -> bytes:
-    """Return an example's own text, with the line by which editors find its schema where that is requested."""
+    """Return an example's text for the folder it is copied to, with the line for editors where that is requested."""
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import with_line
 
-    text = chosen.path.read_bytes()
-    return with_line(text.decode(), family(chosen.family)).encode() if schema else text
+    # commands in the comments call the files as they lie in the tree; a copy has its data below its own folder
+    above = chosen.name.rpartition("/")[0]
+    text = re.sub(rf"\bconfigs/(?:{re.escape(above)}/)?", "", chosen.path.read_bytes().decode())
+    return (with_line(text, family(chosen.family)) if schema else text).encode()
+
+
+def _same(place: Path, source: Path) -> bool:
+    """Return whether a file is there already with the same content, but for its comments if it is a specification."""
+    if not place.is_file():
+        return False
+    texts = [path.read_bytes() for path in (place, source)]
+    if source.suffix == ".yaml":
+        texts = [b"\n".join(line for line in text.splitlines() if not line.startswith(b"#")) for text in texts]
+    return texts[0] == texts[1]
 
 
 def _refuse_taken(places: Iterable[Path]) -> None:

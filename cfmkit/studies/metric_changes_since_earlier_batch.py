@@ -8,7 +8,8 @@ import os
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import UsageError, visible
+from cfmkit.errors import ExitCode, UsageError, visible
+from cfmkit.results import Status
 from cfmkit.tables import Table, TableColumn
 
 if TYPE_CHECKING:
@@ -155,11 +156,18 @@ def changes(
         if before is None or entry.skipped:
             continue
         if (before.status, before.exit_code) != (entry.status, int(entry.code)):
-            found.append(MetricChange(entry.spec, "status", before.status, entry.status, "", None, True))
+            ends = _ends(before.status, before.exit_code), _ends(entry.status, int(entry.code))
+            found.append(MetricChange(entry.spec, "status", *ends, "", None, True))
         if entry.written:
             now = (_read(os.path.join(folder, entry.folder, "metrics.json")) or {}).get("metrics", {})
             found += _of_metrics(entry.spec, before.metrics, now, tolerance)
     return tuple(found)
+
+
+def _ends(status: str, code: int) -> str:
+    """Return how a specification ended: a curve may be complete and miss a requirement."""
+    missed = code == ExitCode.REQUIREMENT_MISSED
+    return f"{status}, requirement missed" if missed and status == Status.COMPLETE.key else status
 
 
 def _of_metrics(

@@ -134,13 +134,15 @@ class Summary:
             inside = np.where(group, score, np.nan)
             if np.isnan(inside).all() or (self.best_meets and not meeting):
                 continue
-            at, before = int(np.nanargmin(inside)), self._best_score()
-            best = float(inside[at])
-            same = self.best is not None and self.best_meets == meeting and abs(best - before) <= TIE * abs(before)
-            if self.best is None or meeting > self.best_meets or best < before:
-                self.best, self.best_meets = int(indices[at]), meeting
-                self.best_values = rows.values[at].copy()
-                self.ties = self.ties if same else 0
+            least = float(np.nanmin(inside))
+            as_good = np.flatnonzero(np.abs(inside - least) <= TIE * abs(least))
+            before = self._best_score()
+            same = self.best is not None and self.best_meets == meeting and abs(least - before) <= TIE * abs(before)
+            # of points that only rounding tells apart the first is the best
+            if self.best is None or meeting > self.best_meets or (least < before and not same):
+                self.best, self.best_meets = int(indices[as_good[0]]), meeting
+                self.best_values = rows.values[as_good[0]].copy()
+                self.ties = 0
             score_now = self._best_score()
             self.ties += int((np.abs(inside - score_now) <= TIE * abs(score_now)).sum())
 

@@ -71,3 +71,55 @@ def test_names_and_options_that_contradict_each_other_are_refused(cli):
 
 def test_the_same_list_in_python():
     assert cfmkit.examples()[0].path.is_file()
+
+
+def test_what_an_example_is_ends_with_its_sentence_and_not_at_an_abbreviation():
+    about = {one.name: one.about for one in cfmkit.examples()}
+    assert about["studies/slider_crank_class_map"].endswith("sec. 4.2, as a map.")
+    assert about["slider_crank_li2019_prototype"].endswith("of spring steel.")
+    assert about["studies/slider_crank_li2019_fig9"].endswith("positive above 0.0095741.")
+    assert not [name for name, text in about.items() if "configs/" in text]
+
+
+def test_a_copy_of_a_study_names_the_command_that_runs_it_and_the_file_as_it_lies(cli):
+    assert "cfmkit sweep vcfm_fig9_theta2.yaml" in cli("examples", "studies/vcfm_fig9_theta2").out
+    text = (cli.folder / "vcfm_fig9_theta2.yaml").read_text()
+    assert "`cfmkit sweep vcfm_fig9_theta2.yaml`" in text
+    assert "cfmkit sensitivity cam_tolerance.yaml" in cli("examples", "studies/cam_tolerance").out
+    assert "configs/" not in (cli.folder / "cam_tolerance.yaml").read_text()
+    cli("examples", "cam_as_built")
+    assert "--data synthetic/cam_loop.csv" in (cli.folder / "cam_as_built.yaml").read_text()
+
+
+def test_a_figure_takes_the_studies_that_were_copied_before_and_no_others(cli):
+    cli("examples", "studies/vcfm_fig9_theta2")
+    before = (cli.folder / "vcfm_fig9_theta2.yaml").read_bytes()
+    done = cli("examples", "studies/figure", "--json")
+    assert done.code == 0
+    assert "vcfm_fig9_theta2.yaml" not in done.document["files"]
+    assert (cli.folder / "vcfm_fig9_theta2.yaml").read_bytes() == before
+    (cli.folder / "figure.yaml").unlink()
+    (cli.folder / "vcfm_fig9_theta2.yaml").write_bytes(before.replace(b"25 mm", b"26 mm"))
+    assert cli("examples", "studies/figure").code == 7
+
+
+def test_quick_examples_are_run_first_and_can_be_run_alone(cli, monkeypatch):
+    from types import SimpleNamespace
+
+    from cfmkit.errors import ExitCode
+    from cfmkit.runs import batch
+
+    ran = []
+
+    def instead(files, *_, **__):
+        ran.append([Path(file).stem for file in files])
+        entries = tuple(SimpleNamespace(status="complete", code=ExitCode.OK, message="") for _ in files)
+        return SimpleNamespace(entries=entries, exit_code=ExitCode.OK)
+
+    monkeypatch.setattr(batch, "batch", instead)
+    every, quick = cli("examples", "--run", "all"), cli("examples", "--run", "quick")
+    searches = {one.name for one in cfmkit.examples() if one.searches}
+    assert {"beam_design_arch", "beam_design_lan", "beam_lan_rising"} == searches == set(ran[0][-3:])
+    assert ran[1] == ran[0][:-3]
+    assert f"{len(ran[1])} examples take some seconds each, the last 3 search for shapes" in every.err
+    assert quick.err == ""

@@ -279,6 +279,14 @@ def test_show_names_what_was_probably_meant(cli, typed, meant):
     assert f"did you mean '{meant}'?" in done.err
 
 
+@pytest.mark.parametrize(("name", "key"), [("lan-2006", "LanLee2006"), ("sanchez-salinas-2022", "SanchezSalinas2022")])
+def test_a_paper_is_shown_with_its_own_bibtex_entry(cli, name, key):
+    shown, (entry,) = cli("show", name).out, cli("show", name, "--json").document["bibtex"]
+    assert entry.startswith("@article{" + key)
+    assert entry in shown
+    assert shown.count("@") == 1
+
+
 def test_show_references_lists_the_papers_of_every_family(cli):
     document = cli("show", "references", "--json").document
     assert {item["family"] for item in document["references"]} == set(families.names())

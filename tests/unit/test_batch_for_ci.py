@@ -199,3 +199,8 @@ def test_a_batch_that_fails_is_kept_in_the_cache_of_the_action():
 def test_the_hook_leaves_alone_what_other_tools_read(name, left_out):
     (hook,) = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
     assert bool(re.search(hook["exclude"], name)) is left_out
+
+
+def test_a_complete_curve_that_misses_a_requirement_now_is_a_change_in_words(tmp_path):
+    (found,) = changes({"a": Earlier("complete", 0, {})}, [one(code=ExitCode.REQUIREMENT_MISSED)], str(tmp_path))
+    assert found.sentence == "status: complete -> complete, requirement missed"

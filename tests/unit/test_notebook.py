@@ -142,3 +142,16 @@ def test_texts_of_whatever_is_in_a_study_are_short():
     assert list(texts_that_are_long(found)) == []
     assert all(len(repr(one)) < 2000 for one in found.summary.values())
     assert "'metrics': Named of" in repr(found.summary)
+
+
+def test_texts_of_drawings_files_and_measured_curves_are_short(tmp_path):
+    spec = cfmkit.load(CONFIGS / "cam.yaml", ["analysis.points=21"])
+    curve = cfmkit.analyze(spec).curve
+    rows = [f"{1e3 * place},{force}" for place, force in zip(curve.motion, curve.effort, strict=True)]
+    (tmp_path / "curve.csv").write_text("\n".join(["displacement [mm],force [N]", *rows]) + "\n")
+    measured = cfmkit.measure(tmp_path / "curve.csv")
+    fitted = cfmkit.calibrate(spec, tmp_path / "curve.csv", fit=["mechanism.rolling_friction"])
+    named = (measured, measured.source, measured.source.recording, fitted, fitted.after)
+    for one in (cfmkit.drawing(spec), cfmkit.export(spec), *named):
+        assert 10 < len(repr(one)) < 2000, type(one)
+        assert "array([" not in repr(one)

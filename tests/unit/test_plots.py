@@ -281,6 +281,19 @@ def test_a_name_stands_nearest_to_its_own_line():
     assert abs(ends[1].mean() - 6.0) < 1.0
 
 
+def test_no_name_stands_where_lines_run_together():
+    ax = axes()
+    ax.set_xlim(-1, 10)
+    ax.set_ylim(-1, 10)
+    x = np.linspace(0, 9, 100)
+    lines = [np.column_stack([x, slope * x]) for slope in (0.3, 0.4)]
+    for line in lines:
+        ax.plot(*line.T)
+    texts = place_labels(ax, [Label(name, "k", line, prefer=0.0) for name, line in zip("ab", lines, strict=True)])
+    left = [ax.transData.inverted().transform(box.get_points())[0, 0] for box in boxes_of(texts)]
+    assert min(left) > 1.0
+
+
 def test_no_leader_runs_through_another_name():
     ax = axes()
     ax.set_xlim(0, 10)

@@ -229,6 +229,17 @@ def test_points_that_are_as_good_as_the_best_are_counted():
     assert summary.as_json(records)["best"]["ties"] == 3
 
 
+@pytest.mark.parametrize("at_once", [1, 3])
+def test_of_points_that_only_rounding_tells_apart_the_first_is_the_best(at_once):
+    wish = wishes({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
+    records = run(prepare(cfmkit.load("configs/cam.yaml"), SweepRequest(vary=wish, metrics=("force_ripple",))))
+    summary = summary_of(records)
+    for indices, rows in records.batches(at_once):
+        rounding = 1.0 - 1e-13 * np.asarray(indices)[:, None]
+        summary.add(indices, replace(rows, values=rows.values * rounding))
+    assert (summary.best, summary.ties) == (0, 3)
+
+
 def test_the_nominal_curve_is_read_in_one_pass_over_the_cells(monkeypatch):
     """Cells of a column are made once: once a row took 28 times the time of the study."""
     rows = 500

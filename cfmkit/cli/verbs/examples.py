@@ -18,6 +18,12 @@ PLACE = 52
 EXAMPLE = "cfmkit examples cam"
 
 ALL = "all"
+QUICK = "quick"
+LONG = (
+    "{quick} examples take some seconds each, the last {long} search for shapes for many minutes; "
+    "`cfmkit examples --run quick` leaves those out"
+)
+"""All but those that search for a shape."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +36,11 @@ class ExamplesOptions(Common):
     )
     run: Annotated[
         str | None,
-        option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; no files are kept."),
+        option(
+            "--run",
+            metavar="NAME|quick|all",
+            text="Run one, those that take seconds, or all, to check this installation; no files are kept.",
+        ),
     ] = None
     schema: Annotated[
         bool | None,
@@ -44,7 +54,7 @@ class ExamplesOptions(Common):
 
 def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
     """List the examples that come with cfmkit, copy one, or run them to check an installation; nothing is replaced."""
-    from cfmkit.runs.examples import copy, example, examples
+    from cfmkit.runs.examples import copy, examples
 
     if options.run is not None:
         if options.name is not None or options.out is not None:
@@ -52,7 +62,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
         return _checked(options.run, options, terminal)
     if options.name is not None:
         written = [str(path) for path in copy(options.name, options.out or ".", options.schema is not False)]
-        verb = _verb(example(options.name).family, written[0])
+        verb = _verb(options.name, written[0])
         page = (
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
             Paragraph("next", command_line("cfmkit", verb, written[0])),
@@ -65,31 +75,40 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
     return Answer({"examples": records}, tuple(listed("examples", records, fields)))
 
 
-def _verb(kind: str, path: str) -> str:
-    """Return what an example is for."""
-    from cfmkit.families import family
-
-    if kind == "figure":
-        return kind
-    return "design" if family(kind).design and _designs(path) else "analyze"
-
-
-def _designs(path: str) -> bool:
-    """Return whether a specification says what is to be designed."""
+def _verb(name: str, path: str) -> str:
+    """Return what an example is for: a study for the study that it states."""
     from cfmkit.api import load
+    from cfmkit.families import family
+    from cfmkit.runs.examples import example
 
-    return getattr(load(path), "design", None) is not None
+    if (kind := example(name).family) == "figure":
+        return kind
+    spec = load(path)
+    if "/" in name:
+        stated = next((study for study in ("sweep", "sensitivity") if getattr(spec, study) is not None), None)
+        if stated is not None:
+            return stated
+    return "design" if family(kind).design and getattr(spec, "design", None) is not None else "analyze"
 
 
 def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
-    """Return what became of examples that were run in a folder that is gone afterwards."""
+    """Return what became of examples that were run in a folder that is gone afterwards, the quick ones first."""
     from tempfile import TemporaryDirectory
 
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch
     from cfmkit.runs.examples import example, examples
 
-    chosen = [one for one in examples() if "/" not in one.name] if name == ALL else [example(name)]
+    if name in (ALL, QUICK):
+        mechanisms = [one for one in examples() if "/" not in one.name]
+        chosen = sorted(mechanisms, key=lambda one: one.searches)
+        searches = sum(one.searches for one in chosen)
+        if name == QUICK:
+            chosen = chosen[: len(chosen) - searches]
+        else:
+            terminal.complain(() if terminal.quiet else (LONG.format(quick=len(chosen) - searches, long=searches),))
+    else:
+        chosen = [example(name)]
     with TemporaryDirectory(prefix="cfmkit-examples-") as place, watching(terminal, "examples") as progress:
         files = [one.path for one in chosen]
         found = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)

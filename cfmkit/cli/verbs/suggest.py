@@ -14,6 +14,7 @@ from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, W
 from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
+    GOOD,
     LABEL,
     CellGrid,
     GridColumn,
@@ -21,6 +22,7 @@ from cfmkit.cli.page_block_types import (
     Span,
     TextLine,
     Written,
+    command_line,
     line,
 )
 from cfmkit.cli.verb_result import Answer
@@ -270,6 +272,13 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
     yield BLANK
     yield written.block(everything)
+    if data["proposals"]:
+        yield Paragraph("next", _next(data["proposals"][0], written.folder), GOOD)
+
+
+def _next(best: Mapping[str, Any], folder: str) -> str:
+    """Return the command that makes files to cut or print of a proposal."""
+    return command_line("cfmkit", "export", str(Path(folder) / best["folder"] / "design.yaml"))
 
 
 def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
