@@ -203,12 +203,12 @@ def _resolved(places: FloatArray, wanted: FloatArray, largest: float) -> tuple[F
 
 
 def place_text(place: Sequence[float] | FloatArray) -> str:
-    """Return a place (2,) [m] for a message.
+    """Return a place (2,) [m] for a message, rounded to nanometres.
 
-    >>> place_text([0.005, 0.0])
+    >>> place_text([0.005, -3e-19])
     '(5 mm, 0 mm)'
     """
-    return f"({', '.join(format_short(float(one), 'length') for one in place)})"
+    return f"({', '.join(format_short(round(float(one), 9) + 0.0, 'length') for one in place)})"
 
 
 def _wanted(

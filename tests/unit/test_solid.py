@@ -125,9 +125,11 @@ def test_a_step_of_the_drawings_rounding_is_no_place_to_be_resolved(rise):
     assert ring.area == pytest.approx(9e-6 + 4e-3 * rise, rel=1e-4)
 
 
-def test_a_hole_that_is_cut_beside_the_part_is_named():
-    rings = (Ring.of(box(0, 0, 10e-3, 4e-3), False), Ring.of(circle(1e-3) + np.array([20e-3, 2e-3]), True))
-    with pytest.raises(GeometryError, match=r"the hole round \(20 mm, 2 mm\) is not inside the outline"):
+@pytest.mark.parametrize(("height", "said"), [(2e-3, "2"), (-3e-19, "0")])
+def test_a_hole_that_is_cut_beside_the_part_is_named(height, said):
+    """A height that is rounding is none: it had been -3e-16 mm."""
+    rings = (Ring.of(box(0, -4e-3, 10e-3, 4e-3), False), Ring.of(circle(1e-3) + np.array([20e-3, height]), True))
+    with pytest.raises(GeometryError, match=rf"the hole round \(20 mm, {said} mm\) is not inside the outline"):
         mesh(rings, 1e-3)
 
 

@@ -448,10 +448,11 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding("wide_beam", reported)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
+        from cfmkit.solid.boundary_and_element_sizes import place_text
+
         largest, spot = solution.worst
-        at = ", ".join(format_short(one, "length") for one in spot.tolist())
         yield finding(
             "overstressed",
-            f"the stress reaches {format_short(largest, 'stress')} at ({at}); the allowable stress is "
+            f"the stress reaches {format_short(largest, 'stress')} at {place_text(spot)}; the allowable stress is "
             f"{format_short(allowable, 'stress')}",
         )

@@ -277,11 +277,12 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     limit = made_of.allowable_stress
     peaks, places = solution.fine.peaks
     if limit is not None and peaks.max() > limit:
+        from cfmkit.solid.boundary_and_element_sizes import place_text
+
         worst = int(peaks.argmax())
-        at = ", ".join(format_short(one, "length") for one in places[worst].tolist())
         yield finding(
             "overstressed",
-            f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at ({at}) of the drawing, at "
-            f"{format_short(float(course.travel[worst]), 'length')} of travel; the allowable stress is "
-            f"{format_short(limit, 'stress')}",
+            f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at {place_text(places[worst])} "
+            f"of the drawing, at {format_short(float(course.travel[worst]), 'length')} of travel; "
+            f"the allowable stress is {format_short(limit, 'stress')}",
         )
