@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.specs.spec import Spec
+    from cfmkit.studies.sensitivity.result_types import Findings
     from cfmkit.tables import Table
 
 
@@ -36,6 +37,8 @@ class StudyResult:
         Headers of the columns that were varied.
     spec : Spec, optional
         What was varied.
+    findings : Findings, optional
+        What a sensitivity study found, which its pictures are drawn from.
     """
 
     table: Table
@@ -45,6 +48,7 @@ class StudyResult:
     convergence: Table | None = None
     varied: tuple[str, ...] = ()
     spec: Spec | None = None
+    findings: Findings | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Keep the texts of what is inside short."""
@@ -74,7 +78,11 @@ class StudyResult:
 
     @property
     def figures(self) -> Mapping[str, Callable[[], Figure]]:
-        """What draws each picture of a sweep, by its name: ``study.figures["force_mean"]()``."""
+        """What draws each picture of a study, by its name: ``study.figures["force_mean"]()``."""
+        if self.findings is not None:
+            from cfmkit.plots.sensitivity import figures
+
+            return figures(self.findings)
         if self.spec is None or "drawn" not in self.summary:
             return {}
         from cfmkit.studies.pictures import makers_of_tables

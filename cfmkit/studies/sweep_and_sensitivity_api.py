@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +44,6 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
 
 def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sensitivity study; see `cfmkit.sensitivity`."""
-    from cfmkit.studies.engine import run
     from cfmkit.studies.sensitivity.output import outputs
     from cfmkit.studies.sensitivity.parameters import with_options
     from cfmkit.studies.sensitivity.run_sensitivity_method import carry_out
@@ -54,12 +54,15 @@ def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
         if isinstance(asked.get("parameters"), Mapping):
             asked["parameters"] = {path: in_words(it, spec, path) for path, it in asked["parameters"].items()}
         spec = spec.replace({"sensitivity": with_options(spec.sensitivity, asked)})
-    executor = _executor(jobs)
+    found = carry_out(prepare(spec), partial(_computed, _executor(jobs)))
+    return replace(_read(outputs(found)), spec=found.setup.study.spec, findings=found)
 
-    def compute(work: Work) -> Records:
-        return run(work, executor)
 
-    return _read(outputs(carry_out(prepare(spec), compute)))
+def _computed(executor: Executor, work: Work) -> Records:
+    """Return the records of a piece of work."""
+    from cfmkit.studies.engine import run
+
+    return run(work, executor)
 
 
 def in_words(values: Any, spec: Spec, path: str) -> Any:

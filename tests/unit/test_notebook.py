@@ -84,6 +84,19 @@ def test_a_study_is_shown_with_its_best_point_requirements_a_figure_and_its_firs
     assert "2 more rows" in shown
 
 
+@pytest.mark.parametrize("method", ["tolerance", "local"])
+def test_a_sensitivity_study_is_shown_with_a_figure(method):
+    parameters = {"mechanism.springs.stiffness": {"normal": "1 %"}}
+    spec = CONFIGS / "cam.yaml"
+    study = cfmkit.sensitivity(spec, method=method, samples=10, parameters=parameters, metrics=["force_mean"])
+    assert study._repr_html_().count("<svg") == 1
+    assert any(name.startswith("force_mean") for name in study.figures)
+    assert len(repr(study)) < 2000
+    again = pickle.loads(pickle.dumps(study))
+    assert again.summary == study.summary
+    assert set(again.figures) == set(study.figures)
+
+
 def test_a_spec_is_shown_as_its_file():
     spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
     assert "roller_radius" in spec._repr_html_()
