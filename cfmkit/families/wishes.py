@@ -99,6 +99,8 @@ class Candidate:
         window and travel written out. Empty: nothing has to be done.
     promise : float
         The smaller, the sooner it is worth a try.
+    free : tuple of str
+        Paths of values of one that is not designed, which may move where made parts miss a yield.
     """
 
     variant: str
@@ -106,6 +108,7 @@ class Candidate:
     design: bool = False
     finish: str = ""
     promise: float = 0.0
+    free: tuple[str, ...] = ()
 
 
 def called(variant: str, wish: Wish, block: MaterialBlock) -> str:

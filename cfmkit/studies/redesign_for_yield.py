@@ -296,7 +296,7 @@ def _moved(given: Spec, design: Design, run: Run, largest: bool) -> tuple[int, D
     if first is None:
         return 0, replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
     sight = Sight(design.spec, tuple(free), made, rows_of(nominal, first, places), run)
-    problem = _problem(sight, free, wanted, run)
+    problem = problem_of(sight, free, wanted, run)
     start = np.array([float(design.spec.at(path)) for path in free])
     try:
         found, good = _held(problem, sight, start, largest)
@@ -382,7 +382,8 @@ def _errors(sight: Sight) -> FloatArray:
     return np.asarray(sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal)
 
 
-def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> RobustProblem:
+def problem_of(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> RobustProblem:
+    """Return how the values with ranges `free` [SI] are to move until a share `wanted` of parts is good."""
     made, clock = sight.made, Clock.of(run.time_budget)
     values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
     errors = values - made.nominal
@@ -406,13 +407,22 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
     )
 
 
-def _designed(design: Design, sight: Sight, found: RobustResult, good: int, problem: RobustProblem) -> Design:
-    """Return the design with its values moved, or why there is none, and what the search says of it."""
+def written(sight: Sight, found: RobustResult, problem: RobustProblem) -> Spec:
+    """Return the design with its values moved, as few digits of them as matter."""
     steps = 10.0**-DIGITS * problem.reach
     x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
-    spec = sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.none)
+    return sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.none)
+
+
+def costliest_path(sight: Sight, found: RobustResult, problem: RobustProblem) -> str:
+    """Return which value it is whose tolerance costs most; several that err as one are joined by commas."""
     groups = sight.made.joined()
-    worst = ", ".join(sight.made.paths[k] for k in groups[costliest(found, problem, groups)])
+    return ", ".join(sight.made.paths[k] for k in groups[costliest(found, problem, groups)])
+
+
+def _designed(design: Design, sight: Sight, found: RobustResult, good: int, problem: RobustProblem) -> Design:
+    """Return the design with its values moved, or why there is none, and what the search says of it."""
+    x, spec, worst = found.x, written(sight, found, problem), costliest_path(sight, found, problem)
     if _misses(good, problem):
         return _impossible(design, sight, good, worst, problem)
     solved = f"of {CHECKED} parts that were solved {good} are good; the tolerance that costs most is that of {worst}"

@@ -5,6 +5,7 @@ The estimate is of first order and takes a few solutions: it says whether a desi
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.families.base import function_named
+from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.requirement_constraints import (
@@ -26,6 +28,7 @@ from cfmkit.studies.requirement_constraints import (
     stated_places,
 )
 from cfmkit.studies.stated_or_assumed_tolerances import MODULUS, assumed
+from cfmkit.studies.yield_of_drawn_parts import SCALED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,6 +41,9 @@ if TYPE_CHECKING:
     from cfmkit.studies.stated_or_assumed_tolerances import Assumed
 
 PARTS = 4000
+
+PROPORTIONAL = 1e-3
+"""To this share a force goes with the modulus; differences are as good as that."""
 
 FEW_POINTS, ALIKE = 31, 1e-6
 """Points on the curves of parts, where the design's metrics are the same with so few, but for this share of them."""
@@ -73,7 +79,29 @@ class YieldUnknown(Exception):
     """Why nothing is said of a yield."""
 
 
-def _reported(found: Assumed, shares: tuple[float, float]) -> str:
+@dataclass(frozen=True)
+class FirstOrderShares:
+    """Which share of parts is good, to first order.
+
+    Attributes
+    ----------
+    good : float
+        Of parts as they are made.
+    measured : float
+        Of parts whose modulus is as it should be.
+    trimmed : float
+        Of parts whose mean force is brought to that of the design.
+    proportional : bool
+        Whether the force goes with the modulus, as that of a part of one material without bought springs does.
+    """
+
+    good: float
+    measured: float
+    trimmed: float
+    proportional: bool
+
+
+def _reported(found: Assumed, shares: FirstOrderShares) -> str:
     process = found.process
     used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
     reported = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
@@ -81,9 +109,9 @@ def _reported(found: Assumed, shares: tuple[float, float]) -> str:
         low, high = (format_short(end, "stress") for end in found.modulus)
         reported.append(f"modulus {low} to {high}")
     reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
-    text = f"{_share(shares[0])} parts would meet the requirements if made by {process.name} "
+    text = f"{_share(shares.good)} parts would meet the requirements if made by {process.name} "
     text += f"({', '.join(reported)}; assumed{reason}; to first order)"
-    return text if found.modulus is None else f"{text}, {_share(shares[1])} parts once the modulus is measured"
+    return text if found.modulus is None else f"{text}, {_share(shares.measured)} parts once the modulus is measured"
 
 
 def _share(share: float) -> str:
@@ -93,8 +121,8 @@ def _share(share: float) -> str:
     return f"about {100.0 * share:.2g} % of" if share * PARTS >= 1.0 else "hardly any"
 
 
-def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
-    """Return the share of good parts, and that of those whose modulus is as it should be.
+def first_order_shares(result: Result, found: Assumed, run: Run) -> FirstOrderShares:
+    """Return the share of good parts, as they are, with the modulus as it should be, and after a trim.
 
     Parameters
     ----------
@@ -130,7 +158,7 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
         if np.allclose(numbers[-count:], middle[-count:], rtol=ALIKE, atol=0.0):
             spec, middle = thin, np.concatenate([middle[: len(middle) - len(numbers)], numbers])
     generator = np.random.default_rng([run.seed, 17])
-    moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
+    moved, by_modulus, proportional = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle))), False
     nominal = {path: float(spec.at(path)) for path in paths}
     steps = {path: (nominal[path], step_of(sigma)) for path, sigma in found.deviations.items()}
     if found.modulus:
@@ -138,15 +166,37 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> tuple[float,
     for path, slope in _slopes(spec, rows, steps, exact, run).items():
         if path == MODULUS and found.modulus is not None:
             errors = generator.uniform(*found.modulus, PARTS) - nominal[path]
+            efforts = slice(len(rows.branches) * len(rows.places))
+            proportional = np.allclose(nominal[path] * slope[efforts], middle[efforts], rtol=PROPORTIONAL, atol=0.0)
         else:
             errors = found.deviations[path] * generator.standard_normal(PARTS)
         change = np.outer(errors, slope)
         moved += change
         by_modulus = change if path == MODULUS else by_modulus
-    limits = [(middle + part) @ rows.matrix.T + rows.constant for part in (moved, moved - by_modulus)]
+    parts = middle + moved, middle + moved - by_modulus, _trimmed(result, rows, middle, middle + moved)
     slack = 1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
-    share, measured = (float((one >= -slack).all(axis=1).mean()) for one in limits)
-    return share, measured
+    good, measured, trimmed = (
+        float((one @ rows.matrix.T + rows.constant >= -slack).all(axis=1).mean()) for one in parts
+    )
+    return FirstOrderShares(good, measured, trimmed, proportional)
+
+
+def _trimmed(result: Result, rows: RequirementRows, middle: FloatArray, parts: FloatArray) -> FloatArray:
+    """Return the numbers of parts after a trim, (n, q): the mean effort of each on the first branch is the design's.
+
+    Efforts and the metrics that go with them are scaled, stresses stay: as `yield_of_drawn_parts` has it.
+    """
+    window = window_of(result)
+    low, high = (rows.places[0], rows.places[-1]) if window is None else (window.lo, window.hi)
+    slack = 1e-9 * (rows.places[-1] - rows.places[0])
+    at = np.flatnonzero((rows.places >= low - slack) & (rows.places <= high + slack))
+    level, means = (np.trapezoid(one[..., at], rows.places[at], axis=-1) for one in (middle, parts))
+    scaled = [one.dimension in SCALED for one in rows.metrics]
+    efforts = np.arange(len(middle)) < len(rows.branches) * len(rows.places)
+    efforts[len(middle) - len(scaled) :] = scaled
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where(means, level / means, np.nan)  # without a force there is nothing to trim: never good
+    return np.asarray(np.where(efforts, parts * factor[:, None], parts))
 
 
 def _slopes(

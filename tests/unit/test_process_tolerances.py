@@ -30,11 +30,13 @@ def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
     spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
     spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
     result = cfmkit.analyze(spec)
-    share, measured = first_order_shares(result, assumed(spec), Run())
+    shares = first_order_shares(result, assumed(spec), Run())
     made = tolerances_of(spec, spec.design, 0)
     assert made.paths == ("mechanism.beam.offset",)
     judged = judge(made, made.drawn(), result, Run()).share()
-    assert share == measured
+    share = shares.good
+    assert share == shares.measured
+    assert not shares.proportional  # no spread of the modulus is stated
     assert abs(share - judged.value) < 3 * (share * (1 - share) / judged.count) ** 0.5 + 0.02
 
 

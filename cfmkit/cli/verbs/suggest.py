@@ -245,7 +245,10 @@ VARIANT = 1
 
 def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterator[Block]:
     """Yield the proposals as a table, near misses, families out of reach with their nearest wish, files."""
-    yield TextLine((Span("suggest", LABEL), Span(f"  {data['message']}")), f"{written.seconds:.1f} s")
+    head, _, rest = data["message"].partition("; ")  # the time stands behind what fits into a line
+    yield TextLine((Span("suggest", LABEL), Span(f"  {head}")), f"{written.seconds:.1f} s")
+    if rest:
+        yield Paragraph("", rest)
     if data["proposals"]:
         yield BLANK
         more = _more(data)

@@ -94,7 +94,10 @@ def _followed(name: str) -> Kept:
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
-    """Return rescaled shapes that do what is wished as far as bending goes, those that fill the room least first."""
+    """Return rescaled shapes that do what is wished as far as bending goes, those that fill the room least first.
+
+    For a yield the thickest come first.
+    """
     if wish.kind == "torque":
         return FamilyOffer(reason="the kept shapes are pushed: they give a force, no torque")
     if wish.adjustable is not None:
@@ -171,8 +174,11 @@ def _sized(
         return wide / wish.depth, f"the beams would be {mm(wide)} wide"
     spec = _written(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
+    # of made parts those with thick beams are most alike: an error of the thickness counts three times
+    promise = area if wish.good_parts is None else -thicker * thin
     variant = called(f"shape {kept.name}", wish, block)
-    return Candidate(variant, spec, False, "cfmkit.families.beam.proposals_for_wish:finish", area)
+    finish = "cfmkit.families.beam.proposals_for_wish:finish"
+    return Candidate(variant, spec, False, finish, promise, ("mechanism.thickness", "mechanism.width"))
 
 
 def _width(wish: Wish, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:

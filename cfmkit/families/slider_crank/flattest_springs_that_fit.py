@@ -77,7 +77,7 @@ class SprungMotion:
             return ((self.deep, self.deep),)
         return tuple((share * self.deep, (1.0 - share) * self.deep) for share in SHARES)
 
-    def largest_rates(self, places: FloatArray) -> FloatArray:
+    def largest_rates(self, places: FloatArray, since: int = 0) -> FloatArray:
         """Return the largest rates of springs that bear the motion up to each place [N m/rad, the last N/m].
 
         A spring at the slider can only be stretched, from where it is at rest.
@@ -86,20 +86,25 @@ class SprungMotion:
         ----------
         places : (n,) array
             Motions from where all springs are relaxed on, increasing.
+        since : int
+            The first of them that is wanted.
 
         Returns
         -------
-        (m, 4, n) array
+        (m, 4, n - since) array
             For each of the `depths`.
         """
         units = self.assembly.units(places)
         turns = np.maximum.accumulate(np.abs(units.turn), axis=1)
-        pushed = np.minimum.accumulate(units.turn[3]) < -STILL * turns[3]
-        rest, found = float(units.position[0]), []
-        for below, above in self.depths:
-            pins = [stiffest("torsion", turns[k], self.widest, above if k else below) for k in range(3)]
-            found.append([*pins, np.where(pushed, 0.0, stiffest("extension", turns[3], above, rest))])
-        return np.array(found)
+        pushed = (np.minimum.accumulate(units.turn[3]) < -STILL * turns[3])[since:]
+        rest, turns = float(units.position[0]), turns[:, since:]
+        deep = np.array([(below, above, above) for below, above in self.depths])[:, :, None]
+        # all depths in one call: there are few places, and a call takes longer than they do
+        alike = np.broadcast_to(turns[:3], (len(deep), *turns[:3].shape))
+        pins = stiffest("torsion", alike.ravel(), self.widest, (deep + np.zeros_like(alike)).ravel())
+        wide = deep[:, 2] + np.zeros_like(turns[3])
+        slider = stiffest("extension", np.tile(turns[3], len(deep)), wide.ravel(), rest).reshape(wide.shape)
+        return np.concatenate([pins.reshape(alike.shape), np.where(pushed, 0.0, slider)[:, None]], axis=1)
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,7 @@ def largest_effort(motion: SprungMotion) -> float:
     places = np.linspace(motion.assembly.start, motion.high, PLACES)
     first = int(np.searchsorted(places, motion.low))
     window = int(motion.length / (places[1] - places[0]))
-    rates = motion.largest_rates(places)[:, :, first + window :]
+    rates = motion.largest_rates(places, first + window)
     drives = np.maximum(motion.assembly.forces(places), 0.0)[:, first:]
     inside = np.lib.stride_tricks.sliding_window_view(drives, window + 1, axis=1)[:, : rates.shape[2]]
     least = np.einsum("dkw,kwp->dwp", rates, inside).min(axis=2)

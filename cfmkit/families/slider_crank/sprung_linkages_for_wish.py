@@ -264,8 +264,12 @@ def pushed_linkage(wish: Wish, lengths: Proportions, crank: float, first: float)
         "analysis": pushed_analysis((first, lengths.reach * crank)),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    most = max(map(largest_effort, _pushing(spec, wish)))
-    if most < WEAK * wish.low:
+    most = 0.0
+    for motion in _pushing(spec, wish):
+        most = max(most, largest_effort(motion))
+        if most >= WEAK * wish.low:  # what more there is does not matter
+            break
+    else:
         return most
     return Candidate("springs at pins", spec, finish=FINISH, promise=largest_first(crank, wish))
 

@@ -86,7 +86,7 @@ FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
-    """Return mechanisms that the closed forms say are worth designing, the smallest first."""
+    """Return mechanisms that the closed forms say are worth designing, the smallest first, for a yield the thickest."""
     if wish.kind == "torque":
         return FamilyOffer(reason="leaves that snap through give a force at their shuttle, no torque")
     found: list[Candidate] = []
@@ -100,7 +100,9 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
             if excess <= 1.0:
                 pairs = spec.mechanism.bistable.half_beams // 2
                 variant = called(f"{pairs} V{'s' if pairs > 1 else ', guided'}", wish, block)
-                promise = over["across"] * over["along"]
+                # of made parts those with thick leaves are most alike: an error of the thickness counts three times
+                thick = min(sizes.leaf.thickness, sizes.side.thickness)
+                promise = over["across"] * over["along"] if wish.good_parts is None else -thick
                 found.append(Candidate(variant, spec, True, FINISH, float(promise)))
             if (coiled := _coiled(wish, block, spec, sizes)) is not None:
                 found.append(coiled)
@@ -119,7 +121,7 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
     """Return candidates, those of different numbers of Vs by turns."""
     kinds = sorted(dict.fromkeys(one.variant for one in found), key=_turn)
     rows = [[one for one in found if one.variant == kind] for kind in kinds]
-    # the smallest first, then larger ones, which are flatter
+    # the smallest first, then larger ones, which are flatter; for a yield the thickest, then thinner ones
     turns = [[row[len(row) * part // 8] for part in (0, 4, 2, 6, 1, 7)] for row in rows]
     mixed = [row[k] for k in range(6) for row in turns]
     return [one for number, one in enumerate(mixed) if all(one is not other for other in mixed[:number])]
@@ -234,6 +236,7 @@ def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes
     if not springs:
         return None
     promise = across * (stands + min(one.free_length or 0.0 for one in springs))
+    promise = promise if wish.good_parts is None else -float(leaf.thickness)
     listed = spec.replace({"design.catalogue": tuple(springs)})
     return Candidate(called("2 Vs, catalogue springs", wish, block), listed, True, FINISH, float(promise))
 

@@ -73,7 +73,7 @@ def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | 
     return min((one for one in found if one.outer_diameter <= widest), key=lambda one: one.body_length, default=None)
 
 
-def stiffest(kind: Kind, deflection: FloatArray, widest: float, room: float) -> FloatArray:
+def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray) -> FloatArray:
     """Return the largest rates of springs that can be stretched [m], or turned [rad], so far and fit: zero for none.
 
     Parameters
@@ -82,7 +82,7 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float, room: float) -> 
         Of the springs.
     deflection : (n,) array
         How far they are stretched or turned.
-    widest, room : float
+    widest, room : float or (n,) array
         Largest outer diameter, and length with the loops of one that is stretched [m].
 
     Examples

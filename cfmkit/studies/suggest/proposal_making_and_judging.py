@@ -16,6 +16,7 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.studies.suggest.margins_for_yield import redesigned
 from cfmkit.studies.suggest.yield_of_proposal import GoodParts, good_parts, with_made_parts
 
 if TYPE_CHECKING:
@@ -41,13 +42,17 @@ SLACK = 1e-9
 
 @dataclass(frozen=True)
 class ProposalJob:
-    """A candidate of a family that is to be made and judged against a wish before a deadline, in `time.time` [s]."""
+    """A candidate of a family that is to be made and judged against a wish before a deadline, in `time.time` [s].
+
+    `near`: what came of it, to be designed again with margins for the yield that is all it misses.
+    """
 
     family: str
     candidate: Candidate
     wish: Wish
     seed: int
     deadline: float | None = None
+    near: Proposal | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,8 @@ class Proposal:
         ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
+    movable : bool
+        Whether all that it misses is the yield, and a design with margins might have it.
     """
 
     family: str
@@ -79,6 +86,7 @@ class Proposal:
     message: str = ""
     numbers: Mapping[str, float | None] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    movable: bool = False
 
     @property
     def good(self) -> bool:
@@ -99,7 +107,7 @@ class Proposal:
         """Return it as plain lists and mappings."""
         return {
             "family": self.family, "variant": self.variant, "text": self.text, "missed": list(self.missed),
-            "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes),
+            "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes), "movable": self.movable,
         }  # fmt: skip
 
     @classmethod
@@ -118,6 +126,8 @@ def made(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; whatever its design or model refuses is its message."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
+        if job.near is not None:
+            return _with_margins(job, job.near, clock)
         spec, reported = _designed(job, clock)
         if spec is None:
             return Proposal(job.family, candidate.variant, message=reported)
@@ -150,6 +160,19 @@ def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     return spec, ""
 
 
+def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
+    """Return a proposal designed again for the wished yield, or with what is missing of it."""
+    if clock.late():
+        return Proposal(job.family, near.variant, message=OUT_OF_TIME)
+    left = None if clock.deadline is None else clock.deadline - time.time()
+
+    def judge(spec: Spec) -> Proposal:
+        return judged(job.family, near.variant, spec, job.wish, job.seed, clock)
+
+    found = redesigned(near, job.candidate, job.wish, Run(job.seed, time_budget=left), judge)
+    return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
+
+
 def _seconds(clock: Clock) -> float:
     """Return how long one design may search [s]."""
     return LONGEST if clock.deadline is None else min(LONGEST, max(clock.deadline - time.time(), 0.1))
@@ -177,14 +200,15 @@ def judged(name: str, variant: str, spec: Spec, wish: Wish, seed: int = 0, clock
     missed += _outside(wish, space)
     missed += _too_short(wish, result)
     missed += _badly_adjusted(wish, result)
-    numbers = numbers_of(result, space, wish)
+    numbers, movable = numbers_of(result, space, wish), False
     if wish.good_parts is not None and len(missed) <= 1:
         parts: GoodParts = good_parts(replace(result, spec=written), wish, clock, draw=not missed)
         if parts.late:
             return Proposal(name, variant, message=OUT_OF_TIME)
+        movable = parts.movable and not missed
         missed += [parts.missed] if parts.missed else []
         numbers["yield"] = parts.share
-    return Proposal(name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)))
+    return Proposal(name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable)
 
 
 def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]]:

@@ -145,42 +145,15 @@ def suggest(
     times = _Times.of(run.time_budget, reserve)
     answers, unasked = _answers(wish, run, times.asking)
     queues = {one.family: list(one.offer.candidates) for one in answers}
-    total = sum(map(len, queues.values()))
-    done: list[Proposal] = []
-    reused = tried = turn = 0
-    cut, enough = unasked, ENOUGH if wish.good_parts is None else ENOUGH_WITH_PARTS
-
-    known: dict[int, Proposal] = {}
-
-    def late() -> bool:
-        end = times.with_proposals if any(one.good for one in (*done, *known.values())) else times.without
-        return end is not None and time.time() > end
-
-    while not late() and (batch := list(_next(queues, done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
+    making = _Making(run, times, sum(map(len, queues.values())))
+    turn, cut, enough = 0, unasked, ENOUGH if wish.good_parts is None else ENOUGH_WITH_PARTS
+    while not making.late() and (batch := list(_next(queues, making.done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
         turn += 1
         jobs = [ProposalJob(name, candidate, wish, run.seed, times.without) for name, candidate in batch]
-        keys = [_key(job) for job in jobs]
-        places = [run.notes.find(key) for key in keys]
-        known = {
-            index: Proposal.of_record(run.notes.read(place, key))
-            for index, (place, key) in enumerate(zip(places, keys, strict=True))
-            if place >= 0
-        }
-        reused += len(known)
-        left = [index for index in range(len(jobs)) if index not in known]
-        for index, outcome in until(run.executor, times.without)(partial(_made_of, tuple(jobs)), iter(left), late):
-            proposal = _survived(jobs[index], outcome)
-            if proposal.message != OUT_OF_TIME:
-                known[index] = proposal
-                if proposal.message != ENDED_EARLY:  # a machine with less to do may finish it next time
-                    run.notes.add(keys[index], proposal.as_record())
-            tried += 1
-            run.progress(min(0.99, (tried + reused) / max(total, 1)), f"{sum(one.good for one in done)} proposals")
-        done += [known[index] for index in sorted(known)]
-        if len(known) < len(jobs):
+        if not (making.all_of(jobs) and making.all_of(making.with_margins(enough))):
             cut = True
             break
-        known = {}
+    done = making.done
     counts = {name: sum(one.family == name for one in done) for name in queues}
     if not cut and not any(one.good for one in done):
         answers = _with_nearest(answers, wish, run, times.without)
@@ -190,9 +163,82 @@ def suggest(
         tuple(_near(done, wish)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
-        cut or (late() and bool(list(_next(queues, done, 1, enough)))),
-        reused,
+        cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
+        making.reused,
     )
+
+
+class _Making:
+    """The candidates that were made, in the order in which they were asked for.
+
+    Attributes
+    ----------
+    done : list of Proposal
+        What became of them; in a round that the time ended, of some of them.
+    reused : int
+        Those that were found in the journal.
+    """
+
+    def __init__(self, run: Run, times: _Times, total: int) -> None:
+        self._run, self._times, self._total, self._tried = run, times, total, 0
+        self._known: dict[int, Proposal] = {}
+        self._jobs: list[ProposalJob] = []
+        self.done: list[Proposal] = []
+        self.reused = 0
+
+    def late(self) -> bool:
+        """Tell whether the time is up, of which there is more as long as nothing is found."""
+        found = any(one.good for one in (*self.done, *self._known.values()))
+        end = self._times.with_proposals if found else self._times.without
+        return end is not None and time.time() > end
+
+    def all_of(self, jobs: Sequence[ProposalJob]) -> bool:
+        """Make candidates, or find them in the journal; return whether the time sufficed for all."""
+        run, notes = self._run, self._run.notes
+        keys = [_key(job) for job in jobs]
+        places = [notes.find(key) for key in keys]
+        self._known = {
+            index: Proposal.of_record(notes.read(place, key))
+            for index, (place, key) in enumerate(zip(places, keys, strict=True))
+            if place >= 0
+        }
+        self.reused += len(self._known)
+        left = [index for index in range(len(jobs)) if index not in self._known]
+        work = partial(_made_of, tuple(jobs))
+        for index, outcome in until(run.executor, self._times.without)(work, iter(left), self.late):
+            proposal = _survived(jobs[index], outcome)
+            if proposal.message != OUT_OF_TIME:
+                self._known[index] = proposal
+                if proposal.message != ENDED_EARLY:  # a machine with less to do may finish it next time
+                    notes.add(keys[index], proposal.as_record())
+            self._tried += jobs[index].near is None
+            made = (self._tried + self.reused) / max(self._total, 1)
+            run.progress(min(0.99, made), f"{sum(one.good for one in self.done)} proposals")
+        for index in sorted(self._known):
+            self._take(jobs[index], self._known[index])
+        complete = len(self._known) == len(jobs)
+        self._known = {}
+        return complete
+
+    def _take(self, job: ProposalJob, proposal: Proposal) -> None:
+        """Keep what became of a candidate, in place of the near miss that it was designed again for."""
+        if job.near is None:
+            self.done.append(proposal)
+            self._jobs.append(job)
+            return
+        at = next(k for k, one in enumerate(self.done) if one is job.near)
+        self.done[at] = proposal if proposal.text else replace(job.near, movable=False)
+
+    def with_margins(self, enough: int) -> list[ProposalJob]:
+        """Return what is worth a design with margins: of families that lack proposals those with the largest yield."""
+        found = []
+        for name in dict.fromkeys(job.family for job in self._jobs):
+            mine = [(job, one) for job, one in zip(self._jobs, self.done, strict=True) if job.family == name]
+            lacking = enough - sum(one.good for _, one in mine)
+            near = [(job, one) for job, one in mine if one.movable]
+            near.sort(key=lambda pair: -float(pair[1].numbers["yield"] or 0.0))
+            found += [replace(job, near=one) for job, one in near[: max(lacking, 0)]]
+        return found
 
 
 def _with_nearest(answers: list[Answered], wish: Wish, run: Run, deadline: float | None) -> list[Answered]:
@@ -296,6 +342,7 @@ def _key(job: ProposalJob) -> str:
     content = {
         "family": job.family, "variant": candidate.variant, "design": candidate.design, "finish": candidate.finish,
         "spec": candidate.spec.model_dump(mode="json"), "wish": repr(job.wish), "seed": job.seed, "code": code_stamp(),
+        "margins": job.near and job.near.text,
     }  # fmt: skip
     return stable_hash(content)[:32]
 

@@ -7,12 +7,13 @@ is the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.base import Run
+from cfmkit.specs.units import format_short
 from cfmkit.studies.sensitivity.parameters import parameters_of
 from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, assumed, tolerances
 from cfmkit.studies.yield_by_assumed_tolerances import YieldUnknown, first_order_shares
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.stated_or_assumed_tolerances import Assumed
+    from cfmkit.studies.yield_by_assumed_tolerances import FirstOrderShares
 
 PARTS = 100
 """Parts that are drawn of a proposal, each analysed in full: one standard deviation is 3 % where 90 % are good."""
@@ -50,11 +52,14 @@ class GoodParts:
         Why that is not what is wished; empty where it is.
     late : bool
         Whether the time ended it before anything was known.
+    movable : bool
+        Whether a design with margins might have what is missing.
     """
 
     share: float | None
     missed: str = ""
     late: bool = False
+    movable: bool = False
 
 
 def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
@@ -91,17 +96,45 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
     if found is None or result.spec.sensitivity is None:
         return GoodParts(None, "its yield is not known: the errors of its dimensions by the process are not known")
     first = _first_order(result, found)
-    if first is not None and first[0] < wanted:
-        return GoodParts(
-            first[0], _reported(first[0], f"made by {found.process.name}, to first order", wanted, first[1])
-        )
+    most = 1.0 if first is None else _most(first, found, wish)
+    if first is not None and first.good < wanted:
+        text = _reported(first.good, f"made by {found.process.name}, to first order", wanted)
+        return GoodParts(first.good, text + _cures(first, found, most, wanted), movable=most >= wanted)
     if not draw:
-        return GoodParts(None if first is None else first[0])
-    return _drawn(result, found, wanted, clock)
+        return GoodParts(None if first is None else first.good)
+    drawn = _drawn(result, found, wanted, clock)
+    return replace(drawn, movable=first is not None and bool(drawn.missed) and most >= wanted)
 
 
-def _first_order(result: Result, found: Assumed) -> tuple[float, float] | None:
-    """Return the share of good parts and that with the modulus measured; None where only drawn parts can say it."""
+def _most(first: FirstOrderShares, found: Assumed, wish: Wish) -> float:
+    """Return the largest yield of any shape, by the modulus alone, which no shape makes any surer.
+
+    A force that goes with a modulus between E0 and E1, all equally likely, is within [F0, F1] for a share of
+    (1 - F0/F1) E1/(E1 - E0) at most: the range of moduli that give such forces is widest at its upper end.
+    """
+    if found.modulus is None or not first.proportional:
+        return 1.0
+    low, high = found.modulus
+    return min(1.0, (1.0 - wish.low / wish.high) * high / (high - low))
+
+
+def _cures(first: FirstOrderShares, found: Assumed, most: float, wanted: float) -> str:
+    """Return what a yield would be without errors that a whole part has in common, and how one gets there."""
+    better = {"once the modulus is measured": first.measured, "after a trim of each part's force": first.trimmed}
+    shown = [f"{_percent(share)} {words}" for words, share in better.items() if share > first.good + 0.005]
+    text = f" ({', '.join(shown)})" if shown else ""
+    if most >= wanted or found.modulus is None:
+        return text
+    ends = " to ".join(format_short(end, "stress") for end in found.modulus)
+    return (
+        f"{text}; no shape gets beyond {_percent(most)}, as its force goes with the modulus of {ends}: measure it on a "
+        "coupon and state it as the wish's material, fit it to a measured part with 'cfmkit calibrate', or trim the "
+        "force of each part"
+    )
+
+
+def _first_order(result: Result, found: Assumed) -> FirstOrderShares | None:
+    """Return the shares of good parts; None where only drawn parts can say them."""
     try:
         return first_order_shares(result, found, Run())
     except YieldUnknown:
@@ -133,10 +166,8 @@ def _met(result: Result) -> Iterator[NDArray[np.bool_]]:
         yield np.asarray(judge(made, values[begin : begin + AT_ONCE], result, Run()).met.all(axis=1))
 
 
-def _reported(share: float, made: str, wanted: float, measured: float | None = None) -> str:
-    text = f"yield {_percent(share)} {made}, wanted at least {_percent(wanted)}"
-    better = measured is not None and measured > share + 0.005
-    return f"{text} ({_percent(float(measured or 0.0))} once the modulus is measured)" if better else text
+def _reported(share: float, made: str, wanted: float) -> str:
+    return f"yield {_percent(share)} {made}, wanted at least {_percent(wanted)}"
 
 
 def _percent(share: float) -> str:
