@@ -12,9 +12,9 @@ from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import Candidate
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
-from cfmkit.studies.suggest import margins_for_yield
-from cfmkit.studies.suggest.margins_for_yield import Moved, moved_for_yield, redesigned
-from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made
+from cfmkit.studies.suggest import proposal_making_and_judging
+from cfmkit.studies.suggest.margins_for_yield import Moved, moved_for_yield
+from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 
@@ -92,7 +92,7 @@ def moved_to(monkeypatch, shares):
         asked.append(share)
         return Moved(spec, 0.5, shares[len(asked) - 1], "mechanism.bistable.thickness")
 
-    monkeypatch.setattr(margins_for_yield, "moved_for_yield", moved)
+    monkeypatch.setattr(proposal_making_and_judging, "moved_for_yield", moved)
     return asked
 
 
@@ -156,13 +156,14 @@ def test_a_strip_moved_for_a_yield_has_it():
     given = cfmkit.load("configs/studies/slider_crank_strip_yield.yaml")
     asked = tuple(one for one in given.requirements if one.metric != "yield")
     parameters = {path: {"normal": one.normal} for path, one in given.design.tolerances.items()}
-    block = {"method": "tolerance", "parameters": parameters, "samples": 100}
+    block = {"method": "tolerance", "parameters": parameters, "samples": 60}
+    given = given.replace({"analysis.points": 31, "analysis.recheck": False})
     spec = given.replace({"design": None, "requirements": asked, "sensitivity": block})
     candidate = Candidate("strip", given, design=True)
     moved = moved_for_yield(candidate, spec, wish(**{"yield": "85 %"}), 0.85, Run())
     assert moved.began < 0.6
     assert moved.share >= 0.85
-    found = cfmkit.sensitivity(moved.spec, method="tolerance", samples=100, parameters=parameters)
+    found = cfmkit.sensitivity(moved.spec, method="tolerance", samples=60, parameters=parameters)
     assert found.summary["yield"]["value"] >= 0.8
 
 

@@ -7,15 +7,13 @@ new design as of any other proposal. Where it does not, more is requested.
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.designing.robust_design import NoPart, with_margins
-from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Status
@@ -26,21 +24,12 @@ from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances
 from cfmkit.studies.suggest.yield_of_proposal import PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.families.wishes import Candidate, Wish
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
 
-
-TRIES = 3
-"""How often more is requested than what drawn parts did not have."""
 
 STEPS = 15
 """Steps of one search, which is ended by them and not by a clock: what can be reached is nearly reached in ten."""
-
-MOST_ASKED = 0.9975
-"""For a larger share the drawn parts of the search are too few."""
 
 
 @dataclass(frozen=True)
@@ -61,60 +50,6 @@ class Moved:
     began: float
     share: float
     costliest: str
-
-
-def redesigned(
-    near: Proposal, candidate: Candidate, wish: Wish, run: Run, judge: Callable[[Spec], Proposal]
-) -> Proposal:
-    """Return a proposal whose made parts are good as often as wished, else the best found, with what is missing of it.
-
-    Parameters
-    ----------
-    near : Proposal
-        Which misses the yield alone.
-    candidate : Candidate
-        What it was made of.
-    wish : Wish
-        With a share of good parts.
-    run : Run
-        Seed, and how long it may take.
-    judge : callable
-        Analyses and judges a specification, drawn parts included.
-    """
-    clock = Clock.of(run.time_budget)
-    wanted = asked = float(wish.good_parts or 0.0)
-    best, spec, last, obstacle = near, near.spec, None, ""
-    for _ in range(TRIES):
-        left = None if clock.deadline is None else clock.deadline - time.time()
-        moved = None if clock.late() else moved_for_yield(candidate, spec, wish, asked, replace(run, time_budget=left))
-        if moved is None:
-            break
-        last, there = moved, judge(moved.spec)
-        if there.good:
-            return replace(there, notes=(_note(moved), *there.notes))
-        if not there.movable:
-            obstacle = "; ".join(there.missed) or there.message
-            break
-        share = float(there.numbers["yield"] or 0.0)
-        if share > float(best.numbers["yield"] or 0.0):
-            best = there
-        if moved.share < asked or asked >= MOST_ASKED:
-            break
-        asked, spec = min(MOST_ASKED, max(moved.share, asked) + 0.5 * (wanted - share)), there.spec
-    return replace(best, missed=(f"{best.missed[0]}; {_tried(last, obstacle)}",), movable=False)
-
-
-def _note(moved: Moved) -> str:
-    shares = f"{100.0 * moved.began:.3g} % of parts were good before and {100.0 * moved.share:.3g} % are now"
-    return f"designed with margins for the yield: to first order {shares}"
-
-
-def _tried(moved: Moved | None, obstacle: str) -> str:
-    """Return why margins did not help."""
-    if moved is None:
-        return "no value may move for it"
-    reported = f"margins reach no more, and the tolerance of {moved.costliest} costs most"
-    return f"{reported}; moved farther, the mechanism misses more: {obstacle}" if obstacle else reported
 
 
 def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, run: Run) -> Moved | None:

@@ -16,11 +16,11 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.studies.suggest.margins_for_yield import redesigned
+from cfmkit.studies.suggest.margins_for_yield import Moved, moved_for_yield
 from cfmkit.studies.suggest.yield_of_proposal import GoodParts, good_parts, with_made_parts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.families.base import Room
     from cfmkit.families.wishes import Candidate, Wish
@@ -35,6 +35,12 @@ ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
 LIVES = ("fatigue_life", "spring_life")
 """Metrics that say how many cycles the material, and bought springs, last."""
+
+TRIES = 3
+"""How often more is requested than what drawn parts did not have."""
+
+MOST_ASKED = 0.9975
+"""For a larger share the drawn parts of the search are too few."""
 
 SLACK = 1e-9
 """On lengths that are compared: what writing a number down does to its last digit."""
@@ -171,6 +177,60 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
 
     found = redesigned(near, job.candidate, job.wish, Run(job.seed, time_budget=left), judge)
     return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
+
+
+def redesigned(
+    near: Proposal, candidate: Candidate, wish: Wish, run: Run, judge: Callable[[Spec], Proposal]
+) -> Proposal:
+    """Return a proposal whose made parts are good as often as wished, else the best found, with what is missing of it.
+
+    Parameters
+    ----------
+    near : Proposal
+        Which misses the yield alone.
+    candidate : Candidate
+        What it was made of.
+    wish : Wish
+        With a share of good parts.
+    run : Run
+        Seed, and how long it may take.
+    judge : callable
+        Analyses and judges a specification, drawn parts included.
+    """
+    clock = Clock.of(run.time_budget)
+    wanted = asked = float(wish.good_parts or 0.0)
+    best, spec, last, obstacle = near, near.spec, None, ""
+    for _ in range(TRIES):
+        left = None if clock.deadline is None else clock.deadline - time.time()
+        moved = None if clock.late() else moved_for_yield(candidate, spec, wish, asked, replace(run, time_budget=left))
+        if moved is None:
+            break
+        last, there = moved, judge(moved.spec)
+        if there.good:
+            return replace(there, notes=(_note(moved), *there.notes))
+        if not there.movable:
+            obstacle = "; ".join(there.missed) or there.message
+            break
+        share = float(there.numbers["yield"] or 0.0)
+        if share > float(best.numbers["yield"] or 0.0):
+            best = there
+        if moved.share < asked or asked >= MOST_ASKED:
+            break
+        asked, spec = min(MOST_ASKED, max(moved.share, asked) + 0.5 * (wanted - share)), there.spec
+    return replace(best, missed=(f"{best.missed[0]}; {_tried(last, obstacle)}",), movable=False)
+
+
+def _note(moved: Moved) -> str:
+    shares = f"{100.0 * moved.began:.3g} % of parts were good before and {100.0 * moved.share:.3g} % are now"
+    return f"designed with margins for the yield: to first order {shares}"
+
+
+def _tried(moved: Moved | None, obstacle: str) -> str:
+    """Return why margins did not help."""
+    if moved is None:
+        return "no value may move for it"
+    reported = f"margins reach no more, and the tolerance of {moved.costliest} costs most"
+    return f"{reported}; moved farther, the mechanism misses more: {obstacle}" if obstacle else reported
 
 
 def _seconds(clock: Clock) -> float:
