@@ -169,7 +169,7 @@ def suggest(
 
 
 class _Making:
-    """The candidates that were made, in the order in which they were asked for.
+    """The candidates that were made, in the order in which they were requested.
 
     Attributes
     ----------
