@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.numerics.one_blas_thread import one_blas_thread
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -48,6 +50,7 @@ class DrivenPart:
     size: float
     stops: tuple[float, ...]
 
+    @one_blas_thread
     def solved(self, report: Callable[[float, str], None] = lambda _share, _text: None) -> TwoMeshes:
         """Return the part on both meshes, on the coarser one at every second stop.
 

@@ -16,6 +16,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.vibration.stiffness_and_mass_matrices import Linearisation
 from cfmkit.errors import InputError
+from cfmkit.numerics.one_blas_thread import one_blas_thread
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -57,6 +58,7 @@ class Frequencies(ShortRepr):
     diverges: Any
 
 
+@one_blas_thread
 def frequencies(
     path: Path,
     masses: NetworkMasses,

@@ -1,0 +1,36 @@
+"""Dense matrices of a few hundred rows on one thread of the linear algebra library.
+
+BLAS libraries start as many threads as there are cores, which wait for each other busily: frequencies of a network of
+beams took 14 s of time and 28 s of processor time in Python, and 1.9 s with one thread. Commands ask for one thread by
+environment variables, before a library is loaded; a program in Python has mostly loaded it before.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+CHOSEN = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Who sets one of these has chosen a number of threads, which stays."""
+
+
+def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function with one thread for BLAS while it runs, unless the environment chooses how many."""
+
+    @functools.wraps(function)
+    def limited(*arguments: P.args, **options: P.kwargs) -> R:
+        if any(name in os.environ for name in CHOSEN):
+            return function(*arguments, **options)
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, user_api="blas"):
+            return function(*arguments, **options)
+
+    return limited
