@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network import Network
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
-_MOST_PULLED = 2048  # segments of a beam that is only pulled: L/t = 10 000 at 3 % takes 1600; more cost minutes on leaves of nanometres
+_MOST_PULLED = 2048  # segments of a beam that is only pulled: L/t = 10 000 at 3 % takes 1600; films would take minutes
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
