@@ -59,7 +59,7 @@ def _one_thread() -> None:
 
     Matrices here are small: threads cost more than they bring, five times as much where other programs run.
     """
-    from cfmkit.studies.serial_and_cluster_executors import ONE_THREAD
+    from cfmkit.numerics.one_blas_thread import ONE_THREAD
 
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)

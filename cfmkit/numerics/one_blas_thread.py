@@ -17,8 +17,18 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 R = TypeVar("R")
 
-CHOSEN = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Who sets one of these has chosen a number of threads, which stays."""
+CHOSEN = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+"""Variables of the environment that libraries read when they are loaded: who sets one has chosen how many threads."""
+
+ONE_THREAD = dict.fromkeys(CHOSEN, "1")
+"""What keeps the libraries of a process to one thread: processes share the cores, and sums come out the same."""
 
 
 def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:

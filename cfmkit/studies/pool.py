@@ -24,9 +24,10 @@ from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError, UsageError
+from cfmkit.numerics.one_blas_thread import ONE_THREAD
 from cfmkit.results import Status
 from cfmkit.studies import worker_process
-from cfmkit.studies.serial_and_cluster_executors import ONE_THREAD, Lost, never
+from cfmkit.studies.serial_and_cluster_executors import Lost, never
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -22,6 +22,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
+from cfmkit.numerics.one_blas_thread import ONE_THREAD
 from cfmkit.results import Status
 
 if TYPE_CHECKING:
@@ -30,20 +31,6 @@ if TYPE_CHECKING:
     Work = Callable[[Any], Any]
     Stopping = Callable[[], bool]
     Executor = Callable[[Work, Iterator[Any], Stopping], Iterator[tuple[Any, Any]]]
-
-
-ONE_THREAD = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-    )
-}
-"""What keeps the libraries of a process to one thread: processes share the cores, and sums come out the same."""
 
 
 @dataclass(frozen=True)

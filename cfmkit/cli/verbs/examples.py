@@ -19,11 +19,12 @@ EXAMPLE = "cfmkit examples cam"
 
 ALL = "all"
 QUICK = "quick"
+"""All but those that search for a shape."""
+
 LONG = (
     "{quick} examples take some seconds each, the last {long} search for shapes for many minutes; "
     "`cfmkit examples --run quick` leaves those out"
 )
-"""All but those that search for a shape."""
 
 
 @dataclass(frozen=True, kw_only=True)
