@@ -612,6 +612,20 @@ analysis:
 """
 
 
+def test_reactions_are_what_holds_a_node_and_a_force_that_drives_is_a_load():
+    """At the same pose: the root bears the force either way, the driven node's column has it under a displacement."""
+    moved = TAUT.replace("travel: 8 mm", "travel: 1 mm\n  outputs: {reactions: [a, b]}")
+    by_motion = cfmkit.analyze(cfmkit.loads(moved)).curve
+    force = float(by_motion.force[-1])
+    loaded = moved.replace("kind: displacement", "kind: force").replace("travel: 1 mm", f"force: {force!r} N")
+    by_force = cfmkit.analyze(cfmkit.loads(loaded)).curve
+    assert by_force.motion[-1] == pytest.approx(1 * MM, rel=1e-5)
+    for curve in (by_motion, by_force):
+        assert curve.extra["a_fx"].values[-1] == pytest.approx(-force, rel=1e-5)
+    assert by_motion.extra["b_fx"].values[-1] == pytest.approx(force, rel=1e-9)
+    assert abs(by_force.extra["b_fx"].values).max() < 1e-9 * force
+
+
 @pytest.mark.parametrize("support", ["pinned", "clamped"])
 def test_elastica_that_are_pulled_taut_have_no_limit_point(support):
     result = cfmkit.analyze(cfmkit.loads(TAUT.replace("support: pinned", f"support: {support}")))
@@ -629,6 +643,20 @@ def test_elastica_that_are_pulled_taut_after_the_last_point_of_a_coarse_curve_ar
     result = cfmkit.analyze(cfmkit.loads(TAUT.replace("points: 61", "points: 5")))
     assert result.message.startswith("the beams are taut at 2.")
     assert "limit point" not in result.message
+
+
+def test_straight_beams_on_a_pin_that_are_pulled_into_one_line_are_said_to_be_taut():
+    """They bear nothing before: 2 hypot(30, 20) = 72.11 mm is as far as they reach."""
+    text = TAUT.replace(
+        "s: {start: a, end: b, shape: {kind: arc, sweep: 60 deg}}", "s: {start: a, end: k, end_joint: pin}"
+    )
+    text = text.replace("  drive:", "    t: {start: k, end: b}\n  drive:").replace("travel: 8 mm", "travel: 25 mm")
+    text = text.replace("  beams:", "    k: {at: [30 mm, 20 mm]}\n  beams:")
+    result = cfmkit.analyze(cfmkit.loads(text))
+    assert result.status is Status.PARTIAL
+    assert re.match(r"the beams are taut at 12\.[01]\d* mm \(a to b: 72\.[01]\d* mm of 72\.11 mm\)", result.message)
+    pushed = cfmkit.analyze(cfmkit.loads(text.replace("direction: 0 deg}\nanalysis", "direction: 180 deg}\nanalysis")))
+    assert "taut" not in pushed.message
 
 
 def test_elastica_that_a_force_pulls_taut_before_the_first_point_are_said_to_be():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import ellipe, ellipk
 
 from cfmkit.elastica import (
     CLAMPED,
@@ -132,6 +133,35 @@ def test_a_bent_column_under_a_force_goes_where_a_displacement_meets_that_force(
     back = trace(net, Displacement("b", np.pi, went), control)
     assert back.events == ()
     np.testing.assert_allclose(back.effort[back.at_requested] / critical, factors, rtol=2e-5)
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_a_column_that_does_not_stretch_buckles_under_a_displacement_once_it_is_bent(clamped: bool) -> None:
+    """The perfect one is rigid until then. Bent by 1e-5 of its length it is nearly the elastica: closed form."""
+    section = Section(2e9, 10e-3, 1e-3, axial=False)
+    ends = (CLAMPED, guided(0.0)) if clamped else (PINNED, guided(0.0, rotates=True))
+    net = Network({"a": Node(0, 0, ends[0]), "b": Node(LENGTH, 0, ends[1])}, {"x": Beam("a", "b", section)})
+    modulus = np.sin(np.array([20.0, 50.0, 80.0]) * np.pi / 360) ** 2  # of the integrals, by the steepest slope
+    shortened = 2 * (1 - ellipe(modulus) / ellipk(modulus)) * LENGTH
+    rigid = trace(net, Displacement("b", np.pi, shortened))
+    assert rigid.status is PathStatus.NO_START
+    critical = (4 if clamped else 1) * np.pi**2 * 2e9 * 10e-3 * 1e-3**3 / 12 / LENGTH**2
+    path = trace(net, Displacement("b", np.pi, shortened), Control(1e-7, imperfection=1e-5 * LENGTH))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.imperfection == f"1e-06 m of the buckling mode under {critical:.4g} N"
+    assert path.stable.all()
+    expected = critical * (2 * ellipk(modulus) / np.pi) ** 2
+    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=1e-4)
+
+
+def test_a_beam_that_is_pulled_and_does_not_stretch_has_no_mode() -> None:
+    """It is looked at under a pull up to 1e5 EI/L^2, and nothing buckles."""
+    section = Section(2e9, 10e-3, 1e-3, axial=False)
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0, guided(0.0)), "c": Node(LENGTH / 2, LENGTH / 2)}
+    net = Network(nodes, {"x": Beam("a", "b", section), "y": Beam("a", "c", section)})
+    path = trace(net, Displacement("b", 0.0, np.array([1e-3])), Control(imperfection=1e-5))
+    assert path.status is PathStatus.NO_START
+    assert path.imperfection == "none: the perfect path has no bifurcation"
 
 
 @pytest.mark.parametrize("slenderness", [1000, 5000])

@@ -1,6 +1,7 @@
 """A stated imperfection: a network bent slightly in its first buckling mode, so that no bifurcation is left.
 
-The mode is the null vector at the first bifurcation of the perfect path. The rotations that it gives the sections
+The mode is the null vector at the first bifurcation of the perfect path, or, where a motion cannot begin since straight
+beams do not stretch, of the path under a force or moment in its place. The rotations that it gives the sections
 are added to the angles of the unloaded shapes, and the nodes, with the rigid arms on them, are moved as it moves them;
 the shapes are then fitted between them as always. Springs are as long before any load as they were said to be. The size
 is the largest displacement of the unloaded centre lines, to first order.
@@ -31,10 +32,13 @@ _PLACES = 32  # from so many places of a beam
 _PANELS = 512  # of a smooth piece: the trapezoidal rule then knows the displacement of a whole wave to 1.3e-5
 
 
-def imperfect(network: Network, first: tuple[PathProblem, Singular] | None, size: float) -> tuple[Network, str]:
+def imperfect(
+    network: Network, first: tuple[PathProblem, Singular] | None, size: float, unit: str = ""
+) -> tuple[Network, str]:
     """Return the network with a mode of this size [m] in its shapes, and the sentence that names it.
 
     `first` is the first bifurcation of the primary path of the perfect network, and the problem that it is one of.
+    `unit` is that of the load at which it is, where the drive is a motion that cannot begin before the network buckles.
     """
     if first is None:
         return network, "none: the perfect path has no bifurcation"
@@ -55,7 +59,9 @@ def imperfect(network: Network, first: tuple[PathProblem, Singular] | None, size
         shape = Bent(beam.shape, tuple(turn.coef.tolist()))
         beams[name] = replace(beam, shape=shape, start_offset=arms[0], end_offset=arms[1])
     place = singular.spot.drive * problem.unit
-    where = f"under {100 * place:.4g} % of the {problem.ramp}" if problem.ramp else f"at {place:.6g}"
+    where = f"under {place:.4g} {unit}" if unit else f"at {place:.6g}"
+    if problem.ramp:
+        where = f"under {100 * place:.4g} % of the {problem.ramp}"
     bent = Network(nodes, beams, network.links, network.springs, network.loads)
     return bent, f"{size:.6g} m of the buckling mode {where}"
 

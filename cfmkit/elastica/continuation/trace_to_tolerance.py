@@ -17,7 +17,8 @@ from cfmkit.elastica.continuation.decision_loop import follow
 from cfmkit.elastica.continuation.path_and_moves import MOST_SEGMENTS, PathProblem
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.kernels.status_codes import STALLED
-from cfmkit.elastica.model.drive import Control, Drive
+from cfmkit.elastica.model.drive import Control, Displacement, Drive, Loading
+from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.outcome.path import Path, PathStatus
 
@@ -30,6 +31,12 @@ if TYPE_CHECKING:
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
 _MOST_PULLED = 2048  # segments of a beam that is only pulled: L/t = 10 000 at 3 % takes 1600; films would take minutes
+_LOADS = (1e1, 1e2, 1e3, 1e4, 1e5)
+"""Loads [EI/L^2 of the mean beam] up to which a network that a displacement cannot move is looked at for buckling.
+
+Columns of the mean length buckle between 2.5 and 39, those of a fiftieth of it at 1e5; each tenfold load is tried by
+itself, for a path meets its first bifurcations one by one only in steps that are not far beyond them."""
+
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
@@ -63,10 +70,31 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 
     perfect = replace(control, imperfection=0.0)
     primary = _solved(network, drive, replace(perfect, branch="primary"), True)
-    bent, name = imperfect(network, primary.first, control.imperfection)
+    first, unit = primary.first, ""
+    if primary.trail.ending.status is PathStatus.NO_START:  # a straight beam that does not stretch is rigid, say
+        first, unit = _under_load(network, drive, perfect), "N" if isinstance(drive, Displacement) else "N m"
+    bent, name = imperfect(network, first, control.imperfection, unit)
     path = _solved(bent, drive, perfect).path()
     branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
     return replace(path, imperfection=name, branch=read_only(branch, np.str_))
+
+
+def _under_load(network: Network, drive: Drive, control: Control) -> tuple[PathProblem, Singular] | None:
+    """Return the first bifurcation under the force or moment of a drive by a motion."""
+    if isinstance(drive, Loading):
+        return None
+    scales = Layout(network, drive).scales
+    if isinstance(drive, Displacement):
+        load, unit = PointLoad(drive.node, float(np.cos(drive.direction)), float(np.sin(drive.direction))), scales.force
+    else:
+        load, unit = PointLoad(drive.node, moment=1.0), scales.moment
+    sense = float(np.sign(drive.points[np.flatnonzero(drive.points)[0]]))
+    for largest in _LOADS:
+        loading = Loading((load,), np.array([sense * largest * unit]))
+        first = _solved(network, loading, replace(control, branch="primary"), True).first
+        if first is not None:
+            return first
+    return None
 
 
 class Attempt(NamedTuple):

@@ -157,7 +157,9 @@ class Path(ShortRepr):
         return read_only(self.layout.motion(node, self.value))
 
     def reaction(self, node: str) -> FloatArray:
-        """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m].
+        """Return force and moment that hold a node, (n, 3) [N, N, N m]: of its support and of a drive by a motion.
+
+        Loads are not among them, those of a drive neither.
 
         Raises
         ------

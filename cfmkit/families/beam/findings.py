@@ -15,13 +15,13 @@ import numpy as np
 from cfmkit.elastica import PathStatus, hindered_curling
 from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
 from cfmkit.families.beam.scalar_results import window_of, within
+from cfmkit.families.beam.taut_beams import taut_beams
 from cfmkit.families.findings import finder, too_soft
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.outcome.path import Path
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import BeamSpec
@@ -100,9 +100,7 @@ def in_units(assembly: Assembly, text: str) -> str:
 
 STRETCH = "analysis.fidelity=extensible"
 
-_STRAIGHT = 0.995  # of the length of a taut beam lies between its ends
 _PARALLEL = 1e-9  # of its length a beam may leave the line of the drive: angles are read in degrees and rounded
-_TIGHT = 50.0  # N L^2 / EI: it is pulled so hard that only its ends are bent
 
 
 @dataclass(frozen=True)
@@ -121,10 +119,10 @@ def ending_of(solution: Solution) -> PathEnding:
     taut: list[str] = []
     kept = len(solution.keep) > 1
     if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) and len(path):
-        taut = list(_taut(path, int(solution.keep[-1]))) if kept else []
+        taut = taut_beams(path, int(solution.keep[-1])) if kept else []
         # points of the curve may be so far apart that they are pulled straight after the last of them, or the first
         if not taut:
-            taut, kept = list(_taut(path, len(path) - 1)), False
+            taut, kept = taut_beams(path, len(path) - 1), False
     if not taut and len(solution.keep) < 2:
         return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
     if not taut:
@@ -140,20 +138,6 @@ def ending_of(solution: Solution) -> PathEnding:
     )
 
 
-def _taut(path: Path, last: int) -> Iterator[str]:
-    """Yield the beams that are pulled straight at a point, each with its length and the way between its ends."""
-    for name, beam in path.layout.network.beams.items():
-        line = path.shape(name, last)
-        chord = line[-1] - line[0]
-        way, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
-        if way < _STRAIGHT * length:
-            continue
-        pull = float(path.end_force(name, 1)[last, :2] @ chord) / way
-        stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
-        if pull * length**2 > _TIGHT * stiffness:
-            yield f"{name}: {format_short(way, 'length')} of {format_short(length, 'length')}"
-
-
 def _in_the_way(solution: Solution) -> str:
     """Return the keys that may keep a mechanism from having a first pose."""
     spec = solution.spec
@@ -167,7 +151,8 @@ def _in_the_way(solution: Solution) -> str:
     along = list(_along_the_drive(spec))
     if along:
         held = f"{', '.join(along)}, straight along the drive, cannot change its length and holds until it buckles"
-        return f"{said}; {held}: computed with mechanism.axial"
+        bent = "or bent by analysis.imperfection, by 1e-5 of its length at least"
+        return f"{said}; {held}: computed with mechanism.axial, {bent}"
     return f"{said}; beams do not stretch: mechanism.axial allows it"
 
 

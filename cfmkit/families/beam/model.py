@@ -28,6 +28,7 @@ from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, 
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
+from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
@@ -128,7 +129,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     drive, travel = spec.mechanism.drive, spec.analysis.travel
     if drive.kind != "displacement" or travel is None:
         return
-    straight = {name: _distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
+    straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
     if abs(spec.extent) <= _TORN * _way_to_support(network, drive.node, straight):
         return
     lengths = {name: fit.length for name, fit in Layout(network, assembly.drive()).fits.items()}
@@ -141,24 +142,11 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
         )
 
 
-def _distance(network: Network, one: str, other: str) -> float:
-    first, second = network.nodes[one], network.nodes[other]
-    return math.hypot(second.x - first.x, second.y - first.y)
-
-
 def _way_to_support(network: Network, node: str, lengths: Mapping[str, float]) -> float:
     """Return the length of beams and links from a node to the nearest one that is held in place [m]; else infinity."""
-    ways = [(beam.start, beam.end, lengths[name]) for name, beam in network.beams.items()]
-    ways += [(link.master, link.node, _distance(network, link.master, link.node)) for link in network.links]
-    reached = {node: 0.0}
-    for _ in network.nodes:
-        for one, other, length in (*ways, *((b, a, length) for a, b, length in ways)):
-            if one in reached and reached[one] + length < reached.get(other, math.inf):
-                reached[other] = reached[one] + length
-    held = {name: at.support for name, at in network.nodes.items() if at.support.along and at.support.across}
-    return min(
-        (way + math.hypot(*held[at].displacement[:2]) for at, way in reached.items() if at in held), default=math.inf
-    )
+    moved = {name: math.hypot(*at.support.displacement[:2]) for name, at in network.nodes.items()}
+    ways = ways_to_supports(network, node, lengths)
+    return min((way + moved[name] for name, way in ways.items()), default=math.inf)
 
 
 def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:

@@ -24,7 +24,8 @@ def output_columns(
     motion : callable
         From a node to its x, y [m] and rotation [rad] at the points of the curve, (n, 3).
     reaction : callable
-        From a node to the force x, y [N] and the moment [N m] that support and drive exert on it, of one copy, (n, 3).
+        From a node to the force x, y [N] and the moment [N m] that hold it, of support and of a drive by a motion, for
+        one copy, (n, 3).
     """
     columns: dict[str, Column] = {}
     for name in outputs.nodes:

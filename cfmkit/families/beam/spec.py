@@ -173,7 +173,9 @@ class Outputs(Model):
 
     nodes: tuple[str, ...] = Field((), max_length=100, description="nodes whose motion is reported: [tip]")
     reactions: tuple[str, ...] = Field(
-        (), max_length=100, description="nodes whose reactions (of support and drive) are reported: [root]"
+        (),
+        max_length=100,
+        description="nodes whose reactions are reported, those of support and of a drive by a motion: [root]",
     )
     cross_stiffness: bool = Field(False, description="column with the stiffness of the driven node across the drive")
 
