@@ -116,6 +116,8 @@ def test_becks_column_is_said_to_flutter_at_its_load():
     assert "flutter_not_judged" not in warned(result)
     assert "2.55 N" in warned(result)["flutter"]
     assert (result.curve.stable == (result.curve.force < 2.5064)).all()
+    bad = int((~result.curve.stable).sum())
+    assert warned(result)["unstable"].startswith(f"{bad} of {len(result.curve.stable)} points are not stable")
 
 
 def test_without_a_density_flutter_is_not_judged():

@@ -269,7 +269,7 @@ def _after(solution: Solution) -> str:
 
 
 def _stability(solution: Solution) -> Iterator[Finding]:
-    bad = ~solution.path.stable[solution.keep]
+    bad = ~solution.stable_equilibrium
     if bad.any():
         x = solution.motion[bad]
         dimension = "angle" if _effort(solution) == "torque" else "length"

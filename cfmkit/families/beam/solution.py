@@ -135,13 +135,18 @@ class Solution(ShortRepr):
 
     @cached_property
     def stable(self) -> Any:
-        """Whether each point is a stable equilibrium that reaches the tolerance.
+        """Whether each point is a stable equilibrium that reaches the tolerance."""
+        return read_only(self.stable_equilibrium & self.accurate, np.bool_)
+
+    @cached_property
+    def stable_equilibrium(self) -> Any:
+        """Whether the equilibrium at each point is stable, accurate or not.
 
         Under loads that turn with their node all motions decide where masses are known, else the path's count.
         """
         found = self.frequencies if self.follows else None
         stable = self.path.stable[self.keep] if found is None else ~(found.flutters | found.diverges)
-        return read_only(stable & self.accurate, np.bool_)
+        return read_only(stable, np.bool_)
 
     @cached_property
     def follows(self) -> bool:
