@@ -9,7 +9,7 @@ from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
 
 TOO_SOFT = 0.01
@@ -43,6 +43,30 @@ def finder(meanings: Mapping[str, str]) -> Finder:
         return Finding(name, message, cures)
 
     return finding
+
+
+def sharp_inside(fillet: float, notes: Sequence[str]) -> str:
+    """Return what is wrong with the inside corners of a part that is solved as a solid; empty if all are round.
+
+    Parameters
+    ----------
+    fillet : float
+        Requested radius [m].
+    notes : sequence of str
+        One for each corner that no such fillet fits, with its place.
+
+    Examples
+    --------
+    >>> sharp_inside(1e-3, ["no fillet of 1 mm fits the inside corner at (0, 2) mm"] * 3)
+    'no fillet of 1 mm fits the inside corner at (0, 2) mm; 2 others are sharp, too: the stress there has no value'
+    """
+    if fillet == 0.0:
+        return "without fillets the stress in inside corners has no value"
+    if not notes:
+        return ""
+    more = len(notes) - 1
+    others = f"; {more} other{'s are' if more > 1 else ' is'} sharp, too" if more else ""
+    return f"{notes[0]}{others}: the stress there has no value"
 
 
 def mm(value: float) -> str:

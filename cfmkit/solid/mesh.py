@@ -11,6 +11,7 @@ Reference
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -132,8 +133,10 @@ def mesh(
         missing = _missing(corners, laid)
         if not any(len(one) for one in missing):
             return _six_nodes(points, corners, rings, laid)
+        first = next(ring.at(arc[at[:1]])[0] for ring, arc, at in zip(rings, laid, missing, strict=True) if len(at))
         laid = [_halved(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
-    raise GeometryError("the outline cannot be meshed: it touches itself, or is thinner than an element")
+    reason = "it touches itself, or is thinner than an element"
+    raise GeometryError(f"the outline cannot be meshed at {place_text(first)}: {reason}")
 
 
 def _region(rings: tuple[Ring, ...]) -> Any:
@@ -252,19 +255,31 @@ CELL = 16
 
 
 def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: float) -> FloatArray:
-    """Return a lattice of some size (k, 2) [m], wherever sizes below twice that may be wanted."""
+    """Return a lattice of some size (k, 2) [m], wherever sizes below twice that may be wanted.
+
+    Its cells are found by halving larger ones, so that one small fillet does not need small cells everywhere.
+    """
     x0, y0, x1, y1 = bounds
     side = CELL * size
-    if (x1 - x0) * (y1 - y0) / side**2 > MOST_NODES:
-        raise _too_many(int(CELL**2 * (x1 - x0) * (y1 - y0) / side**2))
-    corner = np.stack(np.meshgrid(np.arange(x0, x1, side), np.arange(y0, y1, side)), -1).reshape(-1, 2)
-    near = field(corner + 0.5 * side) - GRADING * side  # sizes change by that within half a diagonal
-    corner = corner[near < 2 * size]
-    if CELL**2 * len(corner) > 20 * MOST_NODES:  # of them a few lie in the part
-        raise _too_many(CELL**2 * len(corner))
-    rows = round(CELL / np.sqrt(0.75))
-    column, row = np.meshgrid(np.arange(CELL), np.arange(rows))
-    inner = np.column_stack([(column + 0.5 * (row % 2)).ravel() * size, row.ravel() * side / rows])
+    columns, rows = np.arange(x0, x1, side), np.arange(y0, y1, side)
+    times = 2 ** max(0, math.ceil(math.log2(max(len(columns), len(rows)))))
+    cells = np.zeros((1, 2), np.int64)
+    while True:
+        middles = np.array([x0, y0]) + side * (cells + 0.5 * times)
+        near = field(middles) - GRADING * times * side  # sizes change by that within half a diagonal
+        cells = cells[near < 2 * size]
+        if CELL**2 * len(cells) > 20 * MOST_NODES:  # of them a few lie in the part
+            raise _too_many(CELL**2 * len(cells))
+        if times == 1:
+            break
+        times //= 2
+        cells = (cells[:, None] + times * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])).reshape(-1, 2)
+        cells = cells[(cells[:, 0] < len(columns)) & (cells[:, 1] < len(rows))]
+    cells = cells[np.lexsort(cells.T)]  # row by row: what is thrown does not depend on how cells were found
+    corner = np.column_stack([columns[cells[:, 0]], rows[cells[:, 1]]])
+    lines = round(CELL / np.sqrt(0.75))
+    column, row = np.meshgrid(np.arange(CELL), np.arange(lines))
+    inner = np.column_stack([(column + 0.5 * (row % 2)).ravel() * size, row.ravel() * side / lines])
     return np.asarray((corner[:, None] + inner).reshape(-1, 2))
 
 

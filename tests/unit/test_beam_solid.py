@@ -116,11 +116,18 @@ def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said, changes):
     assert len(caught.value.problems) == 1
 
 
-def test_a_part_without_fillets_is_solved_and_warns_that_stress_has_no_value(tmp_path):
+@pytest.mark.parametrize(
+    ("fillet", "said"),
+    [
+        ("0 mm", "without fillets the stress in inside corners has no value"),
+        ("1e-6 mm", "in the outline, fillets of 1e-06 mm are sharp corners: the stress there has no value"),
+    ],
+)
+def test_a_part_without_fillets_is_solved_and_warns_that_stress_has_no_value(tmp_path, fillet, said):
     path = tmp_path / "vee.yaml"
-    path.write_text(VEE.replace("0.05 mm", "0 mm"), encoding="utf-8")
+    path.write_text(VEE.replace("0.05 mm", fillet), encoding="utf-8")
     result = cfmkit.analyze(cfmkit.load(path).replace({"analysis.travel": "1 mm", "analysis.solid.mesh": "0.5 mm"}))
-    assert "sharp_corners" in {found.name for found in result.warnings}
+    assert [found.message for found in result.warnings if found.name == "sharp_corners"] == [said]
 
 
 def test_a_part_is_pulled_as_well_as_pressed(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
+from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.plane_fem_analysis import part_of
 from cfmkit.plots.style import is_to_scale
 from cfmkit.results import Status
@@ -90,6 +91,13 @@ def test_the_stress_map_is_to_scale_so_that_a_narrow_figure_does_not_squeeze_the
 def test_a_mirrored_pair_has_twice_the_force(strip):
     pair = api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm", "mechanism.copies=mirrored"))
     assert pair.curve.effort == pytest.approx(2.0 * strip["solid"].curve.effort, rel=1e-9)
+
+
+def test_corners_that_no_fillet_fits_are_known_of_the_leg_that_is_solved():
+    assert solved_piece(spec("strip", "mechanism.part.fillet=1 mm")).sharp == ()
+    sharp = solved_piece(spec("strip", "mechanism.part.fillet=10 mm")).sharp
+    assert len(sharp) == 4
+    assert sharp[0].startswith("no fillet of 10 mm fits the inside corner at (-4.878")
 
 
 def test_flexures_are_solved_with_their_own_widths():

@@ -9,7 +9,8 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
+from cfmkit.families.findings import sharp_inside
+from cfmkit.families.vcfm.outline import sharp_corners, solved_leaf, solved_spring
 from cfmkit.results import Status
 
 QUICK = ("analysis.solid.poses=15", "analysis.solid.mesh=0.7 mm", "analysis.points=121", "analysis.fidelity=solid")
@@ -135,6 +136,13 @@ def test_sharp_corners_are_told_and_a_mesh_that_is_too_large_for_the_machine_is_
     found = api.analyze(spec("straight", *QUICK, "analysis.solid.mesh=0.001 mm"))
     assert found.status is Status.NO_EQUILIBRIUM
     assert found.message.startswith("the part cannot be meshed: the mesh would have more than 400000 nodes")
+
+
+def test_corners_that_no_fillet_fits_are_told_where_the_stress_is_read():
+    assert sharp_corners(spec("straight", "mechanism.part.fillet=1 mm")) == ()
+    said = sharp_inside(3e-3, sharp_corners(spec("straight", "mechanism.part.fillet=3 mm")))
+    assert said.startswith("no fillet of 3 mm fits the inside corner at (28, ")
+    assert said.endswith("; 5 others are sharp, too: the stress there has no value")
 
 
 def test_ends_of_windows_are_poses_of_leaf_and_spring():

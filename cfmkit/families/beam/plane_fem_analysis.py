@@ -26,7 +26,7 @@ from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket
+from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
 
@@ -256,7 +256,8 @@ def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidS
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
+    from cfmkit.solid.arcs_of_fillets import with_arcs
+    from cfmkit.solid.meshed_part import TURN, HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
@@ -265,7 +266,9 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
-    rings, thinnest = rings_of(cut), _thinnest(assembly)
+    fillet = (spec.mechanism.part or PartSpec()).fillet
+    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut))
+    thinnest = _thinnest(assembly)
     return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
 
 
@@ -429,6 +432,17 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
+def _sharp(fillet: float) -> str:
+    """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
+    from cfmkit.export.union import ROUGH
+    from cfmkit.solid.arcs_of_fillets import smallest_arc
+
+    if 0.0 < fillet < smallest_arc(ROUGH):
+        radius = format_short(fillet, "length")
+        return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
+    return sharp_inside(fillet, ())
+
+
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
     if reported := _ended(solution):
@@ -436,10 +450,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
-    if (spec.mechanism.part or PartSpec()).fillet == 0:
-        yield finding(
-            "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
-        )
+    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet):
+        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
         yield finding(name, reported)

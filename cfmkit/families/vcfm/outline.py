@@ -68,11 +68,23 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
     part = spec.mechanism.part or CutPart()
     rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
-    notes = sharp_notes([place for _, sharp in rounded for place in sharp], part.fillet)
+    notes = _sharp(rounded, part.fillet)
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
     contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring, sizes))
     notes = (*_notes(spec), *frame_notes(spec, sizes), *notes)
     return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts)
+
+
+def sharp_corners(spec: VcfmSpec) -> tuple[str, ...]:
+    """Return one line per inside corner of leaves and spring that no fillet fits, with its place."""
+    leaves, low = leaves_contours(spec)
+    spring = [] if spec.mechanism.springs is not None else spring_contours(spec, low - GAP)
+    part = spec.mechanism.part or CutPart()
+    return _sharp([filleted(contour, part.fillet) for contour in (*leaves, *spring)], part.fillet)
+
+
+def _sharp(rounded: Sequence[tuple[Contour, tuple[complex, ...]]], fillet: float) -> tuple[str, ...]:
+    return sharp_notes([place for _, sharp in rounded for place in sharp], fillet)
 
 
 def _marks(spec: VcfmSpec, spring: Sequence[Contour], sizes: FrameSizes) -> Iterator[Contour]:

@@ -18,13 +18,13 @@ import numpy as np
 from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket
+from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.largest_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
-from cfmkit.families.vcfm.outline import drawing, solved_leaf, solved_spring
+from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 from cfmkit.stock.material_and_part_spec import CutPart
@@ -249,8 +249,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
-    if (spec.mechanism.part or CutPart()).fillet == 0:
-        reported = "without fillets the stress in inside corners has no value"
+    if reported := sharp_inside((spec.mechanism.part or CutPart()).fillet, sharp_corners(spec)):
         yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     for name, reported in sampler.mesh_error.too_large():
         yield finding(name, reported)

@@ -106,6 +106,8 @@ class SolvedPiece:
         Of flexures or strip [m].
     frame : tuple of (n, 2) arrays
         What stands around it and does not bend [m].
+    sharp : tuple of str
+        One line per inside corner that no fillet fits, with its place.
     """
 
     contour: Contour
@@ -114,6 +116,7 @@ class SolvedPiece:
     sheet: Sheet
     thinnest: float
     frame: tuple[FloatArray, ...] = ()
+    sharp: tuple[str, ...] = ()
 
 
 def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
@@ -131,7 +134,7 @@ def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
         drawn = _cut(spec, replace(_strip(strip, 0.0, _ends(spec)), sheet=Sheet(beam.width)))
     outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
     thinnest = float(drawn.tables[0].columns["thickness"][0].min())
-    return SolvedPiece(outline, tuple(others), _pads(spec, drawn), drawn.sheet, thinnest, frame)
+    return SolvedPiece(outline, tuple(others), _pads(spec, drawn), drawn.sheet, thinnest, frame, drawn.notes)
 
 
 def _without_frame(

@@ -18,7 +18,7 @@ from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.families.fem_results import fillet_table, largest_concentration
-from cfmkit.families.findings import bracket
+from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
@@ -266,12 +266,11 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     if course.ending is not PathEnd.COMPLETE:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
-    if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
-        reported = "without fillets the stress in inside corners has no value"
+    piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
+    if reported := sharp_inside((solution.spec.mechanism.part or PaddedPart()).fillet, piece.sharp):
         yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
-    piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
     if reported := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
         yield finding("wide_beam", reported)
     limit = made_of.allowable_stress
