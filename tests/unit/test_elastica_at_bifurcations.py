@@ -244,3 +244,15 @@ def test_a_drive_that_stands_still_is_refused() -> None:
 def test_as_many_points_as_asked_for_are_always_allowed() -> None:
     path = pressed(np.linspace(0.05, 2.1, 2500) * RISE, 1e-5)
     assert path.status is PathStatus.COMPLETE, path.message
+
+
+@pytest.mark.parametrize("count", [9, 61])
+def test_bifurcations_between_two_points_of_the_primary_path_are_told_one_by_one(count: int) -> None:
+    """Of a V of two leaves three modes become unstable and stable again; with 9 points two of them in one step."""
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 3e-3), "c": Node(80e-3, 0, CLAMPED)}
+    leaf = Section(2e9, 6e-3, 0.5e-3)
+    net = Network(nodes, {"x": Beam("a", "b", leaf), "y": Beam("b", "c", leaf)})
+    path = trace(net, Displacement("b", -np.pi / 2, np.linspace(0, 9.3e-3, count)[1:]), Control(branch="primary"))
+    assert [event.after - event.before for event in path.events] == [1, 1, 1, -1, -1, -1]
+    expected = [0.144709, 0.296103, 0.540543, 1.769872, 3.704185, 4.519626]  # mm: with 61 points
+    np.testing.assert_allclose([1e3 * event.drive for event in path.events], expected, rtol=2e-6)

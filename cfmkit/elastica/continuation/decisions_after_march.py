@@ -24,7 +24,7 @@ from cfmkit.elastica.continuation.branch_rejoins_path import end_at, predicted_e
 from cfmkit.elastica.continuation.path_and_moves import MOST_SEGMENTS, PRIMARY, Leg, Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.points_at_bifurcation import NEAR_BIFURCATION
 from cfmkit.elastica.continuation.switch_to_uncondensed_solver import uncondensed
-from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
+from cfmkit.elastica.continuation.switching import before_last_of_several, first_of_several, switched, well_before
 from cfmkit.elastica.equilibrium.network_solver import FORCE_WEIGHT
 from cfmkit.elastica.kernels.status_codes import DENIED, DONE, INERTIA, NO_START, STALLED
 from cfmkit.elastica.outcome.path import Event, PathStatus
@@ -139,6 +139,10 @@ def crossed(problem: PathProblem, trail: Trail) -> Move:
     if natural and found.after - found.before > 1:
         trail, found = first_of_several(problem, trail, found, one)
         other = trail.spot(-1)
+    if natural and found.before - found.after > 1:
+        earlier = before_last_of_several(problem, trail, found, one)
+        if earlier is not None:
+            return crossed(problem, earlier)
     kind = "limit point" if found.fold else "bifurcation"
     unreported = trail
     trail = trail.with_event(Event(kind, found.spot.drive * problem.unit, found.before, found.after))

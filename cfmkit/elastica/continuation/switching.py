@@ -29,6 +29,7 @@ _STILL = 1e-6  # step to an equilibrium from where Newton's method gets there [r
 
 _TOGETHER = (1e-3, 1e-4, 1e-2)  # shares of the drive's range within which bifurcations are near each other
 _APART = 1e-4  # and from which they are met one by one
+_BACK = (0.5, 0.1, 0.02)  # shares of the way back to the point before: either is located best from far away
 
 
 def descend(solver: ExpandedSolver, saddle: Spot, sign: int) -> Spot | None:
@@ -60,6 +61,23 @@ def first_of_several(problem: PathProblem, trail: Trail, found: Singular, one: S
     if near is None:
         return trail, found
     return trail.up_to(-1).with_spot(near, -1), found._replace(after=between.unstable)
+
+
+def before_last_of_several(problem: PathProblem, trail: Trail, found: Singular, one: Spot) -> Trail | None:
+    """Return the path up to just before the last of several bifurcations behind which fewer directions are unstable.
+
+    None if the others are not well before it: they are met together.
+    """
+    way, change, least = one.drive - found.spot.drive, one.y - found.spot.y, _APART * problem.span
+    for share in (*_BACK, least / abs(way) if abs(way) > 2.0 * least else 0.0):
+        if abs(share * way) < least:
+            break
+        between = problem.fine.solve(found.spot.y + share * change, found.spot.drive + share * way)
+        if between is not None and found.after < between.unstable < found.before:
+            near = trail.settled(problem.fine.reduce(between))
+            same = near is not None and near.unstable == between.unstable
+            return trail.up_to(-1).with_spot(near, -1) if near is not None and same else None
+    return None
 
 
 def switched(
