@@ -256,3 +256,15 @@ def test_bifurcations_between_two_points_of_the_primary_path_are_told_one_by_one
     assert [event.after - event.before for event in path.events] == [1, 1, 1, -1, -1, -1]
     expected = [0.144709, 0.296103, 0.540543, 1.769872, 3.704185, 4.519626]  # mm: with 61 points
     np.testing.assert_allclose([1e3 * event.drive for event in path.events], expected, rtol=2e-6)
+
+
+def test_coarse_points_do_not_lead_from_the_primary_path_onto_a_branch() -> None:
+    """A step over two bifurcations of this V had come to the branch of the third mode, with one of them reported."""
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 4.6943915e-3), "c": Node(80e-3, 0, CLAMPED)}
+    leaf = Section(2e9, 6e-3, 0.50606212e-3)
+    net = Network(nodes, {"x": Beam("a", "b", leaf), "y": Beam("b", "c", leaf)})
+    path = trace(net, Displacement("b", -np.pi / 2, np.linspace(0, 9.6913175e-3, 16)[1:]), Control(branch="primary"))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert np.abs(path.motion("b")[:, 2]).max() < 1e-6
+    assert path.unstable.max() == 3
+    assert len(path.events) == 6

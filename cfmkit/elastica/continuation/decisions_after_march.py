@@ -44,6 +44,7 @@ _ASIDE = 1e-3  # share of the ways to the points on both sides of a bifurcation 
 _STRAIGHT, _ROUNDING = 10.0, 1e-7  # largest change of a pose between, in that share of the whole one; what is rounding
 _FINEST = 1e-8  # share of the range below which a change of stability is not looked into with shorter steps
 _WELL = 3e-3  # share of the drive's range that is well before a corner
+_FURTHER, _SAME_POSE = 4, 1e-3  # solutions on the way on, and change of a pose there: branches are 1e-2 away and more
 _BACK = 30  # points looked at before the place where a march stalled
 _NEAR = 1e-4  # share of the drive's range from which the next requested point is solved for on the fine mesh
 _SHORTER = 0.25  # of a step that passed what was not resolved, for the next
@@ -179,7 +180,21 @@ def _on_one_path(problem: PathProblem, found: Singular, one: Spot, beyond: Spot)
         return False
     if beyond.unstable > one.unstable and far.unstable <= near.unstable:  # interpolated between two paths
         return False
-    return fine.pose_change(near.y, far.y) <= _STRAIGHT * _ASIDE * whole + _ROUNDING
+    if not fine.pose_change(near.y, far.y) <= _STRAIGHT * _ASIDE * whole + _ROUNDING:
+        return False
+    return problem.control.branch != "primary" or _leads_to(problem, near, far, beyond)
+
+
+def _leads_to(problem: PathProblem, near: Spot, far: Spot, beyond: Spot) -> bool:
+    """Tell whether a path that goes on from two equilibria beside a bifurcation comes to a point beyond it."""
+    before, here = near, far
+    for place in np.linspace(far.drive, beyond.drive, _FURTHER + 1)[1:].tolist():
+        rate = (place - here.drive) / (here.drive - before.drive)
+        there = problem.fine.solve(here.y + rate * (here.y - before.y), place)
+        if there is None:
+            return True  # not known
+        before, here = here, there
+    return problem.fine.pose_change(here.y, beyond.y) <= _SAME_POSE
 
 
 def _last_step_before(trail: Trail) -> int:
