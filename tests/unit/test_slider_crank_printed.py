@@ -26,6 +26,7 @@ from flexure_support import (
 import cfmkit
 from cfmkit import api
 from cfmkit.elastica.verification.corotational import recheck
+from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
@@ -703,3 +704,12 @@ def test_friction_that_a_part_of_one_piece_leaves_out_is_said(name: str) -> None
     spec = cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml").replace({"mechanism.guide": {"friction": 0.1}})
     found = {warning.name: warning.message for warning in cfmkit.analyze(spec).warnings}
     assert "'mechanism.guide' counts in the model with springs only" in found["friction_left_out"]
+
+
+@pytest.mark.parametrize("strength", [50.0, 500.0])
+def test_rubber_that_bears_any_curvature_has_no_thickness_from_the_stress(strength: float) -> None:
+    rubber = {"youngs_modulus": 26e6, "poisson_ratio": 0.45, "yield_strength": strength * 1e6}
+    strip = spec("strip").replace({"mechanism.material": rubber})
+    design = family("slider-crank").design(strip, Run())
+    assert design.status is Status.INFEASIBLE
+    assert "far thicker than 'design.beam.thickness', 0.5 mm to 2 mm" in design.message

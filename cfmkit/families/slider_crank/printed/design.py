@@ -68,6 +68,10 @@ DEFAULT_THICKNESS = (0.5e-3, 2e-3)
 DEFAULT_WIDTH = (5e-3, 8e-3)
 """Ranges where none is given [m]: what printing makes, and the width of [B, Table 3]."""
 
+THICKER_BY = 3.0
+"""Times the thickest strip beyond which no thickness from the stress is stated: rubber may bear any curvature of the
+motion, and what grows without end by corrections is no dimension."""
+
 
 def design(spec: SliderCrankSpec, run: Run) -> Design:
     """Return a specification with the strip, or the flexures, that the `design` block asks for.
@@ -311,6 +315,13 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges:
         )
     thickness, width = found
     low, high = ranges.form[0] / 1e3
+    if thickness > THICKER_BY * high:
+        text = f"the stress allows strips far thicker than 'design.beam.thickness', {mm(low)} to {mm(high)}; "
+        return no_design(
+            finding(
+                "target_unreachable", text + "state one 'design.beam.width': the thickness then follows from the force"
+            )
+        )
     if not low <= thickness <= high:
         text = f"the stress requires a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
         text += f"{mm(low)} to {mm(high)}"
