@@ -106,6 +106,11 @@ def test_options_replace_keys_of_a_file(tmp_path):
 
 def test_a_material_named_again_is_one_more_and_replaces_none():
     assert keys(SuggestOptions(material=["pom", "pla,abs"])) == {"material": "[pom,pla,abs]"}
+    assert keys(SuggestOptions(force="19N, 21 N")) == {"force": "[19N, 21 N]"}
+    assert keys(SuggestOptions(torque="[1 N*m, 2 N*m]", force="1,5 N")) == {
+        "torque": "[1 N*m, 2 N*m]",
+        "force": "1,5 N",
+    }
     assert keys(SuggestOptions(material=["[pom]"], prefer=[])) == {"material": "[pom]"}
     assert keys(SuggestOptions(material=["[pom, pla]", "abs"])) == {"material": "[pom, pla,abs]"}
 

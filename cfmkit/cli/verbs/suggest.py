@@ -59,7 +59,7 @@ class SuggestOptions(Common):
         str | None,
         argument("WISH", "YAML file with a block 'wish'; - reads standard input.", completion_candidates.specs),
     ] = None
-    force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '[19 N, 21 N]'.")] = None
+    force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '19 N, 21 N'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
     travel: Annotated[str | None, _key("travel", "LENGTH", "Travel over which the force is to be constant.")] = None
     angle: Annotated[str | None, _key("angle", "ANGLE", "Angle over which the torque is to be constant.")] = None
@@ -112,6 +112,9 @@ KEYS = (
 """Options that are keys of a wish."""
 
 LISTS = ("material", "adjustable", "prefer")
+
+BANDS = ("force", "torque")
+"""Keys that are a list where two values are given."""
 
 
 def run(options: SuggestOptions, terminal: Terminal) -> Answer:
@@ -182,10 +185,16 @@ def keys(options: SuggestOptions) -> dict[str, str]:
             value = value[0] if len(value) == 1 else ",".join(part.strip().strip("[]") for part in value)
         if one.name == "room":
             value = room(value)
-        elif one.name in LISTS and not value.strip().startswith("["):
+        elif (one.name in LISTS or (one.name in BANDS and _are_two(value))) and not value.strip().startswith("["):
             value = f"[{value}]"
         found["yield" if one.name == "made_well" else one.name] = value
     return found
+
+
+def _are_two(text: str) -> bool:
+    """Tell whether a text has two values with units, so that its comma is no decimal one."""
+    parts = text.split(",")
+    return len(parts) == 2 and all(re.search(r"[a-zA-Z]", part) for part in parts)
 
 
 def room(text: str) -> str:
