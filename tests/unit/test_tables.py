@@ -231,7 +231,7 @@ def test_other_readers_see_the_same_rows(given_table):
 
 
 def test_pandas_reads_numbers_as_numbers():
-    import pandas
+    pandas = pytest.importorskip("pandas", reason="needs the extra 'xarray'")
 
     frame = pandas.read_csv(io.BytesIO(to_csv(curve_table([curve()]))))
     assert frame["displacement [mm]"].tolist() == [0.0, 0.1, 0.2]

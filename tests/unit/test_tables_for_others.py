@@ -24,7 +24,7 @@ def study():
 
 
 def test_a_grid_has_a_dimension_for_each_varied_value(study):
-    pytest.importorskip("xarray")
+    pytest.importorskip("xarray", reason="needs the extra 'xarray'")
     found = study.to_xarray()
     assert dict(found.sizes) == {"mechanism.roller_radius": 2, "mechanism.springs.stiffness": 3}
     assert found["force_mean"].attrs == {"units": "N"}
@@ -33,14 +33,14 @@ def test_a_grid_has_a_dimension_for_each_varied_value(study):
 
 
 def test_drawn_points_stand_along_one_dimension():
-    pytest.importorskip("xarray")
+    pytest.importorskip("xarray", reason="needs the extra 'xarray'")
     vary = {"mechanism.roller_radius": "8 mm:12 mm", "mechanism.springs.stiffness": "0.6 N/mm:0.8 N/mm"}
     found = cfmkit.sweep("configs/cam.yaml", vary=vary, combine="lhs", samples=5, metrics=["force_mean"]).to_xarray()
     assert dict(found.sizes) == {"point": 5}
 
 
 def test_a_curve_is_a_dataset_over_its_points():
-    pytest.importorskip("xarray")
+    pytest.importorskip("xarray", reason="needs the extra 'xarray'")
     result = cfmkit.analyze("configs/cam.yaml")
     found = result.to_xarray()
     assert found["displacement"].attrs["units"] == "mm"
@@ -48,7 +48,7 @@ def test_a_curve_is_a_dataset_over_its_points():
 
 
 def test_parquet_holds_what_the_csv_holds(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow.parquet", reason="needs the extra 'table'")
     out = tmp_path / "out"
     command = ["sweep", "configs/cam.yaml", "--vary", "mechanism.roller_radius=8 mm:16 mm:3", "--no-plots"]
     assert main([*command, "--table", "csv,parquet", "-j", "1", "-o", str(out), "-q"]) == 0
@@ -61,7 +61,7 @@ def test_parquet_holds_what_the_csv_holds(tmp_path):
 
 
 def test_a_column_of_numbers_and_words_becomes_texts_and_nothing_stays_nothing():
-    pyarrow = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow.parquet", reason="needs the extra 'table'")
     mixed = Table((TableColumn("a", (1, "x", None)), TableColumn("b", np.array([1.0, np.nan, 2.0]), "N")))
     found = pyarrow.read_table(io.BytesIO(parquet(mixed)))
     assert found.to_pydict() == {"a": ["1", "x", None], "b [N]": [1.0, None, 2.0]}
