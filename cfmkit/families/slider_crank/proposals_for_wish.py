@@ -68,6 +68,9 @@ LATER = 10.0
 FLEXURE = 0.2
 """Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
 
+THICKEST, THICKEST_TAPERED = 0.1, 0.05
+"""Largest thickness of a strip, and of a tapered one, over the crank's length: thicker ones hardly bend as lines do."""
+
 OFFERED = 24
 
 PART = "cfmkit.families.slider_crank.proposals_for_wish:part"
@@ -90,6 +93,10 @@ def _of_force(wish: Wish) -> FamilyOffer:
     wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
     if wide > DOUBT * (wish.depth or max(wish.room)):
         reasons.append(f"a strip would have to be about {mm(wide)} wide")
+    largest = max(fits)
+    if largest > 0.0 and not _can_be_cut(wish, THICKEST * largest):
+        text = f"strips are made {mm(wish.thinnest)} thick at least, too thick for a crank of {mm(largest)}"
+        reasons.append(f"{text}, the longest that fits")
     if most := max((one for one in tried if isinstance(one, float)), default=0.0):
         told = format_short(most, "force", 2)
         reasons.append(f"springs of steel wire that fit at the pins hold at most {told} over this travel")
@@ -144,13 +151,18 @@ def _parts(
     found = []
     for block in _materials(wish):
         wide = strip_width(wish, block, crank)
-        if wide <= DOUBT * deep:
+        if wide <= DOUBT * deep and _can_be_cut(wish, THICKEST * crank):
             found.append(_strip(wish, block, lengths, crank, travel))
         if more[0] and FLEXURES_WIDER * wide <= DOUBT * deep:
             found.append(_flexures(wish, block, lengths, crank, travel))
-        if all(more) and wide <= DOUBT * deep:
+        if all(more) and wide <= DOUBT * deep and _can_be_cut(wish, THICKEST_TAPERED * crank):
             found.append(_tapered(wish, block, lengths, crank, travel))
     return found
+
+
+def _can_be_cut(wish: Wish, thickest: float) -> bool:
+    """Tell whether strips up to a thickness, and as wide as there is room for, can be as thin as they are made."""
+    return wish.thinnest <= min(thickest, wish.depth or math.inf)
 
 
 def pair_size(wish: Wish, lengths: Proportions) -> float:
@@ -163,7 +175,8 @@ def _pairs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, 
     """Return mirrored pairs of strips, each half as wide as one strip; the guide of the slider carries nothing."""
     found = []
     for block in _materials(wish):
-        if 0.5 * strip_width(wish, block, crank) <= DOUBT * (wish.depth or max(wish.room)):
+        wide = 0.5 * strip_width(wish, block, crank)
+        if wide <= DOUBT * (wish.depth or max(wish.room)) and _can_be_cut(wish, THICKEST * crank):
             plain = _strip(wish, block, lengths, crank, travel)
             spec = plain.spec.replace({"mechanism.copies": "mirrored"})
             found.append(replace(plain, variant=plain.variant.replace("strip", "pair of strips"), spec=spec))
@@ -211,7 +224,7 @@ def _strip(
     wish: Wish, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
 ) -> Candidate:
     """Return a strip of one thickness, to be sized by stress and force."""
-    thick, wide = (wish.thinnest, 0.1 * crank), (wish.thinnest, wish.depth or crank)
+    thick, wide = (wish.thinnest, THICKEST * crank), (wish.thinnest, wish.depth or crank)
     data = {
         "family": "slider-crank",
         "name": "suggested",
@@ -240,7 +253,7 @@ def _tapered(
 ) -> Candidate:
     """Return a strip of varying thickness, to be searched for the flattest force."""
     plain = _strip(wish, material, lengths, crank, travel)
-    thick = (max(wish.thinnest, 0.005 * crank), 0.05 * crank)
+    thick = (max(wish.thinnest, 0.005 * crank), THICKEST_TAPERED * crank)
     wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})

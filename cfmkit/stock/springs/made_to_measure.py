@@ -103,12 +103,13 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
         return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), FEWEST))
 
     # the thicker the wire, the stiffer, and the longer
-    low, high = np.full(each.shape, THINNEST / 1e-3), 1e3 * widest / (index + 1.0) + np.zeros(each.shape)
+    low, thickest = np.full(each.shape, THINNEST / 1e-3), 1e3 * widest / (index + 1.0) + np.zeros(each.shape)
+    high = np.maximum(thickest, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         fits = (turns(middle) + ends) * middle * 1e-3 <= room
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    there = (high >= THINNEST / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
+    there = (thickest >= THINNEST / 1e-3) & ((turns(low) + ends) * low * 1e-3 <= room)
     return np.asarray(np.where(there, rate * low**power / turns(low), 0.0).max(axis=0))
 
 
