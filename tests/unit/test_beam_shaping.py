@@ -419,3 +419,13 @@ def test_no_time_means_no_start_and_nothing_noted() -> None:
     result = explored(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})
     assert searched(lan(), 0, 0, late) is None
+
+
+@pytest.mark.parametrize("steps", [0, 1, 3])
+def test_a_search_that_pushes_two_joined_nodes_into_one_place_has_no_answer_there(steps: int) -> None:
+    task = replace(lan(), limits=ALL)
+    x = table_3(task)
+    x[3], x[4] = x[1] + steps * np.spacing(x[1]), x[2]  # n4 on n3 but for rounding: nothing is left of b3
+    program = Shaping(Variables(task, 2), 6.8e-3, Flattest())
+    assert program.begin(x) is None
+    assert program.view(x) is None

@@ -17,7 +17,7 @@ from cfmkit.arrays import read_only
 from cfmkit.designing.objective_and_constraints import LimitRows
 from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
-from cfmkit.families.beam.shaping.variables import Length, lengths
+from cfmkit.families.beam.shaping.variables import Length, has_vanished_beam, lengths
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
@@ -194,10 +194,15 @@ class Response:
 
 
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
-    """Return the response of a network at poses that begin with rest [m]; None where it does not reach them all."""
-    task = variables.task
+    """Return the response of a network at poses that begin with rest [m].
+
+    None where it does not reach them all, or has a beam of no length.
+    """
+    task, network = variables.task, variables.build(x)
+    if has_vanished_beam(network):
+        return None
     try:
-        path = trace(variables.build(x), Displacement(task.driven, task.direction, poses), CONTROL)
+        path = trace(network, Displacement(task.driven, task.direction, poses), CONTROL)
     except CfmError:
         return None
     return Response(variables, x.copy(), path) if path.status is PathStatus.COMPLETE else None

@@ -200,6 +200,15 @@ def _least_chord(variables: Variables, network: Network) -> float:
     return _LEAST_CHORD * float(np.mean([abs(b - a) for a, b in (_chord(network, name) for name in network.beams)]))
 
 
+_NOTHING = 1e-6  # of the mean distance of joined nodes: shorter beams are none, and their slopes have no value
+
+
+def has_vanished_beam(network: Network) -> bool:
+    """Tell whether the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
+    chords = [abs(end - start) for start, end in (_chord(network, name) for name in network.beams)]
+    return min(chords) <= _NOTHING * float(np.mean(chords))
+
+
 def _chord(network: Network, name: str) -> tuple[complex, complex]:
     beam = network.beams[name]
     start, end = network.nodes[beam.start], network.nodes[beam.end]
