@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
 
-DECK = "inp"
-"""Format of a deck of a finite-element solver: of elastic parts, which the drawing alone does not tell."""
-
 
 def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     """Return the specification in a YAML file.
@@ -347,7 +344,8 @@ def export(
     tolerance : str or float, optional
         Largest distance from the exact curves, likewise; default: 0.005 mm.
     format : str or sequence of str, optional
-        What to write, of dxf, svg, csv, stl, 3mf, step and inp: ``"stl,step"``; default: dxf, svg, csv.
+        What to write, of dxf, svg, csv, stl, 3mf, step, inp, png and pdf: ``"stl,step"``; default: dxf, svg, csv. The
+        last two are the dimensioned drawing that `design` makes, ``figures/drawing.png``.
 
     Raises
     ------
@@ -366,8 +364,10 @@ def export(
     >>> sorted(cfmkit.export("configs/cam.yaml"))[:3]
     ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
     """
+    from cfmkit.runs.exported_files import exported
+
     spec = spec_of(spec)
-    drawn = Named(drawn_files(spec, kerf, tolerance, format)[0])
+    drawn = Named(exported(spec, kerf, tolerance, format)[0])
     if out is not None:
         from cfmkit.store import RunFolder, stable_hash
 
@@ -381,75 +381,12 @@ def export(
     return drawn
 
 
-def _length(length: str | float | None, option: str) -> float | None:
-    """Return a length above zero [m]; None for None."""
-    from cfmkit.errors import QuantityError
-    from cfmkit.specs.units import read_quantity
-
-    if length is None:
-        return None
-    try:
-        value = read_quantity(length, "length") if isinstance(length, str) else float(length)
-    except QuantityError as error:
-        raise UsageError(f"{option}: {error}") from None
-    if not value > 0:
-        raise UsageError(f"{option}: {length} is not allowed: must be > 0")
-    return value
-
-
 def resolve(spec: AnySpec) -> Spec:
     """Return the specification with every derived part written out."""
     spec = spec_of(spec)
     record = family(spec.family)
     resolved: Spec = record.resolve(spec) if record.resolve else spec
     return resolved
-
-
-def drawn_files(
-    spec: Spec,
-    kerf: str | float | None = None,
-    tolerance: str | float | None = None,
-    formats: str | Sequence[str] | None = None,
-) -> tuple[dict[str, bytes], Drawing]:
-    """Return the files of `export`, and the drawing with its notes and warnings."""
-    from cfmkit.export import TOLERANCE, USUAL, files
-
-    wanted = _formats(formats, USUAL)
-    if kerf is not None and "dxf" not in wanted:
-        raise UsageError("--kerf makes a second DXF: add dxf to --format")
-    width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
-    drawn = drawing(spec, near)
-    return files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {}), drawn
-
-
-def _decks(spec: Spec) -> dict[str, bytes]:
-    """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
-    record = family(spec.family)
-    if record.elastic_parts is None:
-        raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
-    from cfmkit.elastica.input_deck import beam_deck
-    from cfmkit.solid.input_deck import deck
-
-    parts = record.driven_parts(spec)
-    found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
-    steps = {one.name: len(one.stops) for one in parts}
-    for network in record.driven_networks(spec):
-        title = f"{spec.name}, {network.name} as beams"
-        found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
-    return found
-
-
-def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats that are requested; of a text those between commas."""
-    from cfmkit.export import FORMATS as DRAWN
-
-    known = (*DRAWN, DECK)
-    words = usual if given is None else given.split(",") if isinstance(given, str) else given
-    names = tuple(dict.fromkeys(word.strip().lower() for word in words))
-    for name in names:
-        if name not in known:
-            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
-    return names
 
 
 def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:

@@ -88,8 +88,19 @@ def _command(name: str) -> Any:
     )
     callback.__annotations__ = {field.name: hints[field.name] for field in fields}
     app = typer.Typer(**_STYLE)
-    app.command(name, help=inspect.getdoc(module.run), epilog=_example(module))(callback)
+    app.command(name, help=_unwrapped(inspect.getdoc(module.run) or ""), epilog=_example(module))(callback)
     return _plain(typer.main.get_command(app))
+
+
+def _unwrapped(text: str) -> str:
+    """Return a docstring with one line for each paragraph: typer keeps the ends of lines of all but the first.
+
+    Examples
+    --------
+    >>> _unwrapped("What it does.\\n\\nMore of it,\\nand the end.")
+    'What it does.\\n\\nMore of it, and the end.'
+    """
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
 def _example(module: ModuleType) -> str | None:

@@ -115,9 +115,9 @@ class Changing(Common):
         option(
             "--set",
             metavar="A.B=VALUE",
-            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Repeatable. "
-            """Put a key that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. """
-            "With a family in front, for the specs of that family only: cam:mechanism.roller_radius='10 mm'.",
+            text="Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
+            """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
+            "With a family in front, for the specs of that family only: cam:design.force='60 N'.",
             autocompletion=completion_candidates.changes,
         ),
     ] = None

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
-from cfmkit.cli.page_block_types import FAINT, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
+from cfmkit.cli.page_block_types import FAINT, MARGIN, CellGrid, JsonText, Paragraph, Span, TextLine, Verbatim
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 NARROWEST, WIDEST = 40, 108
 """Columns of a page. In 40 the page of a cam still shows every number beside its name; wider than 108 a paragraph is
 hard to read, and hardly a line but commands to copy gets so long."""
-
-MARGIN = 9
-"""Columns of the words that begin a paragraph: ``warning`` or ``feasible`` and a blank."""
 
 LEAST_GAP = 2
 """Columns between the two ends of a line: fewer would read as one text."""

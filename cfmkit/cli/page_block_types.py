@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 PLAIN, GOOD, BAD, LABEL, FAINT = "", "cyan", "bold yellow", "bold", "dim"
 """Tones. Colours only repeat what a word says, and blue stands against yellow, which everybody can tell apart."""
 
+MARGIN = 9
+"""Columns of the words that begin a paragraph: ``warning`` or ``feasible`` and a blank."""
+
 MOST_NAMES = 2
 """Files of one folder that are named: the paragraph of a cam's design has 163 characters then, two lines of the widest
 page; with four of each it has 222."""
@@ -202,6 +205,11 @@ def _braced(names: Iterable[str], most: int | None) -> Iterator[str]:
         else:
             more = ["..."] if len(bases) > most else []
             yield f"{folder}/{{{','.join([*bases[:most], *more])}}}"
+
+
+def next_command(*words: str) -> TextLine:
+    """Return the line that says which command follows, never broken: it is copied."""
+    return whole_line(Span(f"{'next':<{MARGIN}}", GOOD), command_line(*words))
 
 
 def command_line(*words: str) -> str:

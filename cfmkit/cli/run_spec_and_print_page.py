@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit import api
-from cfmkit.cli.output import MARGIN
 from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
+    MARGIN,
     CellGrid,
     Paragraph,
     Span,

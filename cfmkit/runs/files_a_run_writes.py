@@ -7,7 +7,7 @@ nothing depends on the time: the same result gives the same bytes.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.errors import GeometryError, SolutionError
@@ -15,12 +15,11 @@ from cfmkit.families import family
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.plots.figures import moving_of
 from cfmkit.results import PART_NOT_DRAWN, Finding
+from cfmkit.runs.part_on_paper import part_on_paper
 from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from matplotlib.figure import Figure
 
     from cfmkit.export.contours import Drawing
     from cfmkit.runs.run_outcome import Report
@@ -71,7 +70,7 @@ def files(
         yield name, make()
     makers = {**api.figures(result), **report.supplement.figures} if plots or page else {}
     if makers and drawing is not None:
-        makers["drawing"] = partial(_drawn, drawing, result.spec)
+        makers["drawing"] = partial(part_on_paper, drawing, result.spec)
     drawn = {stem: form.draw(make) for stem, make in makers.items()}
     for stem, figure in drawn.items() if plots else ():
         yield from form.write(figure, stem)
@@ -130,44 +129,3 @@ def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:
 
     for name, data in drawn(drawing).items():
         yield f"geometry/{name}", data
-
-
-def _drawn(drawing: Drawing, spec: Spec) -> Figure:
-    from cfmkit.plots.workshop_drawing import drawing_figure
-
-    stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
-    reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
-    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported)
-
-
-def stated_tolerances(spec: Spec) -> tuple[str, ...]:
-    """Return a line for each tolerance that the specification's design states."""
-    design = getattr(spec, "design", None)
-    made = {} if design is None else design.tolerances_of(spec)[0]
-    return tuple(f"{path}: {_spread(stated)}" for path, stated in made.items())
-
-
-def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
-    """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
-    from cfmkit.studies.stated_or_assumed_tolerances import assumed
-
-    found = assumed(spec)
-    if found is None:
-        return ()
-    process = found.process
-    kinds = [kind for kind in ("thickness", "position") if kind in found.kinds.values()]
-    held = [f"{kind} +- {1e3 * getattr(process, kind):g} mm (standard deviation)" for kind in kinds]
-    kerf = f"kerf {1e3 * process.kerf:g} mm, " if process.kerf else ""
-    return (
-        f"process: {process.name}, assumed",
-        *held,
-        f"{kerf}inside corners from {1e3 * process.least_radius:g} mm, walls from {1e3 * process.least_feature:g} mm",
-    )
-
-
-def _spread(stated: Any) -> str:
-    """Return a tolerance in words, in the units that it was given in."""
-    if isinstance(stated, tuple):
-        return " ... ".join(str(value) for value in stated)
-    words = stated.model_dump(exclude_none=True)
-    return ", ".join(f"{word} {value}" for word, value in words.items())

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
+import shlex
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
+from cfmkit.cli.page_block_types import Paragraph, Written
+from cfmkit.cli.verbs.suggest import _page
 
 WISHES = Path(__file__).parents[1] / "wishes"
 FEASIBLE = sorted(path.stem for path in (WISHES / "sources").glob("*.yaml"))
@@ -32,13 +37,49 @@ def check_proposals(found, out):
         assert all(outcome.ok for outcome in cfmkit.check(result)), one["folder"]
 
 
-def test_a_cam_is_suggested_for_a_long_stroke_with_some_loss(tmp_path):
-    code, found = suggested("cam-published", tmp_path / "out", "-j", "1")
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    """Return the folder of a search for the published cam, and what it printed."""
+    out, page = tmp_path_factory.mktemp("a wish's") / "out", io.StringIO()
+    with redirect_stdout(page):
+        code = main(["suggest", str(WISHES / "cam-published.yaml"), "-o", str(out), "-j", "1", "--no-plots"])
     assert code == 0
+    return out, page.getvalue()
+
+
+def test_a_cam_is_suggested_for_a_long_stroke_with_some_loss(published):
+    out, _ = published
+    found = json.loads((out / "metrics.json").read_text())
     assert {one["family"] for one in found["proposals"]} == {"cam"}
-    check_proposals(found, tmp_path / "out")
-    header = (tmp_path / "out" / "suggestions.csv").read_text().splitlines()[0]
+    check_proposals(found, out)
+    header = (out / "suggestions.csv").read_text().splitlines()[0]
     assert header.startswith("number,family,variant,force_mean [N],ripple [1]")
+
+
+def test_the_next_line_is_a_command_that_writes_files_to_cut(published, tmp_path):
+    out, page = published
+    last = page.splitlines()[-1]  # one line, longer than the page is wide
+    assert len(last) > max(map(len, page.splitlines()[:2]))
+    label, program, verb, *words = shlex.split(last)
+    assert (label, program, verb) == ("next", "cfmkit", "export")
+    best = json.loads((out / "metrics.json").read_text())["proposals"][0]
+    assert words == [str(out / best["folder"] / "design.yaml")]
+    assert (out / best["folder"] / "geometry").is_dir()
+    assert main([verb, *words, "--format", "dxf,png", "-o", str(tmp_path / "cut")]) == 0
+    assert (tmp_path / "cut" / "figures" / "drawing.png").read_bytes().startswith(b"\x89PNG")
+    assert list((tmp_path / "cut").glob("*.dxf"))
+
+
+def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
+    one = {"family": "cam", "variant": "2 springs", "mean": 20.0, "ripple": 0.01, "across": 1.0, "along": 2.0}
+    one |= {"depth": None, "safety_factor": None, "parts": 3, "hysteresis": None, "finer_deviation": None}
+    both = [one | {"folder": "1-cam-2-springs"}, one | {"folder": "10-cam"}]
+    data = {"message": "2 mechanisms meet the wish", "proposals": both, "wish": {}, "near_misses": []}
+    written = Written("out", ("1-cam-2-springs/design.yaml", "10-cam/design.yaml", "10-cam/curve.csv"))
+    page = list(_page(data | {"families": [], "warnings": []}, written, False))
+    notes = [block.text for block in page if isinstance(block, Paragraph) and block.word == "note"]
+    assert len(notes) == 1
+    assert "written of 1-cam-2-springs:" in notes[0]
 
 
 def test_a_wish_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):

@@ -59,7 +59,7 @@ def test_a_number_out_of_its_limits_is_refused_with_them(cli, arguments, reporte
         ("batch", "What to do with every spec; default: design where there is a block design, else analyze."),
         ("batch", "Output folder; default: cfm-out/batch/."),
         ("measure", "Output folder; default: cfm-out/DATA-measure/."),
-        ("sensitivity", "or Monte Carlo over tolerances; default: the spec's, else oat."),
+        ("sensitivity", "(the tolerances that a yield needs); default: the spec's, else oat."),
     ],
 )
 def test_the_help_names_the_defaults(cli, verb, reported):

@@ -271,6 +271,8 @@ def test_export_gives_the_files_and_writes_them_where_a_folder_is_named(tmp_path
     written = cfmkit.export(CAM, tmp_path / "out")
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*written, "manifest.json"}
     assert all((tmp_path / "out" / name).read_bytes() == data for name, data in written.items())
+    assert cfmkit.export(CAM, format="png") == cfmkit.export(CAM, format=["PNG"])
+    assert set(cfmkit.export(CAM, format="png,pdf")) == {"figures/drawing.png", "figures/drawing.pdf"}
     for kerf in (0.0, "0 mm", float("nan")):
         with pytest.raises(cfmkit.UsageError, match="must be > 0"):
             cfmkit.export(CAM, kerf=kerf)

@@ -36,6 +36,24 @@ def test_the_example_ends_the_help(name, capsys, monkeypatch):
     assert "{SPEC}" not in shown
 
 
+@pytest.mark.parametrize("name", names())
+def test_the_help_fits_into_80_columns_with_every_word_whole(name, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    main([name, "--help"])
+    shown = capsys.readouterr().out
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", ["batch", "explore", "sensitivity", "suggest"])
+def test_a_paragraph_of_a_help_is_not_broken_where_the_docstring_is(name, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "400")
+    main([name, "--help"])
+    above = capsys.readouterr().out.partition("Arguments")[0]
+    paragraphs = [line.strip() for line in above.splitlines() if line.strip()]
+    assert all(line.endswith(".") for line in paragraphs[1:-1]), paragraphs
+
+
 def test_the_help_says_what_a_spec_is_and_where_to_start(capsys):
     main(["--help"])
     shown = " ".join(capsys.readouterr().out.split())

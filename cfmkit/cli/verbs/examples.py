@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
-from cfmkit.cli.page_block_types import BAD, GOOD, Paragraph, command_line, field, listed
+from cfmkit.cli.page_block_types import BAD, GOOD, Paragraph, field, listed, next_command
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import UsageError, visible
 
@@ -66,7 +66,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
         verb = _verb(options.name, written[0])
         page = (
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
-            Paragraph("next", command_line("cfmkit", verb, written[0])),
+            next_command("cfmkit", verb, written[0]),
         )
         return Answer({"files": written}, page)
     if options.out is not None or options.schema is not None:

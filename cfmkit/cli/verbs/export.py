@@ -30,15 +30,20 @@ class ExportOptions(OneSpec):
     ] = None
     format: Annotated[
         str | None,
-        option("--format", metavar="LIST", text="Any of dxf,svg,csv,stl,3mf,step,inp; default: dxf,svg,csv."),
+        option(
+            "--format",
+            metavar="LIST",
+            text="Any of dxf,svg,csv,stl,3mf,step,inp,png,pdf (the last two: a dimensioned drawing); "
+            "default: dxf,svg,csv.",
+        ),
     ] = None
     quiet: Quiet = False
 
 
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
-    from cfmkit import api
     from cfmkit.cli.run_spec_and_print_page import folder_of
+    from cfmkit.runs.exported_files import exported
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder
@@ -46,7 +51,7 @@ def run(options: ExportOptions, terminal: Terminal) -> Answer:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        drawn, drawing = api.drawn_files(spec, options.kerf, options.tolerance, options.format)
+        drawn, drawing = exported(spec, options.kerf, options.tolerance, options.format)
         for name, data in drawn.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal.arguments)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion_candidates
 from cfmkit.cli.options import Common, argument, flag, option
-from cfmkit.cli.page_block_types import GOOD, Paragraph, Verbatim, command_line
+from cfmkit.cli.page_block_types import GOOD, Paragraph, Verbatim, next_command
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import OutputError, UsageError, visible
 
@@ -59,7 +59,7 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
             raise
     verb = "design" if record.design else "analyze"
     page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
-    follow = Paragraph("next", command_line("cfmkit", verb, name))
+    follow = next_command("cfmkit", verb, name)
     return Answer({"family": options.family, "file": name, "files": names}, (page, follow))
 
 

@@ -70,8 +70,9 @@ class SensitivityOptions(Studying):
         Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] | None,
         option(
             "--method",
-            text="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances; "
-            "default: the spec's, else oat.",
+            metavar="NAME",
+            text="oat (one at a time), local (gradients), morris (screening), sobol (indices), tolerance (Monte Carlo: "
+            "the yield) or inverse (the tolerances that a yield needs); default: the spec's, else oat.",
         ),
     ] = None
     samples: Annotated[
@@ -93,7 +94,7 @@ class SensitivityOptions(Studying):
             "--vary",
             metavar="A.B=SPREAD",
             text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
-            "mechanism.roller_radius='normal:0.05 mm', 'uniform:2 %'. Repeatable; replaces the spec's parameters.",
+            "mechanism.width=uniform:2%. Repeatable; replaces the spec's parameters.",
             autocompletion=completion_candidates.changes,
         ),
     ] = None
@@ -101,8 +102,9 @@ class SensitivityOptions(Studying):
         Literal["fail", "resample", "bound"] | None,
         option(
             "--on-failure",
-            text="For samples without a result: report no index (fail), draw their block again (resample) or report "
-            "intervals (bound); default: fail.",
+            metavar="NAME",
+            text="For samples without a result: fail (report no index), resample (draw their block again) or bound "
+            "(report intervals); default: fail.",
         ),
     ] = None
     metrics: Annotated[

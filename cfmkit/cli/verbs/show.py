@@ -25,8 +25,9 @@ class ShowOptions(Common):
     topic: Annotated[
         str | None,
         argument(
-            "FAMILY|units|metrics|materials|references|NAME",
-            "What to explain: a topic, or anything by its name: brace_length, pla, MPa; default: list all.",
+            "NAME",
+            "What to explain: a family, units, metrics, materials, references, or anything by its name: brace_length, "
+            "pla, MPa; default: list all.",
             completion_candidates.topics,
         ),
     ] = None

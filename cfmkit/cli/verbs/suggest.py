@@ -14,7 +14,6 @@ from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, W
 from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
-    GOOD,
     LABEL,
     CellGrid,
     GridColumn,
@@ -22,14 +21,14 @@ from cfmkit.cli.page_block_types import (
     Span,
     TextLine,
     Written,
-    command_line,
     line,
+    next_command,
 )
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
@@ -284,13 +283,24 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
     yield BLANK
     yield written.block(everything)
+    if bare := [one["folder"] for one in data["proposals"] if not _complete(one["folder"], written.files)]:
+        yield Paragraph(
+            "note",
+            f"the time was up before more than design.yaml was written of {', '.join(bare)}: `cfmkit analyze` of it "
+            "gives the curve and figures, `cfmkit export --format dxf,svg,png` the files to cut and a drawing",
+        )
     if data["proposals"]:
-        yield Paragraph("next", _next(data["proposals"][0], written.folder), GOOD)
+        yield _next(data["proposals"][0], written.folder)
 
 
-def _next(best: Mapping[str, Any], folder: str) -> str:
-    """Return the command that makes files to cut or print of a proposal."""
-    return command_line("cfmkit", "export", str(Path(folder) / best["folder"] / "design.yaml"))
+def _complete(folder: str, files: Iterable[str]) -> bool:
+    """Return whether more of a proposal is there than its spec."""
+    return any(name.startswith(f"{folder}/") and name != f"{folder}/design.yaml" for name in files)
+
+
+def _next(best: Mapping[str, Any], folder: str) -> TextLine:
+    """Return the line with the command that makes files to cut or print of a proposal."""
+    return next_command("cfmkit", "export", str(Path(folder) / best["folder"] / "design.yaml"))
 
 
 def _more(data: Mapping[str, Any]) -> tuple[str, ...]:

@@ -1,0 +1,118 @@
+"""What `export` writes: the part in the requested formats, decks of its elastic parts, and its drawing on paper.
+
+Nothing here touches a disk.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit import api
+from cfmkit.errors import UsageError
+from cfmkit.families import family
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.export.contours import Drawing
+    from cfmkit.specs.spec import Spec
+
+DECK = "inp"
+"""Format of a deck of a finite-element solver: of elastic parts, which the drawing alone does not tell."""
+
+PAPER = ("png", "pdf")
+"""Formats of the dimensioned drawing."""
+
+
+def exported(
+    spec: Spec,
+    kerf: str | float | None = None,
+    tolerance: str | float | None = None,
+    formats: str | Sequence[str] | None = None,
+) -> tuple[dict[str, bytes], Drawing]:
+    """Return the files of `export` by name, and the drawing with its notes and warnings.
+
+    Parameters
+    ----------
+    spec : Spec
+        The mechanism as it is.
+    kerf, tolerance : str or float, optional
+        Width of the cut, and largest distance from the exact curves: with a unit, or a number [m].
+    formats : str or sequence of str, optional
+        Of `cfmkit.export.FORMATS`, `DECK` and `PAPER`; default: `cfmkit.export.USUAL`.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the family has nothing to cut, a length is not above zero, a format is unknown or needs a missing library.
+    cfmkit.errors.SolutionError
+        If the mechanism cannot exist as described.
+    cfmkit.errors.GeometryError
+        If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
+    """
+    from cfmkit.export import TOLERANCE, USUAL, files
+
+    wanted = _formats(formats, USUAL)
+    if kerf is not None and "dxf" not in wanted:
+        raise UsageError("--kerf makes a second DXF: add dxf to --format")
+    width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
+    drawn = api.drawing(spec, near)
+    found = files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {})
+    return found | _on_paper(drawn, spec, [one for one in PAPER if one in wanted]), drawn
+
+
+def _on_paper(drawn: Drawing, spec: Spec, formats: Sequence[str]) -> dict[str, bytes]:
+    """Return the dimensioned drawing in each of the formats."""
+    if not formats:
+        return {}
+    from cfmkit.plots.figure_options import FigureForm
+    from cfmkit.runs.part_on_paper import part_on_paper
+
+    form = FigureForm(formats=tuple(formats))
+    return dict(form.files({"drawing": lambda: part_on_paper(drawn, spec)}))
+
+
+def _decks(spec: Spec) -> dict[str, bytes]:
+    """Return the elastic parts as decks of a finite-element solver: meshed, and as beams."""
+    record = family(spec.family)
+    if record.elastic_parts is None:
+        raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
+    from cfmkit.elastica.input_deck import beam_deck
+    from cfmkit.solid.input_deck import deck
+
+    parts = record.driven_parts(spec)
+    found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}
+    steps = {one.name: len(one.stops) for one in parts}
+    for network in record.driven_networks(spec):
+        title = f"{spec.name}, {network.name} as beams"
+        found[f"{network.name}-as-beams.inp"] = beam_deck(title, network, steps[network.name])
+    return found
+
+
+def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
+    """Return the formats that are requested; of a text those between commas."""
+    from cfmkit.export import FORMATS as DRAWN
+
+    known = (*DRAWN, DECK, *PAPER)
+    words = usual if given is None else given.split(",") if isinstance(given, str) else given
+    names = tuple(dict.fromkeys(word.strip().lower() for word in words))
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
+    return names
+
+
+def _length(length: str | float | None, option: str) -> float | None:
+    """Return a length above zero [m]; None for None."""
+    from cfmkit.errors import QuantityError
+    from cfmkit.specs.units import read_quantity
+
+    if length is None:
+        return None
+    try:
+        value = read_quantity(length, "length") if isinstance(length, str) else float(length)
+    except QuantityError as error:
+        raise UsageError(f"{option}: {error}") from None
+    if not value > 0:
+        raise UsageError(f"{option}: {length} is not allowed: must be > 0")
+    return value

@@ -1,0 +1,53 @@
+"""The drawing of a part on a sheet of paper, with what is stated or assumed of its tolerances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cfmkit.export.contours import Drawing
+    from cfmkit.specs.spec import Spec
+
+
+def part_on_paper(drawing: Drawing, spec: Spec) -> Figure:
+    """Return the dimensioned drawing of a part, with the tolerances that are stated or assumed for it."""
+    from cfmkit.plots.workshop_drawing import drawing_figure
+
+    stated, assumed = stated_tolerances(spec), assumed_tolerances(spec)
+    reported = (*assumed[:1], *stated, *assumed[-1:]) if stated else assumed  # stated ones replace those of the process
+    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", reported)
+
+
+def stated_tolerances(spec: Spec) -> tuple[str, ...]:
+    """Return a line for each tolerance that the specification's design states."""
+    design = getattr(spec, "design", None)
+    made = {} if design is None else design.tolerances_of(spec)[0]
+    return tuple(f"{path}: {_spread(stated)}" for path, stated in made.items())
+
+
+def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
+    """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
+    from cfmkit.studies.stated_or_assumed_tolerances import assumed
+
+    found = assumed(spec)
+    if found is None:
+        return ()
+    process = found.process
+    kinds = [kind for kind in ("thickness", "position") if kind in found.kinds.values()]
+    held = [f"{kind} +- {1e3 * getattr(process, kind):g} mm (standard deviation)" for kind in kinds]
+    kerf = f"kerf {1e3 * process.kerf:g} mm, " if process.kerf else ""
+    return (
+        f"process: {process.name}, assumed",
+        *held,
+        f"{kerf}inside corners from {1e3 * process.least_radius:g} mm, walls from {1e3 * process.least_feature:g} mm",
+    )
+
+
+def _spread(stated: Any) -> str:
+    """Return a tolerance in words, in the units that it was given in."""
+    if isinstance(stated, tuple):
+        return " ... ".join(str(value) for value in stated)
+    words = stated.model_dump(exclude_none=True)
+    return ", ".join(f"{word} {value}" for word, value in words.items())
