@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.batch import BatchResult, batch
     from cfmkit.runs.examples import Example, examples
     from cfmkit.runs.measure_and_calibrate_api import calibrate, measure
+    from cfmkit.runs.notebook_result import AnalysisView
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.study_result import StudyResult
 
@@ -97,6 +98,7 @@ _HOMES = {
     "cfmkit.experiment.measurement_and_calibration_outputs": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
     "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "measure"),
+    "cfmkit.runs.notebook_result": ("AnalysisView",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.specs.spec": ("Spec",),
     "cfmkit.studies.study_result": ("StudyResult",),
@@ -104,6 +106,7 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AnalysisView",
     "BatchResult",
     "CfmError",
     "Curve",

@@ -6,7 +6,6 @@ Everything is a value: nothing here prints or plots, and a disk is written to on
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import Named
@@ -47,6 +46,13 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
         If the file cannot be read.
     cfmkit.errors.SpecError
         With every problem in it.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml", ["mechanism.roller_radius=10 mm"])
+    >>> spec.family, spec.mechanism.roller_radius
+    ('cam', 0.01)
     """
     from cfmkit.runs.specfile import bind, read_spec
 
@@ -67,6 +73,14 @@ def loads(text: str | bytes, source: str = "text") -> Spec:
     ------
     cfmkit.errors.SpecError
         With every problem in it.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> cfmkit.loads("cfmkit: 1\\nfamily: cam\\nmechanism: {brace_length: 200}", "mine.yaml")
+    Traceback (most recent call last):
+        ...
+    cfmkit.errors.SpecError: mine.yaml:3:12: mechanism: the key ...
     """
     from cfmkit.runs.specfile import bind
     from cfmkit.specs.yamlio import read_document
@@ -83,6 +97,13 @@ def dumps(spec: Spec, complete: bool = False) -> str:
         What to write.
     complete : bool
         Write every default too.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml")
+    >>> cfmkit.loads(cfmkit.dumps(spec)) == spec
+    True
     """
     from cfmkit.specs.yamlio import dump
 
@@ -151,6 +172,13 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     ------
     cfmkit.errors.UsageError
         If the family has nothing to design.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.design("configs/cam.yaml")
+    >>> found.status.key, cfmkit.analyze(found.spec).status.key
+    ('complete', 'complete')
     """
     spec = spec_of(spec)
     record = family(spec.family)
@@ -188,6 +216,13 @@ def evaluate(
     ------
     cfmkit.errors.UsageError
         If one of the names does not exist.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.evaluate("configs/cam.yaml", ["force_ripple[load]"])
+    >>> round(found["force_ripple[load]"].value, 4)
+    0.0124
     """
     from cfmkit.metrics import evaluate as measured
 
@@ -195,7 +230,14 @@ def evaluate(
 
 
 def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
-    """Return what became of each requirement of the specification; one that is not analysed yet is."""
+    """Return what became of each requirement of the specification; one that is not analysed yet is.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> [one.ok for one in cfmkit.check("configs/cam.yaml")]
+    [True, True, True]
+    """
     from cfmkit.metrics import check as checked
     from cfmkit.metrics import values_of_family
 
@@ -389,12 +431,12 @@ def resolve(spec: AnySpec) -> Spec:
     return resolved
 
 
-def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
+def drawing(spec: AnySpec, tolerance: float | None = None) -> Drawing:
     """Return the outlines of the parts that can be cut or printed.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec or path-like
         What to draw.
     tolerance : float, optional
         Largest distance of the outlines from the exact edges [m]; default: 5 um.
@@ -405,15 +447,17 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
         If the family has nothing to cut.
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
-    """
-    from cfmkit.export.engraved_part_labels import engraved
 
-    spec = spec_of(spec)
-    record = family(spec.family)
-    if record.outline is None:
-        raise UsageError(f"{record.phrase} has no part to draw")
-    given = () if tolerance is None else (tolerance,)
-    return engraved(import_module(record.outline).drawing(spec, *given), spec.name)
+    Examples
+    --------
+    >>> import cfmkit
+    >>> drawing = cfmkit.drawing("configs/cam.yaml")
+    >>> drawing.name, len(drawing.contours) > 1
+    ('cam', True)
+    """
+    from cfmkit.runs.exported_files import drawing_of
+
+    return drawing_of(spec_of(spec), tolerance)
 
 
 def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:

@@ -214,9 +214,21 @@ class Explorer:
             data=escaped_json(data),
             style=part("report.css") + part("explorer.css"),
             script=part("explorer.js"),
-            suggestion=f"{Path(self.source).stem}-explored.yaml",
+            suggestion=suggested_name(Path(self.source).stem),
         )
         return text.encode()
+
+
+def suggested_name(stem: str) -> str:
+    """Return the name under which the page offers to save: that of the file, as far as `OWN_NAME` has such letters.
+
+    Examples
+    --------
+    >>> suggested_name("cam 2"), suggested_name("träger<b>"), suggested_name(".-")
+    ('cam 2-explored.yaml', 'tr-ger-b-explored.yaml', 'explored.yaml')
+    """
+    plain = re.sub(r"[^A-Za-z0-9._ -]+", "-", stem).strip("._ -")[:60].rstrip("._ -")
+    return f"{plain}-explored.yaml" if plain else "explored.yaml"
 
 
 def _legend(group: str, spec: Spec) -> str:

@@ -5,9 +5,9 @@ Nothing here touches a disk.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from cfmkit import api
 from cfmkit.errors import UsageError
 from cfmkit.families import family
 
@@ -56,9 +56,20 @@ def exported(
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
-    drawn = api.drawing(spec, near)
+    drawn = drawing_of(spec, near)
     found = files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {})
     return found | _on_paper(drawn, spec, [one for one in PAPER if one in wanted]), drawn
+
+
+def drawing_of(spec: Spec, tolerance: float | None = None) -> Drawing:
+    """Return the outlines of the parts that can be cut or printed, as `cfmkit.drawing` says."""
+    from cfmkit.export.engraved_part_labels import engraved
+
+    record = family(spec.family)
+    if record.outline is None:
+        raise UsageError(f"{record.phrase} has no part to draw")
+    given = () if tolerance is None else (tolerance,)
+    return engraved(import_module(record.outline).drawing(spec, *given), spec.name)
 
 
 def _on_paper(drawn: Drawing, spec: Spec, formats: Sequence[str]) -> dict[str, bytes]:

@@ -11,7 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.runs.explorer_server import Explorer, ExplorerServer
+from cfmkit.runs.explorer_server import Explorer, ExplorerServer, suggested_name
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -63,6 +63,12 @@ def test_a_value_that_is_not_allowed_is_an_answer_with_its_reason(explorer):
 def test_nothing_is_saved_but_a_plain_file_beside_the_spec(explorer, name):
     with pytest.raises(UsageError, match="name a file"):
         explorer.save(name, ())
+
+
+@pytest.mark.parametrize("stem", ["cam", "träger (2)", "a<img src=x>&\"q' ", "-", "x" * 200])
+def test_the_name_that_the_page_offers_can_be_saved(explorer, stem):
+    name = suggested_name(stem)
+    assert explorer.save(name, ()) == {"saved": name}
 
 
 def test_what_is_saved_can_be_analysed_and_replaces_nothing(explorer):
