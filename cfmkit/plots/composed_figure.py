@@ -67,10 +67,11 @@ def composed(panels: Sequence[DrawnPanel], columns: int, form: FigureForm) -> Fi
 
 @styled
 def _composed(panels: Sequence[DrawnPanel], columns: int, cell: float) -> Figure:
-    layouts = []
+    layouts, to_scale = [], []
     for panel in panels:
         figure, layout = noted(panel.make)
-        layouts.append(layout.stretched(cell, titles=False, to_scale=is_to_scale(figure)))
+        to_scale.append(is_to_scale(figure))
+        layouts.append(layout.stretched(cell, titles=False, to_scale=to_scale[-1]))
     rows = [range(start, min(start + columns, len(panels))) for start in range(0, len(panels), columns)]
     heights = [max(layouts[k].size[1] for k in row) + STRIP for row in rows]
     widths = [cell, *(size for _ in range(columns - 1) for size in (GAP, cell))]
@@ -79,6 +80,8 @@ def _composed(panels: Sequence[DrawnPanel], columns: int, cell: float) -> Figure
     grid = whole.add_gridspec(len(rows), len(widths), width_ratios=widths, height_ratios=heights)
     for number, row in enumerate(rows):
         for place, k in enumerate(row):
+            if not to_scale[k]:  # a diagram beside a taller one is as tall
+                layouts[k] = layouts[k].taller(heights[number] - STRIP)
             part = whole.add_subfigure(grid[number, 2 * place])
             layouts[k].host, layouts[k].above = part, STRIP
             laid_out(panels[k].make, layouts[k])

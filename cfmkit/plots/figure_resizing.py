@@ -104,6 +104,14 @@ class FigureLayout:
             boxes.append((x, y, across.at(left + wide, factor) - x, up.at(low + high, taller) - y))
         return FigureLayout((width, up.at(self.size[1], taller) - cut), [], boxes)
 
+    def taller(self, height: float) -> FigureLayout:
+        """Return a layout with its boxes stretched upwards to the height of a panel [mm]; margins stay."""
+        up = _Stretch.of([(low, low + high) for _, low, _, high in self.boxes], self.size[1])
+        factor = up.factor(height)
+        ends = [(up.at(low, factor), up.at(low + high, factor)) for _, low, _, high in self.boxes]
+        boxes = [(box[0], low, box[2], top - low) for box, (low, top) in zip(self.boxes, ends, strict=True)]
+        return FigureLayout((self.size[0], up.at(self.size[1], factor)), [], boxes)
+
     def narrowed(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
         """Return the layout for another width [mm]: stretched, or with boxes below each other where they do not fit."""
         across = _Stretch.of([(left, left + wide) for left, _, wide, _ in self.asked], self.size[0])
@@ -223,19 +231,20 @@ def _keep_on_paper(ax: Axes) -> None:
         return
     ax.yaxis.get_tightbbox()  # puts the label where it will be drawn
     scale = 72.0 / label.figure.dpi
-    outside = EDGE - label.get_window_extent().x0 * scale
+    edge = EDGE + label.figure.bbox.x0 * scale  # of a panel, which may begin inside the paper
+    outside = edge - label.get_window_extent().x0 * scale
     if outside <= 0.0:
         return
     ax.yaxis.labelpad -= min(outside, ax.yaxis.labelpad)
     ax.yaxis.get_tightbbox()
     box = label.get_window_extent()
-    if box.x0 * scale < EDGE:  # in smaller letters, then
-        label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - EDGE) / (box.width * scale), 0.7))
+    if box.x0 * scale < edge:  # in smaller letters, then
+        label.set_fontsize(float(label.get_fontsize()) * max((box.x1 * scale - edge) / (box.width * scale), 0.7))
 
 
 def _keep_note_on_paper(text: Text, figure: Figure) -> None:
     """Break a note whose parts are parted by semicolons where it would leave the paper, and make it smaller then."""
-    room = figure.bbox.width - EDGE / 72.0 * figure.dpi - text.get_window_extent().x0
+    room = figure.bbox.x1 - EDGE / 72.0 * figure.dpi - text.get_window_extent().x0
     parts = text.get_text().split(";  ")
     if text.get_window_extent().width > room and len(parts) > 1:
         half = (len(parts) + 1) // 2
@@ -245,14 +254,14 @@ def _keep_note_on_paper(text: Text, figure: Figure) -> None:
 
 def _keep_name_below_on_paper(ax: Axes) -> None:
     """Move the name of a horizontal axis sideways where it would leave the paper, smaller where it is wider."""
-    label, paper = ax.xaxis.label, ax.figure.bbox.width
+    label, paper = ax.xaxis.label, ax.figure.bbox  # of a panel, its part of the paper
     edge = EDGE / 72.0 * ax.figure.dpi
     if not label.get_text():
         return
-    _shrink(label, label.get_window_extent().width, paper - 2.0 * edge)
+    _shrink(label, label.get_window_extent().width, paper.width - 2.0 * edge)
     ax.xaxis.get_tightbbox()  # puts the label where it will be drawn
     box, room = label.get_window_extent(), ax.get_window_extent().width
-    shift = max(edge - box.x0, 0.0) - max(box.x1 - (paper - edge), 0.0)
+    shift = max(paper.x0 + edge - box.x0, 0.0) - max(box.x1 - (paper.x1 - edge), 0.0)
     label.set_x(label.get_position()[0] + shift / room)
 
 

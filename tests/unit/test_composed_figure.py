@@ -11,6 +11,7 @@ from cfmkit.cli.main import main
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.plots.composed_figure import composed
 from cfmkit.plots.figure_options import FigureForm
+from cfmkit.plots.figure_resizing import FigureLayout
 from cfmkit.plots.style import MM, size_mm
 from cfmkit.plots.vector_formats import svg
 from cfmkit.runs.composed_figure import panels, read
@@ -50,6 +51,29 @@ def test_panels_stand_side_by_side_with_letters_in_the_width_that_is_given():
     assert values[2] == {"6 deg", "7 deg", "8 deg", "9 deg"}
     inches = figure.subfigs[0].axes[0].get_window_extent().width / figure.dpi
     assert 40 < inches / MM < 60
+
+
+def test_names_of_axes_stay_below_and_beside_their_axes_in_every_panel(file):
+    cam = Path("configs/cam.yaml").resolve()
+    name = file(f"panels: [{{run: {cam}, plot: springs}}, {{run: {cam}, plot: loop}}]")
+    figure = composed(panels(name, read(name), serial), 2, FigureForm(width=0.174))
+    for part in figure.subfigs:
+        for ax in part.axes:
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.get_tightbbox()  # puts the label where it will be drawn
+                box = axis.label.get_window_extent()
+                assert not axis.label.get_text() or part.bbox.x0 <= box.x0 < box.x1 <= part.bbox.x1
+            below = ax.xaxis.label.get_window_extent()
+            if ax.xaxis.label.get_text():
+                assert abs(below.x0 + below.x1 - ax.bbox.x0 - ax.bbox.x1) < 0.4 * ax.bbox.width
+
+
+def test_a_diagram_is_stretched_to_the_height_of_its_row_and_keeps_its_margins():
+    layout = FigureLayout((80.0, 60.0), [], [(15.0, 12.0, 60.0, 20.0), (15.0, 34.0, 60.0, 20.0)])
+    tall = layout.taller(100.0)
+    assert tall.size == pytest.approx((80.0, 100.0))
+    assert tall.boxes[0] == pytest.approx((15.0, 12.0, 60.0, 40.0))
+    assert tall.boxes[1] == pytest.approx((15.0, 54.0, 60.0, 40.0))
 
 
 def test_a_panel_may_be_the_folder_of_a_run(file, tmp_path):
