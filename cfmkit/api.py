@@ -457,7 +457,8 @@ def drawing(spec: AnySpec, tolerance: float | None = None) -> Drawing:
     """
     from cfmkit.runs.exported_files import drawing_of
 
-    return drawing_of(spec_of(spec), tolerance)
+    spec = spec_of(spec)
+    return drawing_of(spec, family(spec.family), tolerance)
 
 
 def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.contours import Drawing
+    from cfmkit.families.base import Family
     from cfmkit.specs.spec import Spec
 
 DECK = "inp"
@@ -56,16 +57,15 @@ def exported(
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
-    drawn = drawing_of(spec, near)
+    drawn = drawing_of(spec, family(spec.family), near)
     found = files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {})
     return found | _on_paper(drawn, spec, [one for one in PAPER if one in wanted]), drawn
 
 
-def drawing_of(spec: Spec, tolerance: float | None = None) -> Drawing:
+def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Drawing:
     """Return the outlines of the parts that can be cut or printed, as `cfmkit.drawing` says."""
     from cfmkit.export.engraved_part_labels import engraved
 
-    record = family(spec.family)
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
