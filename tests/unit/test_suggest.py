@@ -340,6 +340,15 @@ def test_kept_shapes_scale_as_beams_that_only_bend():
     assert curve.extra["max_stress"].values[-1] == pytest.approx(shape.stress[-1], rel=1e-4)
 
 
+def test_a_wide_and_low_room_gets_a_network_that_was_shaped_for_one():
+    asked = wish(force="20 N", travel="4 mm", ripple="4 %", room="[90 mm, 30 mm, 12 mm]")
+    first = function_named(family("beam").propose)(asked, Run()).candidates[0]
+    assert first.variant == "shape lan-wide"
+    found = made(ProposalJob("beam", first, asked, 0))
+    assert found.good, found.missed
+    assert found.numbers["ripple"] < 0.025
+
+
 def test_a_wish_beyond_energy_gets_nothing_and_ends_with_4():
     found = suggest(wish_of(str(WISHES / "unreachable-grain-of-pla.yaml"), {}).wish(), Run())
     assert not found.proposals

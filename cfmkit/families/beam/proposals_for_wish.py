@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Room
     from cfmkit.families.wishes import Wish
 
-SHAPES = ("lan-2010", "lan-flat", "arch", "end-effector", "end-effector-leg")
+SHAPES = ("lan-2010", "lan-flat", "lan-wide", "arch", "end-effector", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
 
 SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
@@ -79,7 +79,11 @@ class Kept:
 
 @lru_cache(maxsize=1)
 def kept_shapes() -> tuple[Kept, ...]:
-    """Return all shapes that are kept, each followed over its travel by bending alone."""
+    """Return all shapes that are kept, each followed over its travel by the model in its file.
+
+    That is bending alone, whose curve is the same for every thickness, or, where beams are stout, with stretch and
+    shear: then the curve is exact where the thickness goes with the size, and a guess elsewhere.
+    """
     return tuple(_followed(name) for name in SHAPES)
 
 
