@@ -168,6 +168,7 @@ def _cure(outcome: FinishedRun, cure: str) -> str:
 HEADLINE = (
     "force_mean",
     "torque_mean",
+    "deviation_from_curve",
     "usable_stroke",
     "force_ripple",
     "torque_ripple",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.mechanism_from_spec import assemble
 from cfmkit.metrics import check, evaluate
@@ -227,6 +228,15 @@ def test_metrics_of_an_analysis_compare_with_its_own_curve_and_requirements_coun
     assert evaluate(result)["deviation_from_curve"].value == pytest.approx(0.4 / 40.4, rel=1e-9)
     assert evaluate(result)["rms_to_curve"].value == pytest.approx(0.4, rel=1e-9)
     assert [one.ok for one in check(result.spec.requirements, result)] == [False, True]
+
+
+def test_page_and_notebook_lead_with_the_deviation_from_a_curve_and_from_none_where_there_is_none(tmp_path, capsys):
+    file = tmp_path / "rising.yaml"
+    file.write_text(cfmkit.dumps(designed(RISING, friction=0.002)), encoding="utf-8")
+    for name, there in ((str(file), True), ("configs/cam.yaml", False)):
+        assert main(["analyze", name, "--no-plots", "-o", str(tmp_path / "out")]) == 0
+        assert ("deviation from curve" in capsys.readouterr().out) == there
+        assert ("deviation_from_curve" in cfmkit.analyze(name)._repr_html_()) == there
 
 
 def test_a_window_that_the_curve_does_not_cover_has_no_deviation():
