@@ -23,9 +23,11 @@ from cfmkit.elastica import (
     Control,
     Displacement,
     LineLoad,
+    Loading,
     Network,
     Node,
     PathStatus,
+    PointLoad,
     Polynomial,
     Section,
     Support,
@@ -132,11 +134,11 @@ def test_mirror_images_of_a_symmetric_network_stay_mirror_images(mesh: Mesh) -> 
     assert min(map(abs, free)) < 1e-13  # sideways motion and rotation of the apex
 
 
-def strip(slenderness: float, ends: str) -> tuple[Network, float]:
+def strip(slenderness: float, ends: str, axial: bool = True) -> tuple[Network, float]:
     """A straight strip of 100 mm, and its bending rigidity; pinned, or clamped and guided."""
     thickness = 0.1 * math.sqrt(12) / slenderness
     start, end = (PINNED, Support(False, True, False)) if ends == "pinned" else (CLAMPED, guided(0.0))
-    section = Section(2e9, 10e-3, thickness)
+    section = Section(2e9, 10e-3, thickness, axial=axial)
     nodes = {"a": Node(0, 0, start), "b": Node(0.1, 0, end)}
     return Network(nodes, {"strip": Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12
 
@@ -158,7 +160,7 @@ def elastica(shortening: float) -> tuple[float, float]:
     return float((2 * ellipk(m) / np.pi) ** 2), 2 * math.asin(math.sqrt(m))
 
 
-def shot(slenderness: float, share: float, ends: str, shortening: float) -> float:
+def shot(slenderness: float, share: float, ends: str, shortening: float, axial: bool = True) -> float:
     """Return the force [N] of a strip that is bent in its first mode, by shooting: solve_ivp knows nothing of the mesh.
 
     share: of the thickness; shortening: of the distance between the ends, over its length.
@@ -169,7 +171,7 @@ def shot(slenderness: float, share: float, ends: str, shortening: float) -> floa
     s = np.linspace(0, 1, 4001)
     sloped = size * waves * np.pi / 0.1 * (np.cos(np.pi * s) if waves == 1 else np.sin(2 * np.pi * s))
     length = 0.1 / np.trapezoid(np.cos(sloped), s)
-    stretch = 1 / (2e9 * 10e-3 * thickness)
+    stretch = 1 / (2e9 * 10e-3 * thickness) if axial else 0.0
 
     def slopes(place: float, state: Any, push: float) -> list[float]:
         angle = size * waves * np.pi / 0.1 * (math.cos(np.pi * place) if waves == 1 else math.sin(2 * np.pi * place))
@@ -206,3 +208,37 @@ def test_a_slender_column_keeps_to_its_first_mode(slenderness: float, share: flo
     for point in (4, 16, 40):
         expected = shot(slenderness, share, ends, pressed.points[point] / 0.1)
         assert path.effort[path.at_requested[point]] == pytest.approx(expected, rel=5e-4)
+
+
+@pytest.mark.parametrize("slenderness", [100, 700, 5000])
+@pytest.mark.parametrize("share", [0.001, 0.01, 0.3])
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_a_slender_column_that_does_not_stretch_leaves_its_nearly_rigid_start(
+    slenderness: float, share: float, ends: str
+) -> None:
+    """Bent by as little as 7e-7 of its length, it hardly moves before its critical force; a force leads there, too."""
+    network, _ = strip(slenderness, ends, axial=False)
+    control = Control(imperfection=share * 0.1 * math.sqrt(12) / slenderness)
+    pressed = trace(network, Displacement("b", np.pi, np.linspace(0, 0.06, 5)), control)
+    assert pressed.status is PathStatus.COMPLETE, pressed.message
+    assert not pressed.unstable.any()
+    assert pressed.events == ()
+    forces = pressed.effort[pressed.at_requested]
+    assert abs(forces[0]) < 1e-5 * forces[1]  # rounding of places
+    expected = shot(slenderness, share, ends, 0.15, axial=False)
+    assert forces[1] == pytest.approx(expected, rel=5e-5)
+    loaded = trace(network, Loading((PointLoad("b", -1.0),), forces[1:]), control)
+    assert loaded.status is PathStatus.COMPLETE, loaded.message
+    moved = loaded.motion("b")[loaded.at_requested, 0]
+    np.testing.assert_allclose(moved, -pressed.drive[pressed.at_requested][1:], rtol=2e-4)
+
+
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_a_straight_column_that_does_not_stretch_is_rigid_whichever_way_it_points(ends: str) -> None:
+    """The sine of its angle is not exact: that is no imperfection."""
+    network, _ = strip(100, ends, axial=False)
+    x, y = 0.1 * math.cos(0.3), 0.1 * math.sin(0.3)
+    free = guided(0.3, rotates=ends == "pinned")
+    askew = Network({"a": network.nodes["a"], "b": Node(x, y, free)}, network.beams)
+    for column, angle in ((network, math.pi), (askew, math.pi + 0.3)):
+        assert trace(column, Displacement("b", angle, np.array([1e-3]))).status is PathStatus.NO_START

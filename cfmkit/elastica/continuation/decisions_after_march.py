@@ -17,6 +17,7 @@ from cfmkit.elastica.continuation import (
     branch_rejoins_path,
     critical_start,
     ending_messages,
+    nearly_rigid_start,
     passing_limit_points,
     points_at_bifurcation,
 )
@@ -71,7 +72,7 @@ def _after(problem: PathProblem, leg: Leg, requested: int) -> Move:
     trail, spot, code, control = leg.trail, leg.spot, leg.code, problem.control
     regained = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
     if code in (NO_START, STALLED) or (regained and control.branch == "stable"):
-        away = critical_start.left(problem, trail, spot)
+        away = critical_start.left(problem, trail, spot) or nearly_rigid_start.left(problem, trail, spot)
         if away is not None or code == NO_START:
             return away or Stop(trail)
     if code == INERTIA and control.branch == "stop":
