@@ -43,6 +43,9 @@ Where the disc at a node of two beams just misses the corners of their ends, a s
 MOST_PLACES = 20_000
 """Places round the boundary at which sizes are looked up; more take seconds."""
 
+TOGETHER = 128
+"""Places whose sizes are spread at once: more hide fewer that smaller neighbours have covered, fewer take calls."""
+
 MOST_REFINED = 1000.0
 """Largest elements in parts of the smallest: beyond it grading alone takes half a minute, and what is so thin beside
 the rest of a part is a flaw of its drawing."""
@@ -156,12 +159,12 @@ class Sizes:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the sizes (k,) [m] at points (k, 2) [m]."""
-        distance, nearest = self._tree.query(points)
-        return np.minimum(self.sizes[nearest] + GRADING * distance, self.largest)
+        return self.looked_up(points)[0]
 
-    def clearance(self, points: FloatArray) -> FloatArray:
-        """Return distances (k,) [m] of points (k, 2) from the nearest place of the boundary."""
-        return np.asarray(self._tree.query(points)[0])
+    def looked_up(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the sizes (k,) at points (k, 2), and how far the boundary's nearest place is (k,) [m]."""
+        distance, nearest = self._tree.query(points)
+        return np.minimum(self.sizes[nearest] + GRADING * distance, self.largest), np.asarray(distance)
 
 
 def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) -> Sizes:
@@ -274,11 +277,15 @@ def _graded(places: FloatArray, wanted: FloatArray) -> FloatArray:
     sizes = wanted.copy()
     tree = cKDTree(places)
     top = float(wanted.max())
-    for i in order:  # from the smallest size on, as in Dijkstra's way through a graph
-        reach = (top - sizes[i]) / GRADING
-        if reach <= 0 or sizes[i] < wanted[i]:
-            continue  # a smaller neighbour has been here, and its reach covers this one's
-        near = np.asarray(tree.query_ball_point(places[i], reach))
-        away = np.hypot(*(places[near] - places[i]).T)
-        sizes[near] = np.minimum(sizes[near], sizes[i] + GRADING * away)
+    for start in range(0, len(order), TOGETHER):  # from the smallest size on, as in Dijkstra's way through a graph
+        some = order[start : start + TOGETHER]
+        # where a smaller neighbour has been, its reach covers this one's
+        some = some[(sizes[some] < top) & (sizes[some] >= wanted[some])]
+        if not len(some):
+            continue
+        met = tree.query_ball_point(places[some], (top - sizes[some]) / GRADING)
+        source = np.repeat(some, [len(one) for one in met])
+        near = np.concatenate([np.asarray(one, np.int64) for one in met])
+        away = np.hypot(*(places[near] - places[source]).T)
+        np.minimum.at(sizes, near, wanted[source] + GRADING * away)
     return sizes

@@ -13,6 +13,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
@@ -25,6 +27,8 @@ POINTS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 WEIGHTS = np.full(3, 1 / 6)
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 """Where the nodes stand in the parent triangle."""
+UPPER = np.argwhere(np.triu(np.ones((12, 12))))
+"""Rows and columns of an element's stiffness on and above the diagonal, (78, 2): it is symmetric."""
 
 
 def slopes(at: FloatArray) -> FloatArray:
@@ -92,9 +96,7 @@ class Elements:
 
     def _strained(self, gradient: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the deformation gradient (2, 2, k) and Green's strain (3, k) at points with these slopes."""
-        times = gradient.shape[-1] // len(self.mesh.triangles)
-        u = np.tile(moved[self.mesh.triangles].transpose(1, 2, 0), times)  # (6, 2, k)
-        f = np.einsum("aik,ajk->ijk", u, gradient)
+        f = self._sloped(gradient, moved)
         # from the displacements' slopes, before 1 is added: tiny strains keep their digits
         strain = np.stack(
             [
@@ -107,16 +109,44 @@ class Elements:
         f[1, 1] += 1.0
         return f, strain
 
+    def _sloped(self, gradient: FloatArray, moved: FloatArray) -> FloatArray:
+        """Return the slopes of displacements (2, 2, k) at points where the shape functions have these."""
+        times = gradient.shape[-1] // len(self.mesh.triangles)
+        u = np.tile(moved[self.mesh.triangles].transpose(1, 2, 0), times)  # (6, 2, k)
+        return np.asarray(np.einsum("aik,ajk->ijk", u, gradient))
+
     def forces(self, moved: FloatArray) -> FloatArray:
         """Return what holds the nodes in place (n, 2) [N], at displacements (n, 2) [m]."""
         gradient, volume = self._parent
         f, strain = self._strained(gradient, moved)
-        return self._gathered(f, volume * self.law(strain)[0])
+        return self._gathered(_times(f, volume * self.law(strain)[0]))
 
-    def _gathered(self, f: FloatArray, s: FloatArray) -> FloatArray:
-        """Return nodal forces (n, 2) [N] from stress times volume (3, k) [N m]."""
+    def along(self, moved: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        """Return forces (n, 2) [N], and the tangent as a function of a direction (n, 2), in which they change so.
+
+        A product of the tangent and a vector takes a quarter of what it takes to assemble the tangent.
+        """
+        gradient, volume = self._parent
+        f, strain = self._strained(gradient, moved)
+        stress, modulus, _ = self.law(strain)
+        s, d = volume * stress, volume * modulus
+
+        def changed(direction: FloatArray) -> FloatArray:
+            df = self._sloped(gradient, direction)
+            de = np.stack(
+                [
+                    (f[:, 0] * df[:, 0]).sum(0),
+                    (f[:, 1] * df[:, 1]).sum(0),
+                    (f[:, 0] * df[:, 1] + f[:, 1] * df[:, 0]).sum(0),
+                ]
+            )
+            return self._gathered(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, de)))
+
+        return self._gathered(_times(f, s)), changed
+
+    def _gathered(self, p: FloatArray) -> FloatArray:
+        """Return nodal forces (n, 2) [N] from the first Piola-Kirchhoff stress times volume (2, 2, k) [N m]."""
         gradient, _ = self._parent
-        p = np.stack([f[:, 0] * s[0] + f[:, 1] * s[2], f[:, 0] * s[2] + f[:, 1] * s[1]], 1)  # (2, 2, k): F S
         each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(POINTS), -1).sum(2)
         nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
         return np.column_stack([np.bincount(nodes, each[:, k].ravel(), count) for k in (0, 1)])
@@ -135,29 +165,27 @@ class Elements:
                 f[:, 0] * gradient[:, None, 1] + f[:, 1] * gradient[:, None, 0],
             ]
         )  # (3, 6, 2, k)
-        m = len(self.mesh.triangles)
         db = np.stack([d[i, 0] * b[0] + d[i, 1] * b[1] + d[i, 2] * b[2] for i in range(3)])
         pg = np.stack([gradient[:, 0] * s[0] + gradient[:, 1] * s[2], gradient[:, 0] * s[2] + gradient[:, 1] * s[1]], 1)
-        blocks = np.empty((12, 12, m))
+        points = (len(POINTS), len(self.mesh.triangles))
+        b, db = b.reshape(3, 6, 2, *points), db.reshape(3, 6, 2, *points)
+        slope, pg = gradient.reshape(6, 2, *points), pg.reshape(6, 2, *points)
+        entries = np.empty((len(UPPER), points[1]))
+        first = 0
         for a in range(6):
-            for c in range(a, 6):
-                spread = (gradient[a, 0] * pg[c, 0] + gradient[a, 1] * pg[c, 1]).reshape(len(POINTS), m).sum(0)
-                for i in (0, 1):
-                    for j in (0, 1):
-                        one = b[0, a, i] * db[0, c, j] + b[1, a, i] * db[1, c, j] + b[2, a, i] * db[2, c, j]
-                        value = one.reshape(len(POINTS), m).sum(0)
-                        if i == j:
-                            value += spread
-                        blocks[2 * a + i, 2 * c + j] = value
-                        blocks[2 * c + j, 2 * a + i] = value
-        return self._gathered(f, s), self._pattern.assembled(blocks.reshape(144, m))
+            spread = np.einsum("jpm,cjpm->cm", slope[a], pg[a:])
+            for i in (0, 1):
+                row = np.einsum("rpm,rcjpm->cjm", b[:, a, i], db[:, a:])
+                row[:, i] += spread
+                row = row.reshape(-1, points[1])[i:]  # from its own diagonal on
+                entries[first : first + len(row)] = row
+                first += len(row)
+        return self._gathered(_times(f, s)), self._pattern.assembled(entries)
 
     @cached_property
     def _pattern(self) -> Pattern:
         unknowns = (2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(len(self.mesh.triangles), 12).T
-        rows = np.repeat(unknowns, 12, axis=0)
-        columns = np.tile(unknowns, (12, 1))
-        return Pattern.of(rows.ravel(), columns.ravel(), 2 * len(self.mesh.nodes))
+        return Pattern.of(unknowns[UPPER[:, 0]].ravel(), unknowns[UPPER[:, 1]].ravel(), 2 * len(self.mesh.nodes))
 
     def stress(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return Cauchy's stress at the nodes, averaged over the elements that meet there.
@@ -214,6 +242,11 @@ class Elements:
         return np.concatenate(found), np.concatenate(nodes)
 
 
+def _times(f: FloatArray, s: FloatArray) -> FloatArray:
+    """Return F S (2, 2, k) of a gradient (2, 2, k) and a symmetric stress (3, k)."""
+    return np.stack([f[:, 0] * s[0] + f[:, 1] * s[2], f[:, 0] * s[2] + f[:, 1] * s[1]], 1)
+
+
 def equivalent(stress: FloatArray) -> FloatArray:
     """Return von Mises' equivalent (k,) [Pa] of plane stresses (3, k); on a free edge it is the stress along it."""
     xx, yy, xy = stress
@@ -222,29 +255,34 @@ def equivalent(stress: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the entries of elements go in a sparse matrix.
+    """Where the entries of elements go in a sparse symmetric matrix.
 
     Attributes
     ----------
     slots : (k,) array of int
-        Of each entry.
-    indices, starts : arrays of int
-        Of the matrix in compressed columns.
+        Of each entry among the matrix's different pairs of row and column.
+    pairs, indices, starts : arrays of int
+        The matrix in compressed columns: pair of each of its entries, rows, and where columns start.
     """
 
     slots: NDArray[np.int64]
+    pairs: NDArray[np.int64]
     indices: NDArray[np.int32]
     starts: NDArray[np.int32]
 
     @classmethod
     def of(cls, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> Pattern:
-        """Return the pattern of a square matrix with entries in these rows and columns, several of them in one."""
-        keys, slots = np.unique(columns * size + rows, return_inverse=True)
+        """Return the pattern of a matrix with entries in these rows and columns, and as many below its diagonal."""
+        pairs, slots = np.unique(np.maximum(rows, columns) * size + np.minimum(rows, columns), return_inverse=True)
+        above, below = pairs % size * size + pairs // size, pairs
+        keys = np.unique(np.concatenate([above, below]))  # column by column
+        column, row = keys // size, keys % size
+        found = np.searchsorted(pairs, np.maximum(row, column) * size + np.minimum(row, column))
         starts = np.searchsorted(keys, np.arange(size + 1) * size)
-        return cls(slots, (keys % size).astype(np.int32), starts.astype(np.int32))
+        return cls(slots, found, row.astype(np.int32), starts.astype(np.int32))
 
     def assembled(self, entries: FloatArray) -> csc_array:
-        """Return the matrix with the sums of the entries."""
+        """Return the matrix with the sums of the entries (k,), each of its pair."""
         size = len(self.starts) - 1
-        data = np.bincount(self.slots, entries.ravel(), len(self.indices))
+        data = np.bincount(self.slots, entries.ravel())[self.pairs]
         return csc_array((data, self.indices, self.starts), shape=(size, size))

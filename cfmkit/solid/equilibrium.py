@@ -26,8 +26,12 @@ ROUNDS = 12
 """Of Newton's method; steps that need more are too long: from a predictor three to five are usual."""
 CORRECTIONS, SHRINK = 10, 0.25
 """With the factors of one tangent, and how much smaller each must be: one costs a sixth of new factors."""
-REFINEMENTS, FINE = 6, 1e-7
-"""Of the path's slope with factors of a tangent nearby, until the last changes it by less than this part."""
+REFINEMENTS, FINE = 6, 1e-5
+"""Of the path's slope with factors of a tangent nearby, until the last changes it by less than this part. It predicts
+poses and motions between them; the stiffness is known more closely than it."""
+PANEL = 1
+"""Columns that SuperLU updates together: in slender parts a column has few others beside it, and the 20 of the default
+take a third more time."""
 FAR = 0.5
 """Largest correction in one round, in parts of the part's size: farther away the tangent says nothing."""
 
@@ -105,8 +109,6 @@ class LinearisedPart:
     order : (q,) array of int
     slope : (q,) array
         Derivative of the residual with respect to the travel.
-    pinned : float
-        Derivative of the effort with respect to the travel, the unknowns held.
     residual : (q,) array
         What is out of balance [N or N m].
     forces : (n, 2) array
@@ -116,20 +118,15 @@ class LinearisedPart:
     matrix: csc_array
     order: NDArray[np.int64]
     slope: FloatArray
-    pinned: float
     residual: FloatArray
     forces: FloatArray
 
     def factored(self) -> Factors:
         """Return the tangent's factors; RuntimeError where it is singular."""
-        found = splu(self.matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        found = splu(
+            self.matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL, options={"SymmetricMode": True}
+        )
         return Factors(found, self.order)
-
-    def times(self, vector: FloatArray) -> FloatArray:
-        """Return the tangent times a vector (q,)."""
-        found = np.empty_like(vector)
-        found[self.order] = self.matrix @ vector[self.order]
-        return found
 
 
 @dataclass(frozen=True)
@@ -191,14 +188,14 @@ class SolidProblem:
         """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
         moved = self.supports.displaced(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
-        beside, corner, slope, pinned = self.supports.borders(unknowns, travel, forces, stiffness)
+        beside, corner, slope, _ = self.supports.carried(unknowns, travel, forces).borders(stiffness)
         selection = self._selection(stiffness)
         order = np.concatenate([selection.order, np.arange(len(selection.order), self.supports.size)])
         matrix = selection.taken(stiffness)
         if len(corner):  # free motions are last: their full rows fill nothing in
             side = csc_array(beside[selection.order])
             matrix = csc_array(block_array([[matrix, side], [side.T, csc_array(corner)]], format="csc"))
-        return LinearisedPart(matrix, order, slope, pinned, self.supports.residual(unknowns, travel, forces), forces)
+        return LinearisedPart(matrix, order, slope, self.supports.residual(unknowns, travel, forces), forces)
 
     def _selection(self, stiffness: csc_array) -> Selection:
         """Return the selection of the loose displacements, found once."""
@@ -225,16 +222,16 @@ class SolidProblem:
                 if not self._believed(here.forces, step):
                     return None
                 if self._balanced(here.residual, here.forces) or self._still(step):
-                    return self._balance(unknowns, travel, here, factors)
+                    return self._balance(unknowns, travel, factors)
                 unknowns = unknowns - step
                 for _ in range(CORRECTIONS):
                     forces = self.elements.forces(self.supports.displaced(unknowns, travel))
                     residual = self.supports.residual(unknowns, travel, forces)
                     if self._balanced(residual, forces):
-                        return self._balance(unknowns, travel, self.linearised(unknowns, travel), factors)
+                        return self._balance(unknowns, travel, factors)
                     more = factors.solve(residual)
                     if self._still(more):
-                        return self._balance(unknowns, travel, self.linearised(unknowns, travel), factors)
+                        return self._balance(unknowns, travel, factors)
                     if not np.abs(more).max() <= SHRINK * np.abs(step).max():
                         break
                     unknowns, step = unknowns - more, more
@@ -251,26 +248,27 @@ class SolidProblem:
         finite = np.isfinite(np.abs(forces).max())
         return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self._scale)
 
-    def _balance(self, unknowns: FloatArray, travel: float, here: LinearisedPart, factors: Factors) -> Balance | None:
-        """Return the equilibrium, with factors of a tangent close to its own; None where they are not close enough."""
-        slope = -factors.solve(here.slope)
+    def _balance(self, unknowns: FloatArray, travel: float, factors: Factors) -> Balance:
+        """Return the equilibrium, with factors of a tangent close to its own; with its own if they are not close."""
+        forces, pull = self.elements.along(self.supports.displaced(unknowns, travel))
+        carried = self.supports.carried(unknowns, travel, forces)
+        path = np.append(np.zeros(self.supports.size), 1.0)
+        beside = carried.times(pull, path)
+        path[:-1] = -factors.solve(beside[:-1])
         for _ in range(REFINEMENTS):
-            more = factors.solve(here.times(slope) + here.slope)
-            slope = slope - more
-            if np.abs(more).max() <= FINE * np.abs(slope).max():
+            pulled = carried.times(pull, path)
+            more = factors.solve(pulled[:-1])
+            # of second order in what the slope was off before: far closer than what it is off now
+            stiffness = float(path @ pulled - more @ pulled[:-1])
+            path[:-1] -= more
+            if np.abs(more).max(initial=0.0) <= FINE * np.abs(path[:-1]).max(initial=0.0):
                 break
         else:
-            factors = here.factored()
-            slope = -factors.solve(here.slope)
-        return Balance(
-            travel,
-            unknowns,
-            self._effort(unknowns, travel, here.forces),
-            here.pinned + float(slope @ here.slope),
-            factors.negative,
-            slope,
-            factors,
-        )
+            factors = self.linearised(unknowns, travel).factored()
+            path[:-1] = -factors.solve(beside[:-1])
+            stiffness = float(path @ beside)
+        effort = self._effort(unknowns, travel, forces)
+        return Balance(travel, unknowns, effort, stiffness, factors.negative, path[:-1], factors)
 
     def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:
         reactions = self.supports.reactions(unknowns, travel, forces)

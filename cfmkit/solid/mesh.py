@@ -305,7 +305,8 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
             places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)
             found.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
     points = np.concatenate(found)
-    return points[field.clearance(points) > 0.5 * ROOM * field(points)]
+    sizes, clearance = field.looked_up(points)
+    return points[clearance > 0.5 * ROOM * sizes]
 
 
 @dataclass(frozen=True)
@@ -324,8 +325,9 @@ class Spacing:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return those of the points (k, 2) [m] that are far enough."""
-        room = ROOM * self.field(points)
-        far = self.field.clearance(points) > room
+        sizes, clearance = self.field.looked_up(points)
+        room = ROOM * sizes
+        far = clearance > room
         if len(self.sewn):
             # half a size beside a seam's own points is further than that from the line between them
             far &= cKDTree(self.sewn).query(points)[0] > SEAM * room / ROOM

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.numerics.hermite_cubics import HermiteCubics
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-    from scipy.interpolate import CubicHermiteSpline
 
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.equilibrium import Balance, SolidProblem
@@ -93,7 +93,7 @@ class PosePath:
         """Of the poses, (k,) [m or rad]."""
         return np.array([pose.travel for pose in self.poses])
 
-    def law(self, sense: float = 1.0) -> CubicHermiteSpline:
+    def law(self, sense: float = 1.0) -> HermiteCubics:
         """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign.
 
         Parameters
@@ -101,11 +101,9 @@ class PosePath:
         sense : float
             1 or -1: that of a travel to the negative side makes it increase along the path.
         """
-        from scipy.interpolate import CubicHermiteSpline
-
         rising = sorted(self.poses, key=lambda pose: sense * pose.travel)
         places, efforts, slopes = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in rising]).T
-        return CubicHermiteSpline(sense * places, sense * efforts, slopes)
+        return HermiteCubics(sense * places, sense * efforts, slopes)
 
     def effort(self, travel: FloatArray) -> FloatArray:
         """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""
@@ -131,11 +129,11 @@ def follow(
         return PosePath((), PathEnd.NO_START)
     span = stops[-1] - stops[0]
     course, state, step = PosePath((start.kept(),), PathEnd.COMPLETE), start, stops[1] - stops[0]
-    before: Balance | None = None
+    smooth: list[Balance] = []  # earlier poses from the last corner on
     for stop in stops[1:]:
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
-            found = advanced(problem, state, ahead, before)
+            found = advanced(problem, state, ahead, _base(smooth, state, ahead))
             steepest = max(abs(pose.stiffness) for pose in course.poses)
             spot = None if found is None else touching(problem, found)
             if spot is not None:
@@ -147,7 +145,7 @@ def follow(
                 if bends(state, found, steepest) and abs(ahead - state.travel) > SHORT * SMALLEST * abs(span):
                     step = 0.5 * (ahead - state.travel)  # between poses the curve is a cubic: none has a corner
                     continue
-                step = GROWTH * (ahead - state.travel)
+                step = max(step, GROWTH * (ahead - state.travel), key=abs)  # a stop close by makes no step shorter
             elif abs(ahead - state.travel) > SMALLEST * abs(span):
                 step = 0.5 * (ahead - state.travel)
                 continue
@@ -157,9 +155,9 @@ def follow(
                 step = SMALLEST * span
                 if found is None:
                     return replace(course, ending=_ending(start, state, beyond))
-            before = state.kept()
+            smooth.append(state.kept())
             if bends(state, found, steepest):
-                before = None  # no cubic leads round a corner
+                smooth = []  # no cubic leads round a corner
                 last = course.bifurcations[-1] if course.bifurcations else math.inf
                 if abs(state.travel - last) > 8 * SHORT * SMALLEST * abs(span):  # a corner is seen by its neighbours
                     course = replace(course, bifurcations=(*course.bifurcations, state.travel))
@@ -234,6 +232,12 @@ def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balan
     moves = len(problem.supports.loose)  # behind them are turns, whose radians are no metres
     correction = float(np.abs((found.unknowns - state.unknowns - predicted)[:moves]).max())
     return found if correction <= STRAY * float(np.abs(predicted[:moves]).max()) + SOFTLY * size else None
+
+
+def _base(smooth: Sequence[Balance], state: Balance, travel: float) -> Balance | None:
+    """Return the last of some poses before a pose from which a cubic reaches to a travel beyond it."""
+    reach = abs(travel - state.travel) / FARTHEST
+    return next((pose for pose in reversed(smooth) if abs(state.travel - pose.travel) >= reach), None)
 
 
 def _bending(before: Balance, state: Balance, travel: float) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
     from scipy.sparse import csc_array
@@ -129,9 +129,43 @@ class Supports:
         ends = [group.free.T @ reaction for group, reaction in zip(self.groups, reactions, strict=True)]
         return np.concatenate([forces.ravel()[self.loose], *ends])
 
-    def borders(
-        self, unknowns: FloatArray, travel: float, forces: FloatArray, stiffness: csc_array
-    ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    def carried(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> Carried:
+        """Return how free motions and the travel move the nodes; forces (n, 2) [N] act on these."""
+        motions = self.motions(unknowns, travel)
+        count = self.size - len(self.loose)
+        ways, curved, first = np.zeros((2 * len(self.places), count + 1)), np.zeros((count + 1, count + 1)), 0
+        for group, motion, lever in zip(self.groups, motions, self._levers(motions), strict=True):
+            rows = (2 * group.nodes[:, None] + np.arange(2)).ravel()
+            last = first + group.free.shape[1]
+            ways[rows, first:last] = lever @ group.free
+            ways[rows, -1] = lever @ group.driven
+            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 2).T
+            turns = np.zeros(count + 1)
+            turns[first:last], turns[-1] = group.free[2], group.driven[2]
+            curved += float((forces[group.nodes] * arm).sum()) * np.outer(turns, turns)
+            first = last
+        return Carried(self.loose, ways, curved)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What free motions of groups, and the travel behind them, do to the nodes.
+
+    Attributes
+    ----------
+    loose : (l,) array of int
+        As of `Supports`.
+    ways : (2n, f + 1) array
+        Derivatives of the nodes' displacements with respect to f free motions and the travel.
+    curved : (f + 1, f + 1) array
+        What the forces on the nodes add to the stiffness as groups turn [N m].
+    """
+
+    loose: NDArray[np.int64]
+    ways: FloatArray
+    curved: FloatArray
+
+    def borders(self, stiffness: csc_array) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """Return the derivatives of the residual that are not those of loose nodes by each other, and the effort's.
 
         Returns
@@ -145,23 +179,18 @@ class Supports:
         pinned : float
             Of the effort on the drive with respect to the travel, the unknowns held.
         """
-        motions = self.motions(unknowns, travel)
-        count = sum(group.free.shape[1] for group in self.groups)
-        ways = np.zeros((2 * len(self.places), count + 1))  # the last: what the travel moves
-        corner, bent, pinned, first = np.zeros((count, count)), np.zeros(count), 0.0, 0
-        for group, motion, lever in zip(self.groups, motions, self._levers(motions), strict=True):
-            rows = (2 * group.nodes[:, None] + np.arange(2)).ravel()
-            last = first + group.free.shape[1]
-            ways[rows, first:last] = lever @ group.free
-            ways[rows, -1] = lever @ group.driven
-            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 2).T
-            curvature = float((forces[group.nodes] * arm).sum())
-            turns = group.free[2]
-            corner[first:last, first:last] = curvature * np.outer(turns, turns)
-            bent[first:last] = curvature * turns * group.driven[2]
-            pinned += curvature * group.driven[2] ** 2
-            first = last
-        pulled = stiffness @ ways
-        corner += ways[:, :-1].T @ pulled[:, :-1]
-        slope = np.concatenate([pulled[self.loose, -1], ways[:, :-1].T @ pulled[:, -1] + bent])
-        return pulled[self.loose, :-1], corner, slope, pinned + float(ways[:, -1] @ pulled[:, -1])
+        pulled = stiffness @ self.ways
+        corner = self.ways.T @ pulled + self.curved
+        beside = pulled[self.loose]
+        slope = np.concatenate([beside[:, -1], corner[:-1, -1]])
+        return beside[:, :-1], corner[:-1, :-1], slope, float(corner[-1, -1])
+
+    def times(self, pull: Callable[[FloatArray], FloatArray], vector: FloatArray) -> FloatArray:
+        """Return how residuals and effort (l + f + 1,) change in a direction of unknowns and travel (l + f + 1,).
+
+        `pull` gives the change of the nodes' forces (n, 2) in a direction of the nodes.
+        """
+        moves = self.ways @ vector[len(self.loose) :]
+        moves[self.loose] += vector[: len(self.loose)]
+        forces = pull(moves.reshape(-1, 2)).ravel()
+        return np.concatenate([forces[self.loose], self.ways.T @ forces + self.curved @ vector[len(self.loose) :]])

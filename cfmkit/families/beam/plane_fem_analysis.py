@@ -27,6 +27,7 @@ from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, find
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
+from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
 
@@ -104,10 +105,8 @@ class SolidSolution(ShortRepr):
     @cached_property
     def stress(self) -> FloatArray:
         """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
-        from scipy.interpolate import PchipInterpolator
-
         rising = np.argsort(self.fine.course.travel)
-        cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
+        cubics = monotone_cubics(self.fine.course.travel[rising], self.fine.peaks[0][rising])
         return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
 
     @property
@@ -122,7 +121,7 @@ class SolidSolution(ShortRepr):
         at_pose = np.array([pose.unstable == 0 for pose in self.fine.course.poses])
         before = np.clip(np.searchsorted(np.abs(travel), np.abs(self.motion) * (1 + 1e-12)) - 1, 0, None)
         stable = at_pose[before]
-        return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
+        return stable if self.reached is None else stable & (self.fine.course.law().derivative(self.motion) > 0.0)
 
     @property
     def everywhere(self) -> None:

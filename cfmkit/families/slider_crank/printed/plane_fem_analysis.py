@@ -31,6 +31,7 @@ from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
+from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.material_and_part_spec import PaddedPart
@@ -83,9 +84,7 @@ class SolidSolution(ShortRepr):
     @cached_property
     def stress(self) -> FloatArray:
         """Largest along a free edge [Pa]; between poses by cubics that stay between their values."""
-        from scipy.interpolate import PchipInterpolator
-
-        found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
+        found = monotone_cubics(self.fine.course.travel, self.fine.peaks[0])(self.travel)
         return read_only(np.maximum(found, 0.0))
 
     @property
