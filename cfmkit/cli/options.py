@@ -62,9 +62,9 @@ def _at_least(low: int) -> Callable[[int | None], int | None]:
     return check
 
 
-def flag(*names: str, text: str) -> Any:
-    """Return the declaration of an option that is there or not."""
-    return typer.Option(*names, help=text)
+def flag(*names: str, text: str, hidden: bool = False) -> Any:
+    """Return the declaration of an option that is there or not; a hidden one is refused with a reason."""
+    return typer.Option(*names, help=text, hidden=hidden)
 
 
 Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]

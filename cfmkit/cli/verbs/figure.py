@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion_candidates
-from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, option
+from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, flag, option
 from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verb_result import Answer
 
@@ -29,6 +29,11 @@ class FigureOptions(Changing, FigureChoice):
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/FILE-figure/.")
     ] = None
+    figure_width: Annotated[
+        str | None,
+        option("--figure-width", metavar="174mm", text="Printed width; default: the file's, else 160mm."),
+    ] = None
+    no_plots: Annotated[bool, flag("--no-plots", text="A figure is all there is.", hidden=True)] = False
     jobs: Jobs = None
     quiet: Quiet = False
 
