@@ -340,13 +340,25 @@ def test_kept_shapes_scale_as_beams_that_only_bend():
     assert curve.extra["max_stress"].values[-1] == pytest.approx(shape.stress[-1], rel=1e-4)
 
 
-def test_a_wide_and_low_room_gets_a_network_that_was_shaped_for_one():
-    asked = wish(force="20 N", travel="4 mm", ripple="4 %", room="[90 mm, 30 mm, 12 mm]")
+@pytest.mark.parametrize(
+    ("room", "force", "shape"),
+    [("[90 mm, 30 mm, 12 mm]", "20 N", "shape lan-wide"), ("[46 mm, 50 mm, 25 mm]", "25 N", "shape lan-tall")],
+)
+def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room, force, shape):
+    asked = wish(force=force, travel="4 mm", ripple="4 %", room=room)
     first = function_named(family("beam").propose)(asked, Run()).candidates[0]
-    assert first.variant == "shape lan-wide"
+    assert first.variant == shape
     found = made(ProposalJob("beam", first, asked, 0))
     assert found.good, found.missed
     assert found.numbers["ripple"] < 0.025
+
+
+def test_the_reason_is_that_of_a_shape_that_travels_so_far():
+    asked = wish(force="60 N", travel="4 mm", ripple="4 %", room="[46 mm, 50 mm, 25 mm]")
+    offer = function_named(family("beam").propose)(asked, Run())
+    assert not offer.candidates
+    assert offer.reason.startswith("the beams would be ")
+    assert offer.reason.endswith(" mm wide")
 
 
 def test_a_wish_beyond_energy_gets_nothing_and_ends_with_4():

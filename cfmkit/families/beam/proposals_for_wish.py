@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Room
     from cfmkit.families.wishes import Wish
 
-SHAPES = ("lan-2010", "lan-flat", "lan-wide", "arch", "end-effector", "end-effector-leg")
+SHAPES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
 
 SIZES = (1.0, 0.96, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
@@ -54,6 +54,9 @@ FLAT = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
 OFFERED = 14
+
+SAYS_LESS = 1e3
+"""Times by which a shape that cannot travel so far misses more: the reason is that of one that can, if there is any."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +126,10 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
+    """Return candidates of all shapes by turns, that of the most promising one first."""
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    rows.sort(key=lambda row: row[0].promise)
     longest = max(map(len, rows))
     return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
@@ -135,7 +140,7 @@ def _rescaled(wish: Wish, kept: Kept, size: float, block: dict[str, Any]) -> Can
     low, high = float(kept.motion[0]), float(kept.motion[-1])
     if length > 0.98 * (high - low):
         longest = 0.6 * (high - low) * size
-        return length / (high - low), f"beams of this room travel about {mm(longest)} at a constant force"
+        return SAYS_LESS * length / (high - low), f"beams of this room travel about {mm(longest)} at a constant force"
     starts = np.linspace(low, high - length, 200)
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
