@@ -26,6 +26,7 @@ from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
+from cfmkit.metrics.metric_definitions import words
 from cfmkit.runs.run import Request, carry_out
 from cfmkit.runs.specfile import STDIN
 from cfmkit.specs.units import border_unit, format_short, to_border
@@ -220,18 +221,6 @@ def searched(found: Mapping[str, Searched]) -> list[str]:
             over = "" if one.window is None else f", {span(*one.window, one.motion)}"
             groups.setdefault(one.model + over, []).append(f"{words(name)} {_short(one.quantity)}")
     return [f"{about}: {', '.join(reported)}" for about, reported in groups.items()]
-
-
-def words(name: str) -> str:
-    """Return a metric's name as people say it.
-
-    Examples
-    --------
-    >>> words("force_mean[load]")
-    'force mean on load'
-    """
-    metric, branch = split_name(name)
-    return metric.replace("_", " ") + (f" on {branch}" if branch else "")
 
 
 def span(low: float, high: float, dimension: str) -> str:

@@ -452,10 +452,15 @@ def drawn(problem: RobustProblem, found: RobustResult, count: int, worst: bool =
 
 
 def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[int, ...]]) -> int:
-    """Return the number of the group of errors without which most more parts would be good, to first order."""
-    shares = []
+    """Return the number of the group of errors without which most more parts would be good, to first order.
+
+    Where no group alone makes a difference to that, the one without which parts miss their limits by least.
+    """
+    spread = np.maximum(found.linear.spread(problem.errors.std(axis=0)), np.finfo(float).tiny)
+    gained = []
     for members in groups:
         still = problem.errors.copy()
         still[:, members] = 0.0
-        shares.append(found.linear.share(still))
-    return int(np.argmax(shares))
+        missed = np.maximum(-found.linear.parts(still) / spread, 0.0).max(axis=1)
+        gained.append((found.linear.share(still), -float(missed.mean())))
+    return max(range(len(groups)), key=gained.__getitem__)

@@ -7,6 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
+from cfmkit.families.rising_progress import Scaled, rising, silent
 from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends
-
-
-def _silent(_fraction: float, _text: str) -> None:
-    """Ignore progress: the default for library use."""
 
 
 class Executor(Protocol):
@@ -70,7 +67,7 @@ class Run:
     seed : int
         Of everything random.
     progress : callable
-        Is told a fraction in [0, 1] and a short text.
+        Is told a fraction in [0, 1], which never falls, and a short text.
     time_budget : float, optional
         In seconds; None: no limit.
     executor : Executor
@@ -83,11 +80,15 @@ class Run:
     """
 
     seed: int = 0
-    progress: Callable[[float, str], None] = _silent
+    progress: Callable[[float, str], None] = silent
     time_budget: float | None = None
     executor: Executor = _one_by_one
     notes: Notes = field(default_factory=_Forgotten)
     wanted: frozenset[str] | None = None
+
+    def __post_init__(self) -> None:
+        """Let no search that looks again take its progress back."""
+        object.__setattr__(self, "progress", rising(self.progress))
 
     def wants(self, names: Iterable[str]) -> bool:
         """Tell whether any of these metrics is looked at."""
@@ -95,11 +96,7 @@ class Run:
 
     def part(self, begun: float, ended: float) -> Run:
         """Return a run that is part of this one: what it calls done lies between two shares of the whole."""
-        return replace(self, progress=partial(_scaled, self.progress, begun, ended))
-
-
-def _scaled(progress: Callable[[float, str], None], begun: float, ended: float, fraction: float, text: str) -> None:
-    progress(begun + (ended - begun) * fraction, text)
+        return replace(self, progress=Scaled(self.progress, begun, ended))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,10 @@ import numpy as np
 
 from cfmkit.metrics.branches_cut_to_window import Undefined
 
+FIRST = 1e-9
+"""In place of a first point at 0, which log t does not have [s]: so early that most of the fall to the next point is
+over long before that one, where the force is hardly more than at it, which errs on the safe side."""
+
 
 @dataclass(frozen=True)
 class FatigueLaw:
@@ -111,7 +115,7 @@ class RelaxationLaw:
             raise Undefined(f"the points of the relaxation end at {hold_text(float(times[-1]))}")
         if time <= times[0]:
             return 1.0
-        return float(np.interp(math.log(time), np.log(np.maximum(times, 1e-9)), moduli) / moduli[0])
+        return float(np.interp(math.log(time), np.log(np.maximum(times, FIRST)), moduli) / moduli[0])
 
 
 @dataclass(frozen=True)

@@ -288,6 +288,20 @@ def split_name(name: str) -> tuple[str, str | None]:
     return metric, rest.removesuffix("]") if bracket else None
 
 
+def words(name: str) -> str:
+    """Return a metric's name as people say it.
+
+    Examples
+    --------
+    >>> words("force_mean[load]"), words("force_after[1000 h]")
+    ('force mean on load', 'force after 1000 h')
+    """
+    metric, rest = split_name(name)
+    after_kind = metric.partition("_")[2]
+    argument = any(one.argument and one.name.partition("_")[2] == after_kind for one in TABLE)
+    return metric.replace("_", " ") + (f" {'' if argument else 'on '}{rest}" if rest else "")
+
+
 def unknown_metric(name: str, known: Iterable[str]) -> str:
     """Say that there is no such metric, and which one could be meant."""
     names = list(dict.fromkeys(known))

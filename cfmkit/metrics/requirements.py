@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric
+from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric, words
 from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
@@ -73,11 +73,10 @@ class Bounds:
 
     def sentence(self, metric: str, item: Value, over: str) -> str:
         """Return the outcome in one line."""
-        name, branch = split_name(metric)
-        words = name.replace("_", " ") + (f" on {branch}" if branch else "")
+        name = words(metric)
         if item.value is None:
-            return f"{words}{over}: no value ({item.reason}), {self.text}: missed"
-        return f"{words} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
+            return f"{name}{over}: no value ({item.reason}), {self.text}: missed"
+        return f"{name} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
 
     def shown(self, value: float) -> str:
         """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""

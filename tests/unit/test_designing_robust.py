@@ -72,6 +72,19 @@ def test_the_tolerance_that_costs_most_is_the_one_with_the_largest_share_of_the_
     assert costliest(found, one, [(0,), (1,)]) == 1
 
 
+def test_where_no_tolerance_alone_makes_parts_good_the_one_that_costs_most_is_the_larger_error():
+    """Both alone leave no good part: the first had been named whichever it was."""
+    for first, worst in ((20.0, 1), (60.0, 0)):
+
+        def seen(x, e, first=first):
+            return x + np.array([first * e[0] + (80.0 - first) * e[1]])
+
+        one = problem(seen, normal(500, 2), [[1.0], [-1.0]], [0.0, 1e-6], [[0.0, 1e-6]], share=0.9)
+        found = with_margins(one, np.array([5e-7]))
+        assert found.linear.share(one.errors) == 0.0
+        assert costliest(found, one, [(0,), (1,)]) == worst
+
+
 def test_a_design_without_numbers_is_refused():
     with pytest.raises(NoPart):
         with_margins(problem(lambda x, e: None, normal(10, 1), [[1.0]], [0.0], [[0, 1]]), np.array([0.5]))

@@ -12,6 +12,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.metrics.branches_cut_to_window import Undefined
 from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
+from cfmkit.metrics.metric_definitions import words
 from cfmkit.runs.run_outcome import report_on
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -73,6 +74,20 @@ def test_points_of_the_modulus_are_met_and_not_left():
     assert law.ratio(3600.0 * 1000**0.5) == pytest.approx(0.625)
     with pytest.raises(Undefined, match="end at 1000 h"):
         law.ratio(4e6)
+
+
+def test_a_first_point_at_the_start_falls_to_the_next_one_at_once_and_meets_it():
+    law = RelaxationLaw((), ((0.0, 2e9), (3600.0, 1.5e9), (3.6e6, 1e9)))
+    assert law.ratio(0.0) == 1.0
+    assert 0.75 < law.ratio(1800.0) < 0.76
+    assert law.ratio(3599.999) == pytest.approx(0.75, rel=1e-6)
+
+
+def test_the_time_of_a_hold_is_no_branch_in_words():
+    """It had been said "force after on 1000 h"."""
+    assert words("force_after[1000 h]") == "force after 1000 h"
+    assert words("torque_after[30 min]") == "torque after 30 min"
+    assert words("force_mean[load]") == "force mean on load"
 
 
 def test_a_material_that_says_nothing_of_use_has_no_such_metrics():

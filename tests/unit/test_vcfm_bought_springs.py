@@ -126,6 +126,12 @@ def test_of_generic_springs_the_one_nearest_to_the_largest_rise_is_taken(spec, r
     assert "the rise of the leaves follows from their rate" in found.message
 
 
+def test_an_analysis_that_is_stated_for_other_springs_is_told_of(spec):
+    stiffer = {"name": "stiffer", "kind": "compression", "stiffness": "1.4 N/mm", "max_elongation": "12 mm"}
+    assert "'analysis' is stated for 1.92 mm: leave it out" in designed(spec, catalogue=(stiffer,)).message
+    assert "'analysis' is stated" not in designed(spec).message
+
+
 def test_where_none_fits_the_nearest_three_are_told(spec):
     soft = [
         {"name": f"s{k}", "kind": "compression", "stiffness": f"{k} N/mm", "counts": (1,)} for k in (1, 2, 30, 40, 50)

@@ -124,7 +124,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
 
 def _numbers(report: MeasureReport) -> CellGrid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from cfmkit.cli.run_spec_and_print_page import words
+    from cfmkit.metrics.metric_definitions import words
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []

@@ -54,6 +54,10 @@ TRIED = 12
 """Springs, the best by the closed forms first, whose leaves are sized by the exact model until some keep the stress."""
 
 
+NOTED = 0.01
+"""Preloads that are stated for other springs are told of beyond this: a force that is that far off shows [1]."""
+
+
 @dataclass(frozen=True)
 class LeavesAroundSprings:
     """Leaves around bought springs.
@@ -327,6 +331,9 @@ def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Des
     note = f"{found.label}: the rise of the leaves follows from their rate, {mm(own.height)}"
     if own.preload_stroke:
         note += f", the preload for the adjustment is {mm(own.preload_stroke)}"
+        stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
+        if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > NOTED * own.preload_stroke:
+            note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
     made = completed(
         _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
     )

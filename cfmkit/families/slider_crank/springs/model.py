@@ -25,7 +25,7 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
-from cfmkit.families.slider_crank.springs.scalar_results import values_of, values_of_wires
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS, values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.unit_springs import JOINTS
@@ -60,7 +60,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     spec : SliderCrankSpec
         The mechanism.
     run : Run
-        Not needed here: the model is a closed form.
+        Which metrics are looked at: scalar results that are not, and then the findings, are left out.
 
     Returns
     -------
@@ -75,14 +75,18 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     said, stuck = {item.name for item in shortfalls}, _held(solution)
+    found = findings_of(spec, solution) if run.wanted is None else ()
+    values = (
+        {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution)} if run.wants(DEFINITIONS) else {}
+    )
     status = Status.PARTIAL if shortfalls or stuck else Status.COMPLETE
     return Result(
         spec=_as_run(spec, assembly),
         status=status,
         message=shortfalls[0].message if shortfalls else stuck,
         curves=(_curve(solution),),
-        values={**values_of(solution), **values_of_wires(spec.mechanism.springs, solution)},
-        warnings=(*shortfalls, *(item for item in findings_of(spec, solution) if item.name not in said)),
+        values=values,
+        warnings=(*shortfalls, *(item for item in found if item.name not in said)),
         travel=asked_motion(spec, assembly),
         target=target_of(spec),
         reference=solution.reference,
