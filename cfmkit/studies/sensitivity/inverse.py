@@ -57,6 +57,13 @@ class LimitsAlong:
         share = ((errors - self.offsets[at]) / np.diff(self.offsets)[at])[:, None]
         return np.asarray((1.0 - share) * self.changes[at] + share * self.changes[at + 1])
 
+    def and_at(self, other: LimitsAlong | None) -> LimitsAlong:
+        """Return the same with what is known at other errors, too."""
+        if other is None:
+            return self
+        offsets, at = np.unique(np.concatenate([self.offsets, other.offsets]), return_index=True)
+        return LimitsAlong(offsets, np.concatenate([self.changes, other.changes])[at])
+
 
 def in_proportion(by_error: FloatArray) -> tuple[LimitsAlong, ...]:
     """Return limits that move in proportion to each error, from their derivatives (m, d)."""

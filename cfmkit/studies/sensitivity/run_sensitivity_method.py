@@ -235,12 +235,14 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
 
 
 def _answered(setup: Setup, errors: FloatArray, costs: FloatArray, wanted: float) -> inverse.ToleranceFactors:
-    """Return the factors on the tolerances; limits are looked at again where these now end."""
+    """Return the factors on the tolerances; limits are looked at again where these now end, and all looks count."""
     from cfmkit.studies.redesign_for_yield import rows_along_errors
 
     result, factors = setup.nominal.result, np.ones(len(setup.parameters))
+    known: tuple[inverse.LimitsAlong | None, ...] = (None,) * len(setup.parameters)
     for _ in range(LOOKS):
-        rows, along = rows_along_errors(setup.study.spec, result, setup.parameters, factors)
+        rows, seen = rows_along_errors(setup.study.spec, result, setup.parameters, factors)
+        known = along = tuple(one.and_at(before) for one, before in zip(seen, known, strict=True))
         answer = inverse.answered(rows, along, errors[:ROUGHLY], costs, wanted)
         ends = np.where(np.isfinite(answer.allocated), answer.allocated, factors)
         ends = np.clip(ends, LEAST_FACTOR, 1.0 if answer.perfect < wanted else inverse.WIDEST)
