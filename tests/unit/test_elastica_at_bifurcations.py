@@ -258,12 +258,19 @@ def test_bifurcations_between_two_points_of_the_primary_path_are_told_one_by_one
     np.testing.assert_allclose([1e3 * event.drive for event in path.events], expected, rtol=2e-6)
 
 
-def test_coarse_points_do_not_lead_from_the_primary_path_onto_a_branch() -> None:
-    """A step over two bifurcations of this V had come to the branch of the third mode, with one of them reported."""
-    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 4.6943915e-3), "c": Node(80e-3, 0, CLAMPED)}
-    leaf = Section(2e9, 6e-3, 0.50606212e-3)
+@pytest.mark.parametrize(
+    ("rise", "thickness", "travel", "points"),
+    [(4.6943915, 0.50606212, 9.6913175, 16), (4.881, 0.4587, 12.586, 7), (4.190, 0.33341, 10.933, 18)],
+)
+def test_coarse_points_do_not_lead_from_the_primary_path_onto_a_branch(
+    rise: float, thickness: float, travel: float, points: int
+) -> None:
+    """A step over two bifurcations of these V, or the first behind the third, had come to another branch."""
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(40e-3, 1e-3 * rise), "c": Node(80e-3, 0, CLAMPED)}
+    leaf = Section(2e9, 6e-3, 1e-3 * thickness)
     net = Network(nodes, {"x": Beam("a", "b", leaf), "y": Beam("b", "c", leaf)})
-    path = trace(net, Displacement("b", -np.pi / 2, np.linspace(0, 9.6913175e-3, 16)[1:]), Control(branch="primary"))
+    drive = Displacement("b", -np.pi / 2, np.linspace(0, 1e-3 * travel, points)[1:])
+    path = trace(net, drive, Control(branch="primary"))
     assert path.status is PathStatus.COMPLETE, path.message
     assert np.abs(path.motion("b")[:, 2]).max() < 1e-6
     assert path.unstable.max() == 3

@@ -276,7 +276,10 @@ def _past(problem: PathProblem, trail: Trail, found: Singular, one: Spot, clear:
     trail = trail.with_points(last)
     if clear.drive != last.drive[0]:
         trail = trail.with_spot(clear, -1)
-    return Resume(trail, clear)
+    if problem.control.branch != "primary":
+        return Resume(trail, clear)
+    # longer first steps have led to branches that are as unstable as the path
+    return Resume(trail, clear, abs(clear.drive - found.spot.drive) or np.inf)
 
 
 def _clear_of(problem: PathProblem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
