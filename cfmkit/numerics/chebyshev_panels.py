@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 NODES = 16
 """Of a panel."""
 
+MOST = 1000
+"""Places at which functions are requested at once, after which halving ends: strips and flexures need some hundreds,
+and a force that is rounding alone, as that of a leg 100 m long, would never be resolved."""
+
 _UNIT = chebyshev.chebpts1(NODES)
 _TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
 
@@ -97,7 +101,7 @@ def resolved(
     close : sequence of float
         Size of the last coefficients of each function, relative to the largest value seen, at which it has converged.
     halvings : int
-        At most so many of a panel, for functions with corners.
+        At most so many of a panel, for functions with corners; none follows a round of more than `MOST` places.
 
     Examples
     --------
@@ -120,7 +124,7 @@ def resolved(
         for panel in wanted:
             found = [coefficients(panel, places, row) for row in values]
             tails = np.array([np.abs(one[-3:]).max() for one in found])
-            (rough if left and (tails > close * largest).any() else done)[panel] = found
+            (rough if left and len(places) <= MOST and (tails > close * largest).any() else done)[panel] = found
         if not rough:
             break
         middles = {panel: 0.5 * (panel[0] + panel[1]) for panel in rough}
