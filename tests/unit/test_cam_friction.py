@@ -10,6 +10,7 @@ from cam_support import analyze, cam, design
 from scipy.optimize import root
 
 import cfmkit
+from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
@@ -275,3 +276,8 @@ def test_a_share_of_friction_that_is_unbounded_is_left_out():
     for name, column in result.curve.extra.items():
         if name.startswith("lost_to_"):
             assert not np.isinf(column.values).any(), name
+
+
+def test_a_mounting_that_is_no_word_and_no_angle_is_told_which_there_are():
+    with pytest.raises(SpecError, match="'sideways' is not one of up, horizontal, down, nor an angle such as '30 deg'"):
+        rubbing(mounting="sideways")

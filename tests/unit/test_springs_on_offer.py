@@ -206,7 +206,7 @@ def test_a_compression_spring_is_not_pressed_beyond_its_turns(block, largest):
 
 def test_of_what_misses_the_nearest_three_are_told():
     misses = [Miss(f"s{k}", share, f"by {share}") for k, share in enumerate((0.5, 0.1, 0.3, 0.2))]
-    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 others miss more"
+    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses more"
 
 
 def test_a_design_with_the_generic_series_is_written_and_read_again(tmp_path):

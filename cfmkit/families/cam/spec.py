@@ -198,6 +198,8 @@ def _mounting(value: Any) -> Any:
     """Return a word or an angle as the block that it is short for."""
     if isinstance(value, str):
         word = str(value).strip()
+        if word.isalpha() and word not in MOUNTINGS:
+            raise ValueError(f"{word!r} is not one of {', '.join(MOUNTINGS)}, nor an angle such as '30 deg'")
         return {"elevation": MOUNTINGS.get(word, value)}
     return value
 

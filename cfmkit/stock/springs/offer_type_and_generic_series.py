@@ -144,4 +144,5 @@ def nearest(misses: Sequence[Miss], count: int = 3) -> str:
     best = sorted(misses, key=lambda miss: miss.share)[:count]
     left = len(misses) - len(best)
     reported = "; ".join(f"{miss.label}: {miss.reason}" for miss in best)
-    return f"{reported}{f'; {left} others miss more' if left else ''}"
+    more = "1 other misses more" if left == 1 else f"{left} others miss more"
+    return f"{reported}; {more}" if left else reported
