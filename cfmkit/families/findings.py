@@ -110,12 +110,14 @@ def too_soft(share: float, where: str) -> str:
     )
 
 
-def bracket(width: float, thickness: float, poisson_ratio: float) -> str:
+def bracket(width: float, thickness: float, poisson_ratio: float, wide_beams: bool) -> str:
     """Return what the finding `wide_beam` says of a part that is solved in plane stress; nothing of a narrow one.
+
+    Where `wide_beams` is requested, it also says that this changes nothing here.
 
     Examples
     --------
-    >>> bracket(10e-3, 1e-3, 0.35)
+    >>> bracket(10e-3, 1e-3, 0.35, False)
     '10 mm wide, 1 mm thick: the force is between that of plane stress, as solved, and that of plane strain, 14 % more'
     """
     if not width > NARROW * thickness:
@@ -124,6 +126,7 @@ def bracket(width: float, thickness: float, poisson_ratio: float) -> str:
     return (
         f"{mm(width)} wide, {mm(thickness)} thick: the force is between that of plane stress, as solved, and that of "
         f"plane strain, {more} more"
+        + ("; mechanism.wide_beams counts in beam models only and changes neither" if wide_beams else "")
     )
 
 

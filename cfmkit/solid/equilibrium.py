@@ -22,6 +22,9 @@ CLOSE = 1e-9
 STILL = 1e-13
 """Correction, in parts of the part's size, below which it is rounding. In a strip 400 times as long as thick forces
 are out of balance by 2e-9 at best, with corrections of 1e-15."""
+ROUGH, ROUNDED = 1e-8, 1e-11
+"""Force out of balance and correction, in the same parts, at which both are rounding if the force falls no more: in
+that strip, bent to a large angle, corrections of 1e-12 are made over and over, while 1.5e-9 stays out of balance."""
 ROUNDS = 12
 """Of Newton's method; steps that need more are too long: from a predictor three to five are usual."""
 CORRECTIONS, SHRINK = 10, 0.25
@@ -210,7 +213,7 @@ class SolidProblem:
 
         Factors of a tangent serve as long as each correction is much smaller than the last.
         """
-        unknowns = guess.copy()
+        unknowns, least = guess.copy(), np.inf
         with np.errstate(all="ignore"):
             for _ in range(ROUNDS):
                 try:
@@ -223,7 +226,10 @@ class SolidProblem:
                     return None
                 if self._balanced(here.residual, here.forces) or self._still(step):
                     return self._balance(unknowns, travel, factors)
-                unknowns = unknowns - step
+                left = float(np.abs(here.residual).max(initial=0.0) / np.abs(here.forces).max())
+                if 0.5 * least < left <= ROUGH and self._still(step, ROUNDED):
+                    return self._balance(unknowns, travel, factors)
+                unknowns, least = unknowns - step, min(least, left)
                 for _ in range(CORRECTIONS):
                     forces = self.elements.forces(self.supports.displaced(unknowns, travel))
                     residual = self.supports.residual(unknowns, travel, forces)
@@ -240,8 +246,8 @@ class SolidProblem:
     def _balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
         return bool(np.abs(residual).max(initial=0.0) <= CLOSE * np.abs(forces).max())
 
-    def _still(self, step: FloatArray) -> bool:
-        return bool(np.abs(step).max(initial=0.0) <= STILL * self._scale)
+    def _still(self, step: FloatArray, part: float = STILL) -> bool:
+        return bool(np.abs(step).max(initial=0.0) <= part * self._scale)
 
     def _believed(self, forces: FloatArray, step: FloatArray) -> bool:
         """Tell whether a correction is small enough to be believed."""

@@ -111,7 +111,10 @@ class PosePath:
 
 
 def follow(
-    problem: SolidProblem, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None
+    problem: SolidProblem,
+    stops: Sequence[float],
+    report: Callable[[float], None] = lambda _share: None,
+    enough: Callable[[float], bool] = lambda _effort: False,
 ) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch.
 
@@ -123,6 +126,8 @@ def follow(
         Travels, from rest on in one direction [m or rad].
     report : callable
         Is given the share of the travel that is done.
+    enough : callable
+        Is given the effort of a pose [N or N m], and tells whether it is the last.
     """
     start = problem.solve(np.zeros(problem.supports.size), stops[0])
     if start is None:
@@ -163,6 +168,8 @@ def follow(
                     course = replace(course, bifurcations=(*course.bifurcations, state.travel))
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
+            if enough(state.effort):
+                return course
     return course
 
 

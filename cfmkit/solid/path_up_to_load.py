@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.solid.path_following import PathEnd, advanced
+from cfmkit.solid.path_following import PathEnd, advanced, follow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -103,9 +103,10 @@ def travel_for(
     report : callable
         Is given the share that is done.
     """
-    travel = guess
+    travel, sense = guess, np.sign(load)
     for times in RANGES:
-        course = meshed.followed(np.linspace(0.0, times * guess, poses).tolist(), report).course
+        stops = np.linspace(0.0, times * guess, poses).tolist()
+        course = follow(meshed.problem, stops, report, lambda effort: sense * effort >= abs(load))
         if len(course.poses) < 2:
             break
         found = LoadPath.of(course, load, through_maxima)

@@ -455,7 +455,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
     thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())
-    if reported := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson):
+    if reported := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson, spec.mechanism.wide_beams):
         yield finding("wide_beam", reported)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:

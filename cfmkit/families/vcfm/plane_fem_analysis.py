@@ -254,5 +254,7 @@ def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
         yield finding(name, reported)
     about = spec.mechanism
     for part in (about.bistable, about.positive):
-        if part is not None and (reported := bracket(part.width, part.thickness, about.material.poisson)):
+        if part is None:
+            continue
+        if reported := bracket(part.width, part.thickness, about.material.poisson, about.wide_beams):
             yield finding("wide_beam", reported)

@@ -270,7 +270,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
-    if reported := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
+    wide = made_of.wide
+    if reported := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio, wide):
         yield finding("wide_beam", reported)
     limit = made_of.allowable_stress
     peaks, places = solution.fine.peaks
