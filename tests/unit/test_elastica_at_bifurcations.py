@@ -260,7 +260,12 @@ def test_bifurcations_between_two_points_of_the_primary_path_are_told_one_by_one
 
 @pytest.mark.parametrize(
     ("rise", "thickness", "travel", "points"),
-    [(4.6943915, 0.50606212, 9.6913175, 16), (4.881, 0.4587, 12.586, 7), (4.190, 0.33341, 10.933, 18)],
+    [
+        (4.6943915, 0.50606212, 9.6913175, 16),
+        (4.881, 0.4587, 12.586, 7),
+        (4.190, 0.33341, 10.933, 18),
+        (4.1598965, 0.3633672, 11.4588855, 19),
+    ],
 )
 def test_coarse_points_do_not_lead_from_the_primary_path_onto_a_branch(
     rise: float, thickness: float, travel: float, points: int

@@ -285,7 +285,8 @@ def _past(problem: PathProblem, trail: Trail, found: Singular, one: Spot, clear:
 def _clear_of(problem: PathProblem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
     """Return a point behind a bifurcation from which the path can be followed on: `other` if it is far enough.
 
-    Near a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
+    Near a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not. A guess
+    far ahead may lead to another branch there, too.
     """
     place = found.spot.drive
     room = min(_CLEAR * problem.span, 0.5 * problem.nearest_target(trail.ahead, other.drive))
@@ -298,7 +299,13 @@ def _clear_of(problem: PathProblem, trail: Trail, found: Singular, one: Spot, ot
     there = other.drive + float(np.sign(other.drive - one.drive)) * room
     guess = found.spot.y + (found.spot.y - early.y) * ((there - place) / before)
     wide = problem.fine.solve(guess, there)
-    near = None if wide is None or wide.unstable != found.after else trail.settled(problem.fine.reduce(wide))
+    if wide is None or wide.unstable != found.after:
+        return other
+    if problem.control.branch == "primary":
+        here = problem.fine.solve(problem.fine.expand(other.y), other.drive)
+        if here is None or not _leads_to(problem, found.spot, here, wide):
+            return other
+    near = trail.settled(problem.fine.reduce(wide))
     return other if near is None else near
 
 
