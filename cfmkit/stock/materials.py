@@ -82,7 +82,7 @@ _METALS = (
     Material(
         "steel-304", 200e9, 0.29, 205e6, 7900.0,
         "E and density: EN 10088-1, steel 1.4301 (AISI 304). Yield: ASTM A240, annealed, minimum; upper end typical of "
-        "cold-rolled sheet. Poisson ratio: handbook value.",
+        "cold-rolled sheet. Poisson ratio: between the 0.27 and 0.30 of tables for AISI 304 and 302.",
         Scatter((190e9, 200e9), (205e6, 310e6)), ("aisi-304", "1.4301", "stainless-steel"),
     ),
     Material(
@@ -109,7 +109,9 @@ _METALS = (
     ),
     Material(
         "beryllium-copper", 131e9, 0.30, 1000e6, 8360.0,
-        "C17200 (CuBe2), precipitation hardened strip: typical data sheet range of the aged tempers TF00 to TH04.",
+        "C17200 (CuBe2), precipitation hardened, tempers TF00 to TH04. E: material-properties.org, beryllium copper "
+        "(131 GPa, yield 1110 MPa); Alloy Wire CB 101 (123 GPa). Density: Little Falls Alloys, alloy 25 (8350 "
+        "kg/m^3). Poisson ratio and the ends of the yield: of no text that is named here; take those of your strip.",
         Scatter((120e9, 134e9), (890e6, 1380e6)), ("c17200", "cube2", "beryllium-bronze"),
     ),
 )  # fmt: skip
@@ -117,25 +119,29 @@ _METALS = (
 _PLASTICS = (
     Material(
         "pla", 3.0e9, 0.36, 45e6, 1240.0,
-        "Printed (filament): typical data sheet range, solid ASTM D638 / ISO 527 bars. Nominal: on edge, along the "
-        "strands; low end: modified PLA and between the layers (PolyTerra: 1.6 GPa, 12 MPa).",
+        "Printed (filament). Nominal: Stratasys PLA, ASTM D638, on edge (3.04 GPa, yield 45 MPa; flat 2.54 GPa, 26 "
+        "MPa). Low end: PolyTerra PLA data sheet V5.3, ISO 527, between the layers (1.6 GPa, 12 MPa). High end and "
+        "density: additive.tools/materials/pla (to 4 GPa and 65 MPa, 1220 to 1260 kg/m^3).",
         Scatter((1.6e9, 4.0e9), (12e6, 65e6)), ("polylactide", "pla-plus"),
     ),
     Material(
         "abs", 2.0e9, 0.35, 33e6, 1040.0,
-        "Printed (filament): typical data sheet range (1.4 GPa Kimya to 2.4 GPa Stratasys ABS-M30). Nominal: middle of "
-        "the range; strength as tested independently for ABS-M30 (ISO 527); low end: between the layers.",
+        "Printed (filament): from 1.44 GPa (Kimya, ISO 527; PMC10406103, Table 2) to 2.41 GPa (Stratasys Fortus "
+        "ABS-M30, ASTM D638). Nominal: middle of that range; strength: ABS-M30 as Loughborough University tested it "
+        "(ISO 527, 33 MPa; published 36 MPa); low end: between the layers.",
         Scatter((1.4e9, 2.5e9), (20e6, 43e6)), ("acrylonitrile-butadiene-styrene",),
     ),
     Material(
         "petg", 2.0e9, 0.38, 45e6, 1270.0,
-        "Printed (filament): typical data sheet range; low end of the strength: between the layers (25 to 38 MPa).",
+        "Printed (filament): additive.tools/materials/petg (2 to 3 GPa and 44 to 56 MPa in the plane, 25 to 38 MPa "
+        "between the layers, 1250 to 1290 kg/m^3). The modulus is the low end of that: printed PETG is often softer.",
         Scatter((1.5e9, 2.9e9), (25e6, 56e6)), ("pet-g",),
     ),
     Material(
         "pa12-sls", 1.65e9, 0.39, 48e6, 930.0,
-        "Laser sintered: typical data sheet values (EOS PA 2200 class); scatter with powder refresh, orientation and "
-        "humidity (3D Systems: 1.39 GPa, 43 MPa).",
+        "Laser sintered, EOS PA 2200 class. Strength and density: additive.tools/materials/pa12 (44 to 52 MPa, 880 to "
+        "960 kg/m^3). Modulus: between 3D Systems' PA12 (1.39 GPa, 43 MPa; PMC10406103, Table 2) and 1.9 GPa; it moves "
+        "with powder refresh, orientation and humidity.",
         Scatter((1.35e9, 1.9e9), (40e6, 52e6)), ("pa12", "nylon-12", "nylon-sls", "pa-2200"),
     ),
     Material(
@@ -146,8 +152,9 @@ _PLASTICS = (
     ),
     Material(
         "pom", 2.8e9, 0.37, 65e6, 1410.0,
-        "Polyoxymethylene, moulded or machined: typical data sheet range, ISO 527 (copolymer 2.5 to 2.9 GPa, 65 MPa: "
-        "Hostaform; homopolymer 3.0 to 3.2 GPa, 72 MPa: Delrin). Not the toughened grades.",
+        "Polyoxymethylene, moulded or machined, ISO 527: copolymer as in the data sheets of Hostaform C 9021 (2.85 "
+        "GPa, 64 MPa) and C 27021 (2.9 GPa, 65 MPa), 1410 kg/m^3; homopolymer 3.0 to 3.2 GPa, 72 MPa (Delrin). Not the "
+        "toughened grades.",
         Scatter((2.5e9, 3.2e9), (60e6, 76e6)), ("delrin", "acetal", "polyoxymethylene", "hostaform"),
     ),
     Material(
@@ -158,24 +165,26 @@ _PLASTICS = (
     ),
     Material(
         "pp", 1.4e9, 0.42, 32e6, 910.0,
-        "Polypropylene homopolymer, sheet and moulded: typical data sheet range, ISO 527 / ASTM D638.",
+        "Polypropylene homopolymer, ASTM D638: Modern Plastics Encyclopedia 99 (1.14 to 1.55 GPa, yield 31 to 37 MPa); "
+        "nominal modulus and density: MakeItFrom, unfilled PP homopolymer (1.4 GPa, 910 kg/m^3).",
         Scatter((1.1e9, 1.6e9), (30e6, 37e6)), ("polypropylene",),
     ),
     Material(
         "pe-hd", 1.0e9, 0.44, 25e6, 955.0,
-        "High-density polyethylene, sheet and moulded: typical data sheet range, ISO 527.",
+        "High-density polyethylene: greensutra.in/greenpedia/plastics (strength 22 to 31 MPa, 952 to 965 kg/m^3); low "
+        "end: engineeringtoolbox.com, polymers (0.7 GPa, 20 to 30 MPa). The modulus goes with the density.",
         Scatter((0.7e9, 1.3e9), (20e6, 31e6)), ("hdpe", "polyethylene"),
     ),
     Material(
         "pc", 2.4e9, 0.37, 65e6, 1200.0,
-        "Polycarbonate, moulded: Makrolon 2405 data sheet, ISO 527; scatter: typical data sheet range. Poisson ratio: "
-        "handbook value.",
+        "Polycarbonate, moulded: Makrolon 2405 data sheet, ISO 527; the ends of the scatter and the Poisson ratio are "
+        "of no text that is named here.",
         Scatter((2.1e9, 2.5e9), (55e6, 70e6)), ("polycarbonate", "makrolon", "lexan"),
     ),
     Material(
         "tpu-95a", 26e6, 0.48, 8.6e6, 1220.0,
-        "Printed (filament), Shore 95A: typical data sheet class; scatter of the modulus as measured on four printed "
-        "TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
+        "Printed (filament), Shore 95A: nominal values of no text that is named here; scatter of the modulus as "
+        "measured on four printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
         Scatter((24e6, 250e6), (5e6, 12e6)), ("tpu", "polyurethane"),
     ),
 )  # fmt: skip
