@@ -30,6 +30,7 @@ from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of,
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
+from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 
@@ -45,6 +46,7 @@ _TORN = 3.0  # travel in lengths from the driven node to a support: at the end t
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
+@one_blas_thread
 def analyze(spec: BeamSpec, run: Run) -> Result:
     """Return the force-displacement path of a beam mechanism, with everything that is wrong with it.
 
