@@ -73,7 +73,7 @@ def test_a_design_writes_its_drawing_and_names_its_tolerances():
 
 
 def test_a_drawing_without_stated_tolerances_names_the_process_that_is_assumed():
-    from cfmkit.runs.files_a_run_writes import assumed_tolerances
+    from cfmkit.runs.part_on_paper import assumed_tolerances
 
     lines = assumed_tolerances(cfmkit.load(CONFIGS / "make_finger.yaml"))
     assert lines[:2] == ("process: fdm, assumed", "thickness +- 0.05 mm (standard deviation)")
@@ -105,10 +105,10 @@ def test_numbers_of_holes_stand_clear_of_every_line():
 
 
 def test_a_drawing_with_stated_tolerances_names_the_process_too():
-    from cfmkit.runs.files_a_run_writes import _drawn
+    from cfmkit.runs.part_on_paper import part_on_paper
 
     spec = cfmkit.load(CONFIGS / "studies" / "cam_bought_parts.yaml")
-    found = texts(_drawn(part_of(spec), spec))
+    found = texts(part_on_paper(part_of(spec), spec))
     assert "process: laser, assumed" in found
     assert "kerf 0.2 mm" in found
     assert "mechanism.springs.stiffness: normal 2 %" in found
