@@ -456,7 +456,8 @@ def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[in
 
     Where no group alone makes a difference to that, the one without which parts miss their limits by least.
     """
-    spread = np.maximum(found.linear.spread(problem.errors.std(axis=0)), np.finfo(float).tiny)
+    spread = found.linear.spread(problem.errors.std(axis=0))
+    spread = np.where(spread > 0.0, spread, np.inf)  # what no error moves is missed alike whatever is held still
     gained = []
     for members in groups:
         still = problem.errors.copy()

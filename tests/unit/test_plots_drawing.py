@@ -66,7 +66,7 @@ def test_a_design_writes_its_drawing_and_names_its_tolerances():
     report = report_on(cfmkit.analyze(design.spec), design)
     assert "figures/drawing.png" in dict(files(report))
     assert "figures/drawing.png" not in dict(files(report, plots=False))
-    from cfmkit.runs.files_a_run_writes import stated_tolerances
+    from cfmkit.runs.part_on_paper import stated_tolerances
 
     (line,) = stated_tolerances(design.spec)
     assert line == "mechanism.brace_length: normal 0.1 mm"

@@ -421,14 +421,14 @@ def test_time_for_the_figures_is_kept_where_the_first_proposal_comes_late():
 
 
 def test_the_nearest_wish_gets_a_proposal_when_it_is_asked():
-    asked = wish(room="[40 mm, 30 mm, 12 mm]")
+    asked = wish(room="[26 mm, 20 mm, 12 mm]")
     propose = function_named(family("beam").propose)
     assert not propose(asked, Run()).candidates
     found = nearest(asked, "beam", 0, NEVER)
     assert found
     for key, value in found.items():
         text = f"[{value.replace(' x ', ', ')}]" if key == "room" else value
-        again = wish(**{"room": "[40 mm, 30 mm, 12 mm]", key: text})
+        again = wish(**{"room": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
         assert any(made(job).good for job in jobs), key
 
