@@ -151,7 +151,7 @@ def _in_the_way(solution: Solution) -> str:
     along = list(_along_the_drive(spec))
     if along:
         held = f"{', '.join(along)}, straight along the drive, cannot change its length and holds until it buckles"
-        bent = "or bent by analysis.imperfection, by 1e-5 of its length at least"
+        bent = "or bent by analysis.imperfection, by 1e-8 of its length at least"
         return f"{said}; {held}: computed with mechanism.axial, {bent}"
     return f"{said}; beams do not stretch: mechanism.axial allows it"
 
