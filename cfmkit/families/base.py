@@ -454,6 +454,11 @@ class Family:
         return packaged(self.bibliography) if self.bibliography else ""
 
     @property
+    def leading(self) -> tuple[str, ...]:
+        """What pages show first: the headline, and how far a curve is from the one that was to be followed."""
+        return (*self.headline, "deviation_from_curve")
+
+    @property
     def phrase(self) -> str:
         """The mechanism with its article: ``a cam mechanism``."""
         return f"{article(self.name)} {self.name} mechanism"

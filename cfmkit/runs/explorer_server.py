@@ -278,10 +278,7 @@ def _shown(result: Result) -> dict[str, Any]:
 
     report = report_on(result)
     tone, words = ENDS.get(int(report.exit_code), ("warn", "the run ended early"))
-    first = (
-        *family(result.spec.family).headline, "deviation_from_curve", "force_mean", "torque_mean", "force_ripple",
-        "torque_ripple",
-    )  # fmt: skip
+    first = (*family(result.spec.family).leading, "force_mean", "torque_mean", "force_ripple", "torque_ripple")
     known = {name: report.metrics[name] for name in dict.fromkeys(first) if name in report.metrics}
     found: dict[str, Any] = {
         "tone": tone,

@@ -121,7 +121,7 @@ def _lines(metrics: Mapping[str, Quantity]) -> list[MetricRow]:
 
 
 def _leads(report: Report, line: MetricRow) -> bool:
-    first = line.name in (*family(report.result.spec.family).headline, "deviation_from_curve") and not line.branch
+    first = line.name in family(report.result.spec.family).leading and not line.branch
     return first and report.metrics[line.name].value is not None
 
 

@@ -50,8 +50,7 @@ class AnalysisView(Result):
         """Return what a notebook shows."""
         parts = [f"<strong>{escape(self.spec.name)}</strong> ({escape(self.spec.family)}): {escape(self.message)}"]
         if self.curves:
-            own = family(self.spec.family).headline
-            lead = (*own, "deviation_from_curve", "force_mean", "torque_mean", "usable_stroke")
+            lead = (*family(self.spec.family).leading, "force_mean", "torque_mean", "usable_stroke")
             known = {name: self.metrics[name] for name in dict.fromkeys(lead) if name in self.metrics}
             rows = [(name, _reported(one), one.definition) for name, one in known.items() if one.value is not None]
             parts.append(html_table(("metric", "value", "what it is"), rows))
