@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 COLUMNS = 3
 
-MOST = 12
-"""Proposals that are drawn."""
+MOST = 24
+"""Proposals that are drawn: four families give three each and often some more; beyond it drawings get too small."""
 
 
 LINE = 3.4
@@ -47,7 +47,7 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     ax = axes_mm(figure, (17.0, 13.0, 100.0, height - 24.0))
     kinds = list(dict.fromkeys(one.family for one in proposals))
     areas, ripples = [], []
-    for number, one in enumerate(proposals, 1):
+    for number, one in enumerate(proposals[:MOST], 1):
         values = one.numbers
         area = 1e4 * float(values["across"] or 0.0) * float(values["along"] or 0.0)
         ripple = 100.0 * float(values["ripple"] or 0.0)
@@ -68,7 +68,13 @@ def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     ax.set_ylim(0.0, 1.12 * max([100.0 * wish.ripple, *ripples]))
     ax.set_xlabel("room needed in the plane [cm²]")
     ax.set_ylabel(f"ripple over the {'travel' if wish.kind == 'force' else 'angle'} [%]")
-    figure.text(0.02, 1.0 - 3.5 / height, "what the proposals need, and how flat they are", fontsize=NORMAL, color=INK)
+    figure.text(
+        0.02,
+        1.0 - 3.5 / height,
+        "what the proposals need, and how flat they are" + _left_out(proposals),
+        fontsize=NORMAL,
+        color=INK,
+    )
     top = 10.0
     for text, kind in [*zip(names, (one.family for one in proposals), strict=False), (key, None)]:
         color = GREY if kind is None else LINES[kinds.index(kind) % len(LINES)]
@@ -98,9 +104,20 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
         (moving.draw_as_made or moving.draw)(ax, 0)
         _frame(ax, space, size, (wide, high))
         ax.set_title(names[number], fontsize=SMALL, loc="left", pad=1.5)
-    figure.text(0.02, 1.0 - 5.0 / total, "the proposals to one scale, each in the room given", fontsize=NORMAL)
+    figure.text(
+        0.02,
+        1.0 - 5.0 / total,
+        "the proposals to one scale, each in the room given" + _left_out(proposals),
+        fontsize=NORMAL,
+    )
     figure.text(0.02, 1.5 / total, _scale_reported(wish), fontsize=SMALL, color=GREY)
     return figure
+
+
+def _left_out(proposals: Sequence[Proposal]) -> str:
+    """Return how many proposals a picture leaves to the table; nothing if it shows all."""
+    more = len(proposals) - MOST
+    return f" (the first {MOST}; {more} more in the table)" if more > 0 else ""
 
 
 def _within(width: float, text: str) -> str:
