@@ -99,11 +99,13 @@ def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
     total = figure.get_figheight() * 25.4
     for number, ((moving, space), size) in enumerate(zip(drawn, sizes, strict=True)):
         row, column = divmod(number, COLUMNS)
-        left = 5.0 + column * (150.0 / columns) + 0.5 * (150.0 / columns - cell[0])
-        ax = axes_mm(figure, (left, total - 8.0 - (row + 1) * (cell[1] + above), *cell))
+        place = 5.0 + column * (150.0 / columns)
+        below = total - 8.0 - (row + 1) * (cell[1] + above)
+        ax = axes_mm(figure, (place + 0.5 * (150.0 / columns - cell[0]), below, *cell))
         (moving.draw_as_made or moving.draw)(ax, 0)
         _frame(ax, space, size, (wide, high))
-        ax.set_title(names[number], fontsize=SMALL, loc="left", pad=1.5)
+        # from the column's edge on, where a name has the room that it is broken for
+        figure.text(place / 160.0, (below + cell[1] + 0.5) / total, names[number], fontsize=SMALL, va="bottom")
     figure.text(
         0.02,
         1.0 - 5.0 / total,
