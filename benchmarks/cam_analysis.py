@@ -23,7 +23,7 @@ from scipy.interpolate import CubicSpline
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable

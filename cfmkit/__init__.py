@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     )
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
     from cfmkit.experiment.reading import Recording
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
     from cfmkit.runs.examples import Example, examples

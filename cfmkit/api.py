@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.arrays import Named
 from cfmkit.errors import UsageError
 from cfmkit.families import family, origin
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import cfmkit
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.sensitivity.probability_confidence_intervals import clopper_pearson
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of

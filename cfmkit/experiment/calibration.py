@@ -17,7 +17,7 @@ from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.least_squares import (
     FittedValues,

@@ -2,101 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cfmkit.families.rising_progress import Scaled, rising, silent
+from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families import it from here
 from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.designing.run_many_starts import Notes
     from cfmkit.elastica.input_deck import DrivenNetwork
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends
-
-
-class Executor(Protocol):
-    """How independent jobs get done: see `cfmkit.studies.serial_and_cluster_executors` and `cfmkit.studies.pool`."""
-
-    def __call__(
-        self, work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
-    ) -> Iterator[tuple[Any, Any]]:
-        """Yield (job, outcome) as they finish; take no more jobs once ``stopping()`` is true."""
-
-
-def _one_by_one(
-    work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
-) -> Iterator[tuple[Any, Any]]:
-    """Do one job after the other in this process: the default for library use."""
-    for job in jobs:
-        if stopping():
-            return
-        yield job, work(job)
-
-
-class _Forgotten:
-    """Keeps nothing: the default for library use."""
-
-    def find(self, _key: str, /) -> int:
-        return -1
-
-    def read(self, place: int, key: str, /) -> Any:
-        raise KeyError(key)
-
-    def add(self, _key: str, _record: Any, /) -> int:
-        return -1
-
-
-@dataclass(frozen=True)
-class Run:
-    """How a function is to be run.
-
-    Attributes
-    ----------
-    seed : int
-        Of everything random.
-    progress : callable
-        Is told a fraction in [0, 1], which never falls, and a short text.
-    time_budget : float, optional
-        In seconds; None: no limit.
-    executor : Executor
-        Does independent jobs, in this process or in others.
-    notes : Notes
-        Keeps what is finished.
-    wanted : frozenset of str, optional
-        Plain names of the metrics that are looked at, and nothing else is: a model may leave its other values and
-        its findings out, and must keep status, curve and those metrics as they are. None: everything is looked at.
-    """
-
-    seed: int = 0
-    progress: Callable[[float, str], None] = silent
-    time_budget: float | None = None
-    executor: Executor = _one_by_one
-    notes: Notes = field(default_factory=_Forgotten)
-    wanted: frozenset[str] | None = None
-
-    def __post_init__(self) -> None:
-        """Let no search that looks again take its progress back."""
-        object.__setattr__(self, "progress", rising(self.progress))
-
-    def wants(self, names: Iterable[str]) -> bool:
-        """Tell whether any of these metrics is looked at."""
-        return self.wanted is None or not self.wanted.isdisjoint(names)
-
-    def part(self, begun: float, ended: float) -> Run:
-        """Return a run that is part of this one: what it calls done lies between two shares of the whole."""
-        return replace(self, progress=Scaled(self.progress, begun, ended))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ polynomials, so that an integral differentiates back to the value to rounding.
 Reference
 ---------
 F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants,
-SIAM J. Sci. Stat. Comput. 5 (1984).
+SIAM J. Sci. Stat. Comput. 5 (1984): what scipy's ``PchipInterpolator`` does.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from cfmkit.numerics.hermite_cubics import monotone_cubics
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -60,7 +58,9 @@ class ThroughPoints:
         rise = np.diff(y) / h
         if not self.smooth or len(y) == 2:
             return np.stack([y[:-1], rise, 0.0 * rise, 0.0 * rise])
-        slope = monotone_cubics(self._knots, y).slope
+        from scipy.interpolate import PchipInterpolator
+
+        slope = PchipInterpolator(self._knots, y).derivative()(self._knots)
         second = (3.0 * rise - 2.0 * slope[:-1] - slope[1:]) / h
         third = (slope[:-1] + slope[1:] - 2.0 * rise) / (h * h)
         return np.stack([y[:-1], slope[:-1], second, third])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.errors import SolutionError, SpecError, UsageError, visible
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.runs.specfile import read_spec
 
 if TYPE_CHECKING:

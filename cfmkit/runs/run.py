@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit import api
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import OVERWRITTEN, Finding, Status
 from cfmkit.runs import run_outcome

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.designing.run_many_starts import Clock
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import WishBlock

@@ -21,7 +21,6 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
-from cfmkit.numerics.hermite_cubics import HermiteCubics
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
@@ -355,9 +354,11 @@ def _checked(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tu
 
 def _estimates(poses: tuple[Balance, ...]) -> FloatArray:
     """Return what the cubic of each interval may be off, (k - 1,) [N or N m]: the larger value of its two ends."""
+    from scipy.interpolate import CubicHermiteSpline
+
     missed = np.zeros(len(poses))
     for k in range(1, len(poses) - 1):
         ends = sorted((poses[k - 1], poses[k + 1]), key=lambda pose: pose.travel)
         x, y, slope = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in ends]).T
-        missed[k] = abs(float(HermiteCubics(x, y, slope)(poses[k].travel)) - poses[k].effort) / HALVED
+        missed[k] = abs(float(CubicHermiteSpline(x, y, slope)(poses[k].travel)) - poses[k].effort) / HALVED
     return np.asarray(np.maximum(missed[:-1], missed[1:]))

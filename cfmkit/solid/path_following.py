@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.hermite_cubics import HermiteCubics
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from scipy.interpolate import CubicHermiteSpline
 
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.equilibrium import Balance, SolidProblem
@@ -93,7 +93,7 @@ class PosePath:
         """Of the poses, (k,) [m or rad]."""
         return np.array([pose.travel for pose in self.poses])
 
-    def law(self, sense: float = 1.0) -> HermiteCubics:
+    def law(self, sense: float = 1.0) -> CubicHermiteSpline:
         """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign.
 
         Parameters
@@ -101,9 +101,11 @@ class PosePath:
         sense : float
             1 or -1: that of a travel to the negative side makes it increase along the path.
         """
+        from scipy.interpolate import CubicHermiteSpline
+
         rising = sorted(self.poses, key=lambda pose: sense * pose.travel)
         places, efforts, slopes = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in rising]).T
-        return HermiteCubics(sense * places, sense * efforts, slopes)
+        return CubicHermiteSpline(sense * places, sense * efforts, slopes)
 
     def effort(self, travel: FloatArray) -> FloatArray:
         """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""

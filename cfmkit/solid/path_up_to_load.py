@@ -68,8 +68,8 @@ class LoadPath:
         sense = float(np.sign(load))
         law = course.law(sense)
         last = float(law.x[-1] if through_maxima else first_maximum(course, sense))
-        there = law.where(abs(load))
-        there = there[(there > 0.0) & (there <= last)]
+        there = law.solve(abs(load), extrapolate=False)
+        there = there[np.isfinite(there) & (there > 0.0) & (there <= last)]
         if len(there):
             return cls(sense * float(there.min()), load, LoadEnd.REACHED)
         how = LoadEnd.MAXIMUM if last < law.x[-1] else LoadEnd.SHORT
@@ -79,8 +79,8 @@ class LoadPath:
 def first_maximum(course: PosePath, sense: float) -> float:
     """Return up to which travel, times the sign of its direction, the effort rises: its end if it always does."""
     law = course.law(sense)
-    flat = law.turning_points()
-    return float(flat[flat > 0.0].min(initial=law.x[-1]))
+    flat = law.derivative().roots(extrapolate=False)
+    return float(flat[np.isfinite(flat) & (flat > 0.0)].min(initial=law.x[-1]))
 
 
 def travel_for(

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.hermite_cubics import HermiteCubics
 from cfmkit.solid.elements import slopes
 from cfmkit.solid.rigid_groups import turned
 
@@ -81,6 +80,8 @@ def _between(
     solved: MeshSolution, read: Callable[[FloatArray, float], FloatArray], turns: bool = False
 ) -> Callable[[FloatArray], FloatArray]:
     """Return a reading of the part's state as a function of the travel; `turns`: its last value is an angle."""
+    from scipy.interpolate import CubicHermiteSpline
+
     travel = solved.course.travel
     step = STEP * float(np.ptp(travel))
     values, ahead, behind = (
@@ -92,7 +93,7 @@ def _between(
         values[:, 2] = np.unwrap(values[:, 2])
         change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     rising = np.argsort(travel)
-    cubics = HermiteCubics(travel[rising], values[rising], change[rising] / (2.0 * step))
+    cubics = CubicHermiteSpline(travel[rising], values[rising], change[rising] / (2.0 * step))
     return lambda places: np.asarray(cubics(places))
 
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.solid.meshed_part import ON
 
 if TYPE_CHECKING:
@@ -112,6 +111,8 @@ class FilletStress:
         Largest in size; tension is positive. At ends that are no pose the size is interpolated, and the sign is that of
         the nearest pose. None where the part does not come to any.
         """
+        from scipy.interpolate import PchipInterpolator
+
         slack = 1e-9 * float(np.ptp(self.travel))  # an end of a window is a pose, but for rounding
         inside = (self.travel >= low - slack) & (self.travel <= high + slack)
         ends = np.array([end for end in (low, high) if self.travel[0] <= end <= self.travel[-1]])
@@ -119,7 +120,7 @@ class FilletStress:
         if not len(places):
             return None
         size = np.abs(self.stress)
-        found = np.concatenate([size[inside], monotone_cubics(self.travel, size)(ends)])
+        found = np.concatenate([size[inside], PchipInterpolator(self.travel, size)(ends)])
         worst = int(found.argmax())
         nearest = int(np.abs(self.travel - places[worst]).argmin())
         return float(np.copysign(found[worst], self.stress[nearest])), float(places[worst])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.metrics.curve_differences import Measure
     from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Spec

@@ -26,7 +26,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 

@@ -22,7 +22,7 @@ from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances, tol
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances

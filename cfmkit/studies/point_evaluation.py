@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families import origin as family_origin
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.metrics import check, evaluate, gaps, other_name, split_name, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import named_in

@@ -29,7 +29,8 @@ from cfmkit.designing.run_many_starts import Clock
 from cfmkit.errors import CfmError, SolutionError, SpecError
 from cfmkit.errors import Problem as Fault
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
 from cfmkit.studies.requirement_constraints import (
     RequirementRows,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from cfmkit.families import family
-from cfmkit.families.base import Run, Sampled, function_named
+from cfmkit.families.base import Sampled, function_named
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.point_evaluation import Metric

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.requirement_constraints import RequirementRows

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import DesignBlock, Spec
     from cfmkit.studies.point_evaluation import Metric
     from cfmkit.studies.sensitivity.parameters import Parameter

@@ -12,7 +12,7 @@ import pytest
 
 from cfmkit.cli.failures import Stopped
 from cfmkit.cli.verbs.design import long_run
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.store import RunFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

@@ -14,7 +14,8 @@ import cfmkit
 from cfmkit import families
 from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.comparison_of_fidelities import (
     PATH,

@@ -7,12 +7,12 @@ import pytest
 
 import cfmkit
 import cfmkit.metrics
-from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.design import missed_by, task_of
 from cfmkit.families.beam.shaping.search import Found
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import NetworkScatter, audited, tolerated
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.pool import Pool
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.base import Family, Run
+from cfmkit.families.base import Family
 from cfmkit.results import Result, Status
 from cfmkit.specs.spec import Analysis, Model, Spec
 from cfmkit.specs.units import Stiffness  # noqa: TC001  pydantic reads the annotation
+
+if TYPE_CHECKING:
+    from cfmkit.families.run_control import Run
 
 TEXT = """
 cfmkit: 1

@@ -13,7 +13,6 @@ from cfmkit import analyze, dumps, evaluate, load, loads
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
-from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping import multistart, search
 from cfmkit.families.beam.shaping.design import blocked, missed_by, shaped, task_of
@@ -32,6 +31,7 @@ from cfmkit.families.beam.shaping.shape_soundness_and_scatter import (
 from cfmkit.families.beam.shaping.sqp_program import Compared, Flattest, Shaping, Widest
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 
 TABLE_3 = np.array([0.0, 30.5, 18.77, 12.44, 24.0, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148])

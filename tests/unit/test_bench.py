@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.specs.spec import Requirement
 from cfmkit.studies.expected_forces_at_bench import bench
 

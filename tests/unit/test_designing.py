@@ -13,7 +13,7 @@ from cfmkit.designing import objective_and_constraints
 from cfmkit.designing.bounds_and_rounding import at_bounds, rounded
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Status
 from cfmkit.studies.serial_and_cluster_executors import Lost

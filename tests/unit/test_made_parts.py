@@ -11,7 +11,7 @@ import pytest
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of

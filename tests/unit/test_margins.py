@@ -12,8 +12,8 @@ import pytest
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.designing.robust_design import RobustProblem, with_margins
-from cfmkit.families.base import Run
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
+from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
 from cfmkit.families.vcfm.scalar_results import values_of
 from cfmkit.specs.units import Share

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
 from cfmkit.stock.processes import PROCESSES

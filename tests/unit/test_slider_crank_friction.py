@@ -10,7 +10,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, turned
 
 CONFIGS = Path(__file__).parents[2] / "configs"

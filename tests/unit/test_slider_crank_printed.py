@@ -27,7 +27,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import strip_thickness_search
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexure_sizing import rotations, sized

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 import cfmkit
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.bought_springs import best_sets
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble

@@ -15,8 +15,9 @@ from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
 from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
 from cfmkit.families.beam.proposals_for_wish import kept_shapes
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.springs_wound_for_wish import wound

@@ -11,7 +11,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 from cfmkit.results import Status

@@ -8,7 +8,7 @@ import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
 from cfmkit.studies.correction_by_solid_model import verified
 

@@ -8,7 +8,8 @@ import cfmkit
 from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verbs import suggest as verb
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.families.wishes import Candidate
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.studies.stated_or_assumed_tolerances import assumed

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.verb_result import Answer
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.comparison_of_fidelities import FidelityComparison

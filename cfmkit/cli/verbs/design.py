@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.verb_result import Answer
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.store import RunFolder
 
 PLACE = 10

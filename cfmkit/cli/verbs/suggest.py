@@ -124,7 +124,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.designing.run_many_starts import Clock
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.runs import suggestion_files
     from cfmkit.runs.read_wish import wish_of
     from cfmkit.runs.run import long_run

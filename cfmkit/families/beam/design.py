@@ -28,10 +28,10 @@ from cfmkit.specs.units import Place, Share, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.mechanism.spec import Mechanism
     from cfmkit.families.beam.network_elements.spec import Thickness
     from cfmkit.families.beam.spec import BeamSpec, Rescale
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
 
 

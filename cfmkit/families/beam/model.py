@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Kind
     from cfmkit.elastica.model.network import Network
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.run_control import Run
 
 _TORN = 3.0  # travel in lengths from the driven node to a support: at the end these are at least twice as long
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms

@@ -27,7 +27,6 @@ from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, find
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
-from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
 
@@ -39,11 +38,11 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.elastica.input_deck import DrivenNetwork
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.families.fem_results import FilletRow
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
     from cfmkit.solid.path_up_to_load import LoadPath
@@ -105,8 +104,10 @@ class SolidSolution(ShortRepr):
     @cached_property
     def stress(self) -> FloatArray:
         """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
+        from scipy.interpolate import PchipInterpolator
+
         rising = np.argsort(self.fine.course.travel)
-        cubics = monotone_cubics(self.fine.course.travel[rising], self.fine.peaks[0][rising])
+        cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
         return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
 
     @property
@@ -121,7 +122,7 @@ class SolidSolution(ShortRepr):
         at_pose = np.array([pose.unstable == 0 for pose in self.fine.course.poses])
         before = np.clip(np.searchsorted(np.abs(travel), np.abs(self.motion) * (1 + 1e-12)) - 1, 0, None)
         stable = at_pose[before]
-        return stable if self.reached is None else stable & (self.fine.course.law().derivative(self.motion) > 0.0)
+        return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
 
     @property
     def everywhere(self) -> None:

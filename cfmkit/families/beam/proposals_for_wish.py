@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.base import Run
 from cfmkit.families.beam.bounding_box import room
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
+from cfmkit.families.run_control import Run
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document

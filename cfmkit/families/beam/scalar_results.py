@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.elastica.outcome.between_points import BetweenPoints
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.solution import OnCurve, Solution
+    from cfmkit.families.run_control import Run
 
 
 BAND = 0.05

@@ -47,9 +47,9 @@ from cfmkit.stock.springs.stress_and_life import SpringInUse
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
     from cfmkit.families.cam.statics import Loads
+    from cfmkit.families.run_control import Run
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 

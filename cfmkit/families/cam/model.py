@@ -43,9 +43,9 @@ from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
     from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
 
 UNLIKE = (

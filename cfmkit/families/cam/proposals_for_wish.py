@@ -27,7 +27,7 @@ from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.wishes import Wish
 
 FRICTION = 0.002

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from cfmkit.families.base import function_named
 
 if TYPE_CHECKING:
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Design
 

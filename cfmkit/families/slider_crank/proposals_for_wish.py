@@ -29,7 +29,7 @@ from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.wishes import Wish
 
 
@@ -296,7 +296,7 @@ def _flexures(
 
 def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     """Return a designed part whose widths, in which force is linear, give exactly the mean that is wished."""
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.model import analyze
 
     made = spec.replace({"design": None, "requirements": (), "mechanism.safety_factor": 1.0})

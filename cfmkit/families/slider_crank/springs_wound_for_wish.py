@@ -34,7 +34,7 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     cfmkit.errors.SolutionError
         If there is no such spring for a joint.
     """
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.springs.model import analyze
 
     solution = analyze(spec.replace({"design": None, "requirements": ()}), Run()).state

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
     from cfmkit.families.vcfm.solution import PartSampler
     from cfmkit.families.vcfm.spec import VcfmSpec

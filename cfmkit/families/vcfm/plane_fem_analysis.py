@@ -25,7 +25,6 @@ from cfmkit.families.vcfm.largest_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring
-from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
 from cfmkit.stock.material_and_part_spec import CutPart
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.outline import SolvedPiece
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
@@ -85,7 +84,9 @@ class SolidPath:
 
     @cached_property
     def _stress(self) -> Any:
-        return monotone_cubics(np.abs(self.solved.course.travel), self.solved.peaks[0])
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(np.abs(self.solved.course.travel), self.solved.peaks[0])
 
     def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.design import DesignSizes
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.wishes import MaterialBlock, Wish
@@ -320,8 +320,8 @@ def _preloads(spec: VcfmSpec, wish: Wish) -> tuple[float, ...]:
 
 def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
-    from cfmkit.families.base import Run
     from cfmkit.families.flattest_window import flattest
+    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.exact_model import analyze
     from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.solution import Push, Solution
 
 

@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
 from cfmkit.families.findings import percent
+from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short, read_quantity
 from cfmkit.studies.suggest.proposal_making_and_judging import ProposalJob, made
 

@@ -15,7 +15,8 @@ import numpy as np
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.designing.robust_design import NoPart, with_margins
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.results import Status
 from cfmkit.studies.redesign_for_yield import Sight, costliest_path, problem_of, written
 from cfmkit.studies.requirement_constraints import places_of, rows_of, sampled_of

@@ -7,7 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.plots.style import BAND, GREY, INK, LINES, NORMAL, SMALL, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:

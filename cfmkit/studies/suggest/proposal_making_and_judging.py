@@ -11,7 +11,8 @@ import numpy as np
 from cfmkit.designing.run_many_starts import NEVER, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short

@@ -21,7 +21,8 @@ import numpy as np
 from cfmkit.designing.run_many_starts import Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family, names
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import function_named
+from cfmkit.families.run_control import Run
 from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash

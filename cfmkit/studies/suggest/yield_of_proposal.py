@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.base import Run
+from cfmkit.families.run_control import Run
 from cfmkit.specs.units import format_short
 from cfmkit.studies.sensitivity.parameters import parameters_of
 from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, assumed, tolerances

@@ -9,9 +9,9 @@ It grows with g: the largest g within the tolerance has the shortest springs. g 
 
 from math import hypot, sqrt
 
-from cfmkit.families.base import Run
 from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.no_mechanism import Infeasible, refusals_answered
+from cfmkit.families.run_control import Run
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit_oblique.model import finding

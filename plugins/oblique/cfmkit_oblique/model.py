@@ -21,8 +21,8 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray
 from cfmkit.curves import Column, Curve
-from cfmkit.families.base import Run
 from cfmkit.families.findings import finder, mm, newton, rate
+from cfmkit.families.run_control import Run
 from cfmkit.results import Finding, Result, Status, quantities
 from cfmkit_oblique.spec import Mechanism, ObliqueSpec
 

@@ -28,9 +28,9 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.run_control import Run
     from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 

@@ -31,8 +31,8 @@ from cfmkit.families.beam.shaping.variables import Variables
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.families.run_control import Run
 
 
 _REFINED = 3  # of the widest: one in a finer order takes as long as a widening, and others gain little

@@ -13,12 +13,12 @@ import numpy as np
 
 from cfmkit.designing.reported_values_of_finished_design import measured
 from cfmkit.elastica.model.beam import fit
-from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.shaping.search import PLACES, Found
 from cfmkit.families.beam.shaping.shape_soundness_and_scatter import Audit, audited
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.run_control import Run
 from cfmkit.results import Quantity, Searched
 from cfmkit.specs.units import format_short
 

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
     from cfmkit.families.cam.dynamics.lagrange_multiplier_check import Scheme
     from cfmkit.families.cam.dynamics.roller_curves_and_motion import Cycloid, Machine
     from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
 
 

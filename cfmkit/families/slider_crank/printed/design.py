@@ -45,7 +45,7 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.printed.spec import StripDesign
     from cfmkit.families.slider_crank.spec import SliderCrankSpec

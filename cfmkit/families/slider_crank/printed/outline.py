@@ -209,7 +209,7 @@ def _frame(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, ...]:
 def _swept(spec: SliderCrankSpec, drawn: Drawing, slider: FloatArray) -> Any:
     """Return all that the leg and the pad at the slider cover at rest and over the travel."""
     from cfmkit.export.ground_frame import swept
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.model import analyze
 
     table = drawn.tables[0].columns

@@ -31,7 +31,6 @@ from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
-from cfmkit.numerics.hermite_cubics import monotone_cubics
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.material_and_part_spec import PaddedPart
@@ -41,8 +40,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.input_deck import DrivenNetwork
-    from cfmkit.families.base import Run
     from cfmkit.families.fem_results import FilletRow
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
@@ -84,7 +83,9 @@ class SolidSolution(ShortRepr):
     @cached_property
     def stress(self) -> FloatArray:
         """Largest along a free edge [Pa]; between poses by cubics that stay between their values."""
-        found = monotone_cubics(self.fine.course.travel, self.fine.peaks[0])(self.travel)
+        from scipy.interpolate import PchipInterpolator
+
+        found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
         return read_only(np.maximum(found, 0.0))
 
     @property

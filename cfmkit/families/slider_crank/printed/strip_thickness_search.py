@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.run_many_starts import NEVER, Clock, OneStart, Stage, done, restored
-from cfmkit.families.base import Run
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import no_design
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.sqp_program import SMALL, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize

@@ -49,7 +49,7 @@ from cfmkit.specs.units import Place, format_short
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
+    from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask

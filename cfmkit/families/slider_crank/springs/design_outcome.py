@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.designing.reported_values_of_finished_design import measured, searched
-from cfmkit.families.base import Run
 from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.rate_fit_task import FREE

@@ -1,0 +1,120 @@
+"""How a function of a family is to be run: seed, progress, time, who does independent jobs, what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from cfmkit.designing.run_many_starts import Notes
+
+
+class Executor(Protocol):
+    """How independent jobs get done: see `cfmkit.studies.serial_and_cluster_executors` and `cfmkit.studies.pool`."""
+
+    def __call__(
+        self, work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
+    ) -> Iterator[tuple[Any, Any]]:
+        """Yield (job, outcome) as they finish; take no more jobs once ``stopping()`` is true."""
+
+
+def _one_by_one(
+    work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
+) -> Iterator[tuple[Any, Any]]:
+    """Do one job after the other in this process: the default for library use."""
+    for job in jobs:
+        if stopping():
+            return
+        yield job, work(job)
+
+
+class _Forgotten:
+    """Keeps nothing: the default for library use."""
+
+    def find(self, _key: str, /) -> int:
+        return -1
+
+    def read(self, place: int, key: str, /) -> Any:
+        raise KeyError(key)
+
+    def add(self, _key: str, _record: Any, /) -> int:
+        return -1
+
+
+def silent(_fraction: float, _text: str) -> None:
+    """Ignore progress: the default for library use."""
+
+
+class Rising:
+    """Passes on the largest fraction so far, with the newest text."""
+
+    def __init__(self, told: Callable[[float, str], None]) -> None:
+        """Tell `told`, from 0 on."""
+        self._told = told
+        self._most = 0.0
+
+    def __call__(self, fraction: float, text: str) -> None:
+        """Report a fraction in [0, 1] and a short text."""
+        self._most = max(self._most, fraction)
+        self._told(self._most, text)
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Passes on the progress of a part of a run as that of the whole: it lies between two shares."""
+
+    whole: Callable[[float, str], None]
+    begun: float
+    ended: float
+
+    def __call__(self, fraction: float, text: str) -> None:
+        """Report a fraction of the part in [0, 1] and a short text."""
+        self.whole(self.begun + (self.ended - self.begun) * fraction, text)
+
+
+def rising(told: Callable[[float, str], None]) -> Callable[[float, str], None]:
+    """Return what passes progress on and never falls; what cannot fall is returned as it is."""
+    return told if told is silent or isinstance(told, Rising | Scaled) else Rising(told)
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a function is to be run.
+
+    Attributes
+    ----------
+    seed : int
+        Of everything random.
+    progress : callable
+        Is told a fraction in [0, 1], which never falls, and a short text.
+    time_budget : float, optional
+        In seconds; None: no limit.
+    executor : Executor
+        Does independent jobs, in this process or in others.
+    notes : Notes
+        Keeps what is finished.
+    wanted : frozenset of str, optional
+        Plain names of the metrics that are looked at, and nothing else is: a model may leave its other values and
+        its findings out, and must keep status, curve and those metrics as they are. None: everything is looked at.
+    """
+
+    seed: int = 0
+    progress: Callable[[float, str], None] = silent
+    time_budget: float | None = None
+    executor: Executor = _one_by_one
+    notes: Notes = field(default_factory=_Forgotten)
+    wanted: frozenset[str] | None = None
+
+    def __post_init__(self) -> None:
+        """Let no search that looks again take its progress back."""
+        object.__setattr__(self, "progress", rising(self.progress))
+
+    def wants(self, names: Iterable[str]) -> bool:
+        """Tell whether any of these metrics is looked at."""
+        return self.wanted is None or not self.wanted.isdisjoint(names)
+
+    def part(self, begun: float, ended: float) -> Run:
+        """Return a run that is part of this one: what it calls done lies between two shares of the whole."""
+        return replace(self, progress=Scaled(self.progress, begun, ended))
