@@ -292,7 +292,8 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
 
     An end inside the part is one of them: the section at a node where beams meet is held over its whole length.
     """
-    from shapely import contains_xy
+    from shapely import contains_xy, distance
+    from shapely import points as points_of
 
     fine = seam[0] + np.linspace(0.0, 1.0, 2000)[:, None] * (seam[1] - seam[0])
     fine = fine[contains_xy(region, fine)]
@@ -305,8 +306,10 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
             places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)
             found.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
     points = np.concatenate(found)
-    sizes, clearance = field.looked_up(points)
-    return points[clearance > 0.5 * ROOM * sizes]
+    # not to the nearest place where sizes are known: those are so far apart that a seam on the edge of small fillets
+    # had points on that edge, which could then not be meshed
+    clearance = distance(region.boundary, points_of(points))
+    return np.asarray(points[clearance > 0.5 * ROOM * field(points)])
 
 
 @dataclass(frozen=True)

@@ -145,6 +145,13 @@ def test_corners_that_no_fillet_fits_are_told_where_the_stress_is_read():
     assert said.endswith("; 5 others are sharp, too: the stress there has no value")
 
 
+def test_leaves_with_fillets_of_ten_micrometres_are_meshed():
+    """A seam along the face of the shuttle had a point on the edge itself, and the part was refused."""
+    leaf = family("vcfm").driven_parts(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=0.01 mm"))[0]
+    grid = leaf.part.meshed(leaf.size).problem.elements.mesh
+    assert grid.area == pytest.approx(sum(ring.area for ring in leaf.part.rings), rel=1e-9)
+
+
 def test_ends_of_windows_are_poses_of_leaf_and_spring():
     made = spec("ding2022", "analysis.fidelity=solid", "analysis.window=[1.3 mm, 4.3 mm]", "analysis.preloads=[0.5 mm]")
     leaf, spring = family("vcfm").driven_parts(made)
