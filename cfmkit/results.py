@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from cfmkit.arrays import Named, Several, ShortRepr
 from cfmkit.errors import ExitCode
@@ -169,6 +169,15 @@ class ClosedForm(Protocol):
 
     def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress [Pa] at places of any shape; NaN where it is unbounded."""
+        ...
+
+
+@runtime_checkable
+class LargestStress(Protocol):
+    """A model that finds the largest stress in a window by itself: its curve then needs no column of stresses."""
+
+    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
+        """Return the largest stress of a branch between two places [Pa]."""
         ...
 
 

@@ -98,6 +98,8 @@ class Run:
     wanted : frozenset of str, optional
         Plain names of the metrics that are looked at, and nothing else is: a model may leave its other values and
         its findings out, and must keep status, curve and those metrics as they are. None: everything is looked at.
+    columns : bool
+        Whether columns of the curve beside motion and effort are looked at; False: metrics of them alone are.
     """
 
     seed: int = 0
@@ -106,6 +108,7 @@ class Run:
     executor: Executor = _one_by_one
     notes: Notes = field(default_factory=_Forgotten)
     wanted: frozenset[str] | None = None
+    columns: bool = True
 
     def __post_init__(self) -> None:
         """Let no search that looks again take its progress back."""

@@ -5,7 +5,7 @@ Nothing is measured over a window that the curve does not cover, and the user he
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
@@ -48,6 +48,9 @@ class Survey:
     """All metrics of one curve over one window; each is computed when it is needed."""
 
     subject: Cycle
+    _known: dict[tuple[Definition, str | None], tuple[Value, ...]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def branches(self) -> tuple[str, ...]:
@@ -56,6 +59,11 @@ class Survey:
 
     def each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
         """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
+        if (definition, branch) not in self._known:
+            self._known[definition, branch] = self._found(definition, branch)
+        return self._known[definition, branch]
+
+    def _found(self, definition: Definition, branch: str | None) -> tuple[Value, ...]:
         function = definition.function
         if function is None:
             return (Value(None, "it was not computed"),)

@@ -17,6 +17,7 @@ from cfmkit.metrics import ranges_many, spread, winding_branches
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
+from cfmkit.results import LargestStress
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -147,8 +148,12 @@ def _area(branch: Branch, window: Window) -> float:
 
 def stress_max(branch: Branch) -> float:
     """Return the largest stress in the window, in whatever load case it is; of a model, next to the points, too."""
-    beside = [float(one.stress.max()) for one in branch.inside_beside if one.stress is not None]
-    return max([stress_range(branch)[1], *beside])
+    model, beside = branch.frame.closed, [one.stress for one in branch.inside_beside if one.stress is not None]
+    if branch.inside.stress is None and isinstance(model, LargestStress):
+        own = model.largest_stress(branch.name, *branch.ends)
+    else:
+        own = stress_range(branch)[1]
+    return max([own, *(float(one.max()) for one in beside)])
 
 
 def stress_range(branch: Branch) -> tuple[float, float]:

@@ -198,7 +198,7 @@ class Study:
 
     def solve(self, spec: Spec) -> Result:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
-        record, run = family(spec.family), Run(self.seed, wanted=self.wanted)
+        record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
         if not self.design or record.design is None:
             return windows_judged(record.analyze(spec, run))
         design = record.design(spec, run)

@@ -24,6 +24,7 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.outcome.largest_stress_in_window import largest_stress
 from cfmkit.elastica.outcome.smooth_stretches_between_bifurcations import Corner, SmoothStretch
 from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
@@ -264,6 +265,10 @@ class BetweenPoints(ShortRepr):
             t = stretch.smooth(wanted[own])
             largest[own] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
         return np.asarray(largest.reshape(np.shape(places)))
+
+    def largest_stress(self, _branch: str, low: float, high: float, /) -> float:
+        """Return the largest stress in a window of a path without corners [Pa]."""
+        return largest_stress(self.path, self._motion, self.at, self.axial, (low, high))
 
     def at(self, places: FloatArray) -> Path:
         """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""

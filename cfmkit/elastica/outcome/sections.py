@@ -236,7 +236,8 @@ def stress_slopes(
     return 6 * moment / (area * t0) - 2 * found.bending_stress * grow, normal / area - found.axial_stress * grow
 
 
-def along_beam(sampler: Sampler, beam: int) -> Sections:
-    """Return section forces and stresses at the rows of a beam at all points, (n, rows)."""
+def along_beam(sampler: Sampler, beam: int, points: Any = None) -> Sections:
+    """Return section forces and stresses at the rows of a beam at points, (n, rows); default: at all of them."""
     rows = sampler.rows(beam)
-    return sections(sampler, beam, sampler.states[:, rows.index], rows.t, rows.step)
+    states = sampler.states if points is None else sampler.states[points]
+    return sections(sampler, beam, states[:, rows.index], rows.t, rows.step)

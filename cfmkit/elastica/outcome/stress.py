@@ -56,16 +56,20 @@ class StressExtremes:
     row: Any
 
 
-def extremes(sampler: Sampler, beam: int, axial: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the largest stress of a beam [Pa] at every point, and its place as a fraction of the arc length."""
-    found = along_beam(sampler, beam)
+def extremes(sampler: Sampler, beam: int, axial: bool, points: Any = None) -> tuple[FloatArray, FloatArray]:
+    """Return the largest stress of a beam [Pa] at points, and its place as a fraction of the arc length.
+
+    `points`: their numbers (n,), increasing; default: all.
+    """
+    found = along_beam(sampler, beam, points)
+    points = np.arange(len(found.moment)) if points is None else points
     sides = np.array([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] if axial else [(1.0, 0.0), (-1.0, 0.0)]).T
     bends, pulls = (np.broadcast_to(side, (len(found.moment), len(side))) for side in sides)
     humps = _highest(sampler, sampler.rows(beam), _combined(found, bends, pulls))
     side = humps.height.argmax(axis=1)[:, None]
     humps = Humps(*(np.take_along_axis(part, side, axis=1) for part in humps.parts))
     bends, pulls = (np.take_along_axis(a, side, axis=1) for a in (bends, pulls))
-    value, t = _polished(sampler, beam, humps, bends, pulls)
+    value, t = _polished(sampler, beam, humps, (bends, pulls), points)
     return value[:, 0], sampler.place(beam, t)[:, 0]
 
 
@@ -77,7 +81,7 @@ def signed_extremes(sampler: Sampler, beam: int, axial: bool) -> StressExtremes:
     bends, pulls = sense * np.array([1.0, 1.0, -1.0, -1.0]), sense * float(axial)
     bends, pulls = np.broadcast_to(bends, shape), np.broadcast_to(pulls, shape)
     humps = _highest(sampler, sampler.rows(beam), _combined(found, bends, pulls))
-    value, t = _polished(sampler, beam, humps, bends, pulls)
+    value, t = _polished(sampler, beam, humps, (bends, pulls), np.arange(len(bends)))
     place = sampler.place(beam, t)
     return StressExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, t, humps.first)))
 
@@ -157,11 +161,14 @@ def _highest(sampler: Sampler, rows: SampledRows, stress: FloatArray) -> Humps:
 
 
 def _polished(
-    sampler: Sampler, beam: int, humps: Humps, bends: FloatArray, pulls: FloatArray
+    sampler: Sampler, beam: int, humps: Humps, signs: tuple[FloatArray, FloatArray], points: Any
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the stress at the tops of humps, integrated, and the parameters there: arrays (n, q)."""
-    rows, at, first = sampler.rows(beam), humps.at, humps.first
-    points = np.repeat(np.arange(len(bends)), bends.shape[1])
+    """Return the stress at the tops of humps at points (n,), integrated, and the parameters there: arrays (n, q).
+
+    signs: of bending and axial stress, (n, q) each.
+    """
+    rows, at, first, (bends, pulls) = sampler.rows(beam), humps.at, humps.first, signs
+    points = np.repeat(points, bends.shape[1])
     spacing = rows.t[first + 1] - rows.t[first]
     for _ in range(_POLISH):
         value, slope = _exact(sampler, beam, (first, at, points), bends, pulls)

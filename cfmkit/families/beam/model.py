@@ -30,6 +30,7 @@ from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of,
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
+from cfmkit.metrics.metric_definitions import ALL_STRESSES
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
@@ -68,10 +69,11 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
     all_of_it = run.wanted is None
-    curves: tuple[Curve, ...] = (_curve(solution) if all_of_it else _effort_and_stress(solution),)
     values = values_of(solution, run) if run.wants(DEFINITIONS) else {}
-    warnings = findings_of(solution) if all_of_it else ()
-    if (along := ride(solution)) is not None:
+    warnings, along = findings_of(solution) if all_of_it else (), ride(solution)
+    stressed = run.columns or along is not None or not _finds_largest_stress(solution) or run.wants(ALL_STRESSES)
+    curves: tuple[Curve, ...] = (_curve(solution) if all_of_it else _plain_curve(solution, stressed),)
+    if along is not None:
         curves += (curve_of(along),) if len(along.place) > 1 else ()
         values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
         if along.missing and status is Status.COMPLETE:
@@ -89,7 +91,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         allowable_stress=solution.assembly.allowable_stress,
         closed=solution.everywhere,
         winding=solution.winding,
-        ends=_ends(solution),
+        ends=_ends(solution, stressed),
         state=solution,
     )
 
@@ -198,9 +200,15 @@ def _curve(solution: Solution) -> Curve:
     )
 
 
-def _effort_and_stress(solution: Solution) -> Curve:
-    """Return the curve with what metrics look at."""
-    extra = {"max_stress": Column(solution.stress, "stress")}
+def _finds_largest_stress(solution: Solution) -> bool:
+    """Return whether the largest stress in a window is known without the stress at every point."""
+    law = solution.everywhere
+    return law is not None and not len(law.corners)
+
+
+def _plain_curve(solution: Solution, stressed: bool) -> Curve:
+    """Return the curve with what metrics look at: with a column of stresses, or without one."""
+    extra = {"max_stress": Column(solution.stress, "stress")} if stressed else {}
     return Curve(
         solution.motion,
         solution.effort,
@@ -215,12 +223,12 @@ def _kind(solution: Solution) -> Kind:
     return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
 
 
-def _ends(solution: Solution) -> Curve | None:
-    """Return the points at which windows end between those of the curve; None without any."""
+def _ends(solution: Solution, stressed: bool) -> Curve | None:
+    """Return the points at which windows end between those of the curve, with their stress; None without any."""
     if not len(solution.ends):
         return None
     there = replace(solution, keep=solution.ends)
-    stress = {"max_stress": Column(there.stress, "stress")}
+    stress = {"max_stress": Column(there.stress, "stress")} if stressed else {}
     kind: Kind = "torque" if solution.motion_dimension == "angle" else "force"
     names = np.repeat(["load"], len(there.keep))
     return Curve(there.motion, there.effort, names, np.array(there.accurate), stress, kind)

@@ -36,7 +36,8 @@ Fault = tuple[tuple[str | int, ...], str]
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
 _CLOSED = 1e-9  # of the length; the engine cannot fit what is shorter
-_GAUSS = 20  # places of the quadrature on each panel, of a turn below a radian on the average
+# 20 places of the quadrature on each panel, of a turn below a radian on the average
+_PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 
 def faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -125,9 +126,8 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
 def _returns(coefficients: Sequence[float]) -> bool:
     """Tell whether a shape whose angle is a polynomial [rad] ends where it starts."""
     panels = 8 + math.ceil(sum(map(abs, coefficients[1:])))
-    places, weights = np.polynomial.legendre.leggauss(_GAUSS)
-    u = (np.arange(panels)[:, None] + 0.5 * (places + 1)) / panels
-    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * weights).sum() / (2 * panels)
+    u = (np.arange(panels)[:, None] + 0.5 * (_PLACES + 1)) / panels
+    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * _WEIGHTS).sum() / (2 * panels)
     return bool(abs(chord) < _CLOSED)
 
 

@@ -1,0 +1,68 @@
+"""The largest stress in a window, found at few points, is that of all beams at all places.
+
+A made part is judged by metrics alone: its curve then has no column of stresses, and the metrics are the same.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cfmkit import api
+from cfmkit.families import family
+from cfmkit.families.base import Run
+from cfmkit.families.beam.model import solve
+from cfmkit.metrics import evaluate
+from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.point_evaluation import Study
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+LAN = "beam_lan2010.yaml"
+SAMPLES = 400
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        (LAN, ["analysis.points=13"]),
+        (LAN, ["analysis.points=181", "analysis.stress=total"]),
+        ("beam_design_arch.yaml", []),
+        ("beam_design_arch.yaml", ["analysis.points=9"]),
+        ("beam_end_effector.yaml", []),
+        ("beam_cantilever.yaml", []),
+    ],
+)
+def test_nothing_in_a_window_is_stressed_more(name: str, changes: list[str]) -> None:
+    law = solve(api.load(CONFIGS / name, changes)).everywhere
+    assert law is not None
+    assert not len(law.corners)
+    for first, last in [(0.0, 1.0), (0.013, 0.31), (0.4, 0.77), (0.512, 0.513), (0.8, 1.0)]:
+        low, high = (float(law.places[0] + share * np.ptp(law.places)) for share in (first, last))
+        there = law.at(np.linspace(low, high, SAMPLES))
+        sampled = np.max([there.beam_stress(beam, law.axial)[0] for beam in there.layout.network.beams], axis=0)
+        found = law.largest_stress("", low, high)
+        assert found >= sampled.max() * (1 - 1e-12)
+        # between two of so many places it rises by less than from one to the next
+        assert found <= sampled.max() + np.abs(np.diff(sampled)).max()
+
+
+@pytest.mark.parametrize("name", [LAN, "beam_v_bifurcation.yaml", "beam_lee_frame.yaml", "beam_cantilever.yaml"])
+def test_metrics_of_a_part_are_those_of_its_analysis(name: str) -> None:
+    spec = api.load(CONFIGS / name)
+    whole = family("beam").analyze(spec, Run())
+    metrics = metrics_of(spec, ["stress_max", "safety_factor", "half_band", "force_mean"], whole.curve)
+    study = Study(spec, (), metrics, lean=True)
+    result = study.solve(spec)
+    known = evaluate(whole, study.names)
+    for metric, found in zip(study.names, study.quantities(result), strict=True):
+        assert (found.value is None) == (known[metric].value is None)
+        assert found.value is None or found.value == pytest.approx(known[metric].value, rel=1e-9)
+
+
+def test_a_part_that_is_judged_by_its_usable_stroke_has_the_stress_at_every_point() -> None:
+    spec = api.load(CONFIGS / LAN)
+    for name, stressed in [("usable_stroke", True), ("stress_max", False)]:
+        study = Study(spec.replace({"requirements": ()}), (), metrics_of(spec, [name]), lean=True)
+        assert ("max_stress" in study.solve(study.spec).curve.extra) == stressed
