@@ -150,6 +150,10 @@ def metrics_page() -> Answer:
     return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
+NO_SPREAD = "none stated"
+"""Of a property for which the sources of a material state no range."""
+
+
 def materials_page() -> Answer:
     """Return the material library."""
     from cfmkit.stock import MATERIALS
@@ -166,7 +170,9 @@ def materials_page() -> Answer:
     sources = (
         field("name", "material", wraps=True),
         field("poisson_ratio", "nu"),
+        Field("from ... to", lambda item: _spread(item["scatter"]["poisson_ratio"]), wraps=True),
         Field("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
+        Field("from ... to", lambda item: _spread(item["scatter"]["density"]), wraps=True),
         field("source", wraps=True),
     )
     sections = (("", records, columns), ("sources", records, sources))
@@ -409,13 +415,18 @@ def _references() -> Records:
     return _gathered((name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])})
 
 
+def _spread(ends: Sequence[float] | None) -> str:
+    """Return a range, or that its source states none."""
+    return NO_SPREAD if ends is None else _range(ends, 1.0)
+
+
 def _property(item: Mapping[str, Any]) -> str:
     """Return the numbers of a material in words."""
     scatter, strength = item["scatter"], item["yield_strength"]
     reported = [
         f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_ends(scatter['youngs_modulus'], 1e9)})",
-        f"nu = {item['poisson_ratio']:.4g}",
-        f"density {item['density']:.4g} kg/m^3",
+        f"nu = {item['poisson_ratio']:.4g} ({_spread(scatter['poisson_ratio'])})",
+        f"density {item['density']:.4g} kg/m^3 ({_spread(scatter['density'])})",
     ]
     if strength is not None:
         reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_ends(scatter['yield_strength'], 1e6)})")

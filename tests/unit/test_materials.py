@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 import cfmkit
+from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.runs.specfile import bind
 from cfmkit.specs.yamlio import dump, read_document
@@ -46,6 +47,22 @@ def test_the_scatter_contains_the_nominal_values_and_has_a_width(item: Material)
         low, high = item.scatter.yield_strength
         assert low <= item.yield_strength <= high
         assert low < high
+
+
+@EVERY
+def test_a_stated_spread_contains_its_value_and_has_a_width(item: Material):
+    for value, ends in [(item.poisson_ratio, item.scatter.poisson_ratio), (item.density, item.scatter.density)]:
+        if ends is not None:
+            assert ends[0] <= value <= ends[1]
+            assert ends[0] < ends[1]
+
+
+def test_the_page_says_in_words_where_no_spread_is_stated(capsys: pytest.CaptureFixture[str]):
+    assert main(["show", "materials"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("none stated") == sum(
+        ends is None for item in MATERIALS.values() for ends in (item.scatter.poisson_ratio, item.scatter.density)
+    )
 
 
 @EVERY
