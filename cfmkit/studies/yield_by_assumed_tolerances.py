@@ -16,6 +16,7 @@ from cfmkit.families.base import function_named
 from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
 from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
+from cfmkit.studies.parts_scaled_by_a_factor import SCALED
 from cfmkit.studies.requirement_constraints import (
     metrics_of_part,
     numbers_in,
@@ -28,7 +29,6 @@ from cfmkit.studies.requirement_constraints import (
     stated_places,
 )
 from cfmkit.studies.stated_or_assumed_tolerances import MODULUS, assumed
-from cfmkit.studies.yield_of_drawn_parts import SCALED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

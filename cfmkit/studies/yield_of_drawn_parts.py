@@ -18,8 +18,8 @@ import numpy as np
 
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
+from cfmkit.families.run_control import Run
 from cfmkit.metrics import split_name, windows_judged
-from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
@@ -27,22 +27,19 @@ from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
+from cfmkit.studies.parts_scaled_by_a_factor import EXACTLY, SHARES, goes_with, once_scaled, one_sigma, power
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.evaluation import plan_of
 from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL, clopper_pearson, wilson
 from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, tolerances_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.families.run_control import Run
     from cfmkit.specs.spec import DesignBlock, Spec
     from cfmkit.studies.point_evaluation import Metric
-    from cfmkit.studies.sensitivity.parameters import Parameter
 
 ALIKE = 0.1
 """An error is common where it changes the force by the same share everywhere but for this share of that share."""
@@ -50,8 +47,8 @@ ALIKE = 0.1
 FAINT = 0.05
 """Where the force is below this share of its largest value, a share of it says nothing."""
 
-SCALED = ("force", "torque", "energy")
-"""Dimensions of metrics that go with the force when it is trimmed."""
+TRIED = 3
+"""Parts without common errors that are analysed, to see that the others follow from those with these errors."""
 
 
 @dataclass(frozen=True)
@@ -105,13 +102,16 @@ class JudgedParts:
         What became of the first of those.
     lacking : tuple of int and str
         How many others have no value for a requirement, and why the first has none.
+    values : (n, m) array
+        Of the metrics that `_noted` says; nan where there is none.
     """
 
     met: NDArray[np.bool_]
     trimmed: NDArray[np.bool_]
     failed: NDArray[np.bool_]
-    why: str = ""
-    lacking: tuple[int, str] = (0, "")
+    why: str
+    lacking: tuple[int, str]
+    values: FloatArray
 
     def share(self, met: NDArray[np.bool_] | None = None) -> YieldShare:
         """Return the share of parts that meet every requirement."""
@@ -163,7 +163,11 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         found[indices] = rows.values
     lacking = np.flatnonzero(np.isnan(found[:, 1:]).any(axis=1) & ~failed)
     about = (len(lacking), _why_lacking(made, values[lacking[0]], run) if len(lacking) else "")
-    return JudgedParts(met, _trimmed(spec, nominal, metrics, found, met), failed, why, about)
+    level = _value(nominal, metrics[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = level / found[:, 0] if level is not None else np.full(len(found), np.nan)
+    trimmed = once_scaled(spec, nominal, metrics, found, met, factor)
+    return JudgedParts(met, trimmed, failed, why, about, found)
 
 
 def _why_lacking(made: DesignTolerances, values: FloatArray, run: Run) -> str:
@@ -199,34 +203,32 @@ def _first_branch(curve: Curve) -> str:
     return f"[{curve.branches[0]}]" if any(curve.branches) else ""
 
 
-def _trimmed(
-    spec: Spec, nominal: Result, metrics: Sequence[Metric], found: FloatArray, met: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Return which requirements parts meet once their mean force is that of the design.
+def _without(
+    made: DesignTolerances, shared: tuple[int, ...], values: FloatArray, judged: JudgedParts, nominal: Result, run: Run
+) -> JudgedParts | None:
+    """Return what becomes of parts without some common errors, from what became of them with these.
 
-    Metrics of forces go with the trim and shares of the force stay; a departure from a target follows from the ends of
-    the force. Whatever else follows the force in a way of its own is left as it was.
+    None where force and stress do not go exactly with each of them, or a requirement is on something else.
     """
-    level = _value(nominal, metrics[0])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factor = level / found[:, 0] if level is not None else np.full(len(found), np.nan)
-    column, out = 1, met.copy()
-    for k, one in enumerate(spec.part_requirements):
-        metric, values = metrics[column], found[:, column]
-        column += 1
-        if split_name(one.metric)[0] == "deviation_from_target":
-            ends = found[:, column : column + 2]
-            column += 2
-            if nominal.target:
-                values = np.abs(factor[:, None] * ends / nominal.target - 1.0).max(axis=1)
-        elif metric.dimension in SCALED:
-            values = factor * values
-        else:
-            continue
-        limits = Bounds.of(one, metric.dimension)
-        out[:, k] = [limits.met(value) for value in np.where(np.isfinite(values), values, np.inf).tolist()]
-        out[~np.isfinite(values), k] = False
-    return out
+    spec, metrics = made.spec, _noted(made.spec, nominal)
+    departs = np.array([split_name(one.name)[0] == "deviation_from_target" for one in metrics])
+    powers = np.array([power(one, stresses=True) for one in metrics])
+    followed = (powers != 0) | departs | [split_name(one.name)[0] in SHARES for one in metrics]
+    groups = [members for members in made.joined() if set(members) <= set(shared)]
+    if not followed.all() or len(values) <= TRIED or len(nominal.curve.branches) > 1:
+        return None
+    if not all(goes_with(made, one, nominal, run) for one in groups):
+        return None
+    still = values[:TRIED].copy()
+    still[:, shared] = made.nominal[list(shared)]
+    factor = np.prod([made.nominal[one[0]] / values[:, one[0]] for one in groups], axis=0)
+    solved = judge(made, still, nominal, run)
+    expected = judged.values[:TRIED] * factor[:TRIED, None] ** powers
+    same = np.isclose(solved.values, expected, rtol=100 * EXACTLY, atol=0.0, equal_nan=True) | departs
+    if not same.all() or (solved.failed != judged.failed[:TRIED]).any():
+        return None
+    met = once_scaled(spec, nominal, metrics, judged.values, judged.met, factor, stresses=True)
+    return replace(judged, met=met)
 
 
 def _value(nominal: Result, metric: Metric) -> float | None:
@@ -246,7 +248,7 @@ def common(made: DesignTolerances, nominal: Result, run: Run) -> tuple[int, ...]
 
 def _force_share(made: DesignTolerances, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:
     """Return by which share a standard deviation of some parameters changes the force; None where it cannot be said."""
-    changes = {made.paths[k]: _one_sigma(made.parameters[k]) for k in members}
+    changes = {made.paths[k]: one_sigma(made.parameters[k]) for k in members}
     try:
         moved = family(made.spec.family).analyze(made.spec.replace(changes), run)
     except CfmError:
@@ -262,10 +264,6 @@ def _force_share(made: DesignTolerances, members: tuple[int, ...], nominal: Resu
         loud = np.abs(before.effort) > FAINT * np.nanmax(np.abs(before.effort))
         inside = (before.motion >= low) & (before.motion <= high) & loud & np.isfinite(after.effort)
     return np.asarray(after.effort[inside] / before.effort[inside] - 1.0) if inside.sum() > 1 else None
-
-
-def _one_sigma(one: Parameter) -> float:
-    return one.spread.nominal + one.spread.standard_deviation
 
 
 def _window(result: Result) -> tuple[float, float]:
@@ -398,7 +396,8 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     if shared:
         still = values.copy()
         still[:, shared] = made.nominal[list(shared)]
-        frozen = judge(made, still, design, run.part(0.4, 0.7), "parts without common errors").share()
+        follows = _without(made, shared, values, judged, design, Run(run.seed))
+        frozen = (follows or judge(made, still, design, run.part(0.4, 0.7), "parts without common errors")).share()
     before, why = _before(given, block, run.part(0.7, 1.0))
     each = tuple(judged.share(judged.met[:, [k]]) for k in range(judged.met.shape[1]))
     paths = tuple(made.paths[k] for k in shared)

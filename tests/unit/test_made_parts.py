@@ -11,13 +11,14 @@ import pytest
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
+from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import analysed, designed
 from cfmkit.specs.units import Share
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
-from cfmkit.studies.yield_of_drawn_parts import common, judge, yields_of
+from cfmkit.studies.yield_of_drawn_parts import _without, common, judge, yields_of
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 
@@ -162,3 +163,20 @@ def test_a_look_at_metrics_alone_leaves_out_the_rest_and_changes_none_of_them(na
     looked = Study(spec, (), (metric,), lean=True)
     assert looked.evaluate(()).values == (pytest.approx(known.values[own].value, rel=1e-12),)
     assert full.key(()) != lean.key(())
+
+
+def test_parts_without_an_error_of_the_modulus_follow_from_those_with_it():
+    """Force and stress go with the modulus: a third of all parts had been analysed again to say so."""
+    spec = cfmkit.load("configs/studies/beam_lan2010_yield.yaml")
+    nominal, made = family("beam").analyze(spec, Run()), tolerances_of(spec, spec.design, 0)
+    modulus = made.paths.index("mechanism.material.youngs_modulus")
+    values = made.drawn(12, 5)
+    values[:, modulus] *= np.linspace(0.8, 1.2, 12)
+    judged = judge(made, values, nominal, Run())
+    without = values.copy()
+    without[:, modulus] = made.nominal[modulus]
+    found, solved = _without(made, (modulus,), values, judged, nominal, Run()), judge(made, without, nominal, Run())
+    assert (found.met == solved.met).all()
+    assert (found.met != judged.met).any()
+    # the force does not go with one beam's thickness
+    assert _without(made, (0,), values, judged, nominal, Run()) is None
