@@ -6,7 +6,7 @@ three weights give both.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,22 @@ def largest(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     weights : (..., r) array
         The value, and its derivatives by anything, are the sums of weight times sample.
     """
+    shape = values.shape
+    value, vertex, three, weight = _parabola(places, values)
+    weights = np.zeros((len(three), shape[-1]))
+    weights[np.arange(len(three))[:, None], three] = weight
+    return value.reshape(shape[:-1]), vertex.reshape(shape[:-1]), weights.reshape(shape)
+
+
+def largest_of_three(places: FloatArray, values: FloatArray) -> tuple[FloatArray, Any, FloatArray]:
+    """Return the same values, and the weights of three samples only: value (...), which (..., 3), weights (..., 3)."""
+    before = values.shape[:-1]
+    value, _, three, weight = _parabola(places, values)
+    return value.reshape(before), three.reshape(*before, 3), weight.reshape(*before, 3)
+
+
+def _parabola(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, Any, FloatArray]:
+    """Return value, vertex, the three samples and their weights, of all the rows of the values one after the other."""
     shape, count = values.shape, values.shape[-1]
     flat = values.reshape(-1, count)
     where = np.broadcast_to(places, shape).reshape(-1, count)
@@ -41,9 +57,7 @@ def largest(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     vertex = _vertex(t, f, where[rows, best])
     away = vertex[:, None] - t
     weight = away[:, [1, 2, 0]] * away[:, [2, 0, 1]] / ((t - t[:, [1, 2, 0]]) * (t - t[:, [2, 0, 1]]))
-    weights = np.zeros_like(flat)
-    weights[rows[:, None], three] = weight
-    return (weight * f).sum(axis=1).reshape(shape[:-1]), vertex.reshape(shape[:-1]), weights.reshape(shape)
+    return (weight * f).sum(axis=1), vertex, three, weight
 
 
 def _vertex(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:

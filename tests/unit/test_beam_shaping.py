@@ -89,6 +89,22 @@ def test_derivatives_of_objective_and_all_limits_are_those_of_differences(goal: 
         np.testing.assert_allclose(rows @ way, (above - below) / (2 * step), rtol=2e-4, atol=2e-4)
 
 
+def test_only_rows_that_hold_by_far_go_without_derivatives() -> None:
+    spec = load("configs/beam_design_lan.yaml", ["analysis.fidelity=reissner"])
+    task = replace(task_of(spec, spec.design.optimise), limits=ALL)
+    all_of, near = (Shaping(Variables(task, 2), 6.8e-3, Flattest(), near=most) for most in (np.inf, 0.5))
+    z = all_of.begin(table_3(task))
+    values, whole, some = all_of.values(z)[1], all_of.slopes(z)[1], near.slopes(z)[1]
+    np.testing.assert_array_equal(near.values(z)[1], values)
+    left_out = (whole != some).any(axis=1)
+    assert values[left_out].min() >= 0.5
+    assert left_out.sum() > 50
+    np.testing.assert_allclose(some[~left_out], whole[~left_out], rtol=1e-12)
+    assert not some[left_out].any()
+    none = Shaping(Variables(task, 2), 6.8e-3, Flattest(), near=-10.0).slopes(z)[1]
+    assert none.shape == whole.shape
+
+
 def test_the_widest_window_has_the_derivative_of_the_force_by_its_start() -> None:
     task = lan()
     program = Shaping(Variables(task, 2), 6.8e-3, Widest(13.6e-3, 0.025))

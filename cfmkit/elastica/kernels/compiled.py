@@ -207,10 +207,12 @@ def slopes(
     return _doors["slopes"](_whole(n_free), m.block, design.block, given, scratch.block, objects(flat(room)))[0] == 1
 
 
-def row_slopes(m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+def row_slopes(
+    m: DiscreteNetwork, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, wanted: Any, out: Any
+) -> None:
     """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.design_derivatives.row_slopes`."""
     room = np.zeros(9 * dys.shape[2])
-    _doors["row_slopes"](_whole(n_free), m.block, design.block, objects((ys, drives, dys, out, room)))
+    _doors["row_slopes"](_whole(n_free), m.block, design.block, objects((ys, drives, dys, wanted, out, room)))
 
 
 def held_slopes(

@@ -416,11 +416,11 @@ def held_slopes(m, design, n_free, ys, drives, dys, out, room):
 
 
 @kernel
-def row_slopes(m, design, n_free, y, drive, dy, out, state):
-    """Set the derivatives of the states at the step boundaries of all segments at one point by all variables.
+def row_slopes(m, design, n_free, y, drive, dy, wanted, out, state):
+    """Set the derivatives of the states at the step boundaries of wanted segments at one point by all variables.
 
-    `design` pairs every beam with every variable. out (steps + segments, 7 k): phi, M, X, Y,
-    energy, h, v, each by all variables. state (9 k): room.
+    `design` pairs every beam with every variable. wanted (segments): the rows of others are left as they are.
+    out (steps + segments, 7 k): phi, M, X, Y, energy, h, v, each by all variables. state (9 k): room.
     """
     n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
     row = 0
@@ -432,6 +432,9 @@ def row_slopes(m, design, n_free, y, drive, dy, out, state):
         begin = m.segment_step[m.beam_segment[e]]
         for j in range(m.beam_segment[e], m.beam_segment[e + 1]):
             o, first, last = n + 6 * j, m.segment_step[j], m.segment_step[j + 1]
+            if not wanted[j]:
+                row += last - first + 1
+                continue
             for k in range(count):
                 state[k], state[count + k] = dy[o + 2, k], dy[o + 5, k]
                 state[2 * count + k], state[3 * count + k], state[4 * count + k] = dy[o, k], dy[o + 1, k], 0.0

@@ -48,10 +48,10 @@ def slopes(n_free, m, design, ys, drives, outs, scratch, room):
     return (1 if regular else 0), 0
 
 
-def row_slopes(n_free, m, design, ys, drives, dys, out, room):
-    """Set the derivatives of the states along all beams at points."""
+def row_slopes(n_free, m, design, ys, drives, dys, wanted, out, room):
+    """Set the derivatives of the states along beams at points, in the segments that are wanted there."""
     for p in range(ys.shape[0]):
-        _row_slopes(m, design, n_free, ys[p], drives[p], dys[p], out[p], room)
+        _row_slopes(m, design, n_free, ys[p], drives[p], dys[p], wanted[p], out[p], room)
     return 0, 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cfmkit.elastica.kernels.network_array_types import DesignSlopes, DiscreteNetwork
-from cfmkit.elastica.kernels.passing_arrays_by_address import complexes, floats
+from cfmkit.elastica.kernels.passing_arrays_by_address import complexes, floats, truths
 from cfmkit.elastica.kernels.workspace import HELD_SLOPES, MARCHING, SLOPES, SOLVING
 
 WHOLE, REAL = "integer", "number"
@@ -36,6 +36,7 @@ DOORS: dict[str, tuple[Any, ...]] = {
         floats(2),
         floats(1),
         floats(3),
+        truths(2),
         floats(3),
         floats(1),
     ),

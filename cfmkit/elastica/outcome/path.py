@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -224,6 +224,12 @@ class Path(ShortRepr):
     def sampler(self) -> Sampler:
         """States along all beams (computed when first needed)."""
         return Sampler(self.solver, self.points)
+
+    def sampled(self, rows: int) -> Path:
+        """Return the path with states at so many even places of each segment: no integrals along beams are taken."""
+        found = replace(self)
+        vars(found)["sampler"] = Sampler(self.solver, self.points, rows)
+        return found
 
     @cached_property
     def energy(self) -> FloatArray:

@@ -39,14 +39,18 @@ class SampledRows:
 class Sampler:
     """States along all beams at the points of a path, dimensionless."""
 
-    def __init__(self, solver: Solver, points: Points) -> None:
-        """Integrate along all beams at all points."""
+    def __init__(self, solver: Solver, points: Points, rows: int | None = None) -> None:
+        """Integrate along all beams at all points.
+
+        rows: samples of a segment, if not those that integrals along a beam (`weights`) need.
+        """
         from cfmkit.elastica.kernels import compiled
 
         self.solver, self.layout = solver, solver.layout
-        rows = _ROWS if solver.tolerance > _TIGHT else 2 * _ROWS
         panel = len(_CLOSED) - 1  # integrals take whole panels; steps of coils come in any number
-        mesh = Mesh(solver.mesh.segments, panel * -(-max(rows, solver.mesh.steps) // panel))
+        usual = _ROWS if solver.tolerance > _TIGHT else 2 * _ROWS
+        steps = panel * -(-max(usual, solver.mesh.steps) // panel) if rows is None else max(rows, solver.mesh.steps)
+        mesh = Mesh(solver.mesh.segments, steps)
         self.per_segment = mesh.steps + 1
         self.cut = grid(self.layout, mesh)
         self.model = assemble_model(self.layout, self.cut, table(self.layout, self.cut))

@@ -91,14 +91,16 @@ class PlainSlopes:
         touched = self.coefficients.any(axis=2) | self.sections.any(axis=2) | (self.rotation != 0) | (self.length != 0)
         powers, shares = cut.rows(self.coefficients.shape[2], 0)
         places, rest = powers.T, self._compliances()
-        own = [np.arange(count) if every else np.flatnonzero(touched[:, e]) for e in range(beams)]
-        blocks = []
-        for e, variables in enumerate(own):
-            block = np.empty((len(places), TABLE_COLUMNS, len(variables)))
-            block[:, 0] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
-            np.multiply(shares[:, :, None], rest[variables, e].T, out=block[:, 1:])
-            blocks.append(block.ravel())
+        change = [np.flatnonzero(touched[:, e]) for e in range(beams)]
+        own = [np.arange(count)] * beams if every else change
         first = np.cumsum([0, *map(len, own)])
+        rows = len(places) * TABLE_COLUMNS
+        values = np.zeros(rows * int(first[-1]))
+        for e, variables in enumerate(change):
+            block = values[rows * first[e] : rows * first[e + 1]].reshape(len(places), TABLE_COLUMNS, -1)
+            at = variables if every else slice(None)
+            block[:, 0, at] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
+            block[:, 1:, at] = shares[:, :, None] * rest[variables, e].T
         shifts: Any = self.origin.any(axis=2) | self.arm.any(axis=2)
         model, length = layout.plan, layout.scales.length
         dofs, loads, springs = layout.dof_count, len(model.load_place), len(model.spring_kind)
@@ -106,8 +108,8 @@ class PlainSlopes:
         return DesignSlopes(
             variable=np.concatenate(own),
             first=first,
-            table=np.concatenate(blocks),
-            begin=first[:-1] * (len(places) * TABLE_COLUMNS),
+            table=values,
+            begin=first[:-1] * rows,
             moves=shifts.any(axis=1),
             shifts=shifts,
             touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.sensitivity.array_derivatives import ComplexSteps, PlainSlopes
 
 
+_COMPILED = [2, 3, 0, 1, 5, 6, 4]  # where x, y, turn, moment, h, v, energy are in the rows of the compiled code
+
+
 @dataclass(frozen=True, eq=False)
 class Slopes:
     """Derivatives of the unknowns and the forces at p chosen points of a path by k design variables.
@@ -94,14 +97,23 @@ class Slopes:
     @cached_property
     def rows(self) -> FloatArray:
         """Derivatives of the sampled states, (p, rows, 7, k): x, y, turn, moment, h, v, energy; dimensionless."""
+        segments = len(self.path.sampler.cut.segment_step) - 1
+        return self.rows_of(np.ones((len(self.points), segments), dtype=np.bool_))[:, :, _COMPILED]
+
+    def rows_of(self, wanted: Any) -> FloatArray:
+        """Return the derivatives of the sampled states in some segments only, in the order of the compiled code.
+
+        wanted (p, segments): a search asks for few. (p, rows, 7, k), component c of `rows` at ``_COMPILED[c]``; zero
+        in other segments.
+        """
         from cfmkit.elastica.kernels import compiled
 
         sampler, solver = self.path.sampler, self.path.solver
         design = self.complex_steps.arrays(sampler.model, sampler.cut, every=True)
-        out = np.empty((len(self.points), sampler.states.shape[1], 7 * len(self.complex_steps)))
+        out = np.zeros((len(self.points), sampler.states.shape[1], 7 * len(self.complex_steps)))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        compiled.row_slopes(sampler.model, design, solver.n_free, ys, drives, self.unknowns, out)
-        return out.reshape(*out.shape[:2], 7, -1)[:, :, [2, 3, 0, 1, 5, 6, 4]]
+        compiled.row_slopes(sampler.model, design, solver.n_free, ys, drives, self.unknowns, wanted, out)
+        return out.reshape(*out.shape[:2], 7, -1)
 
 
 def _values(g: Slopes, dof: int) -> tuple[FloatArray, FloatArray]:
@@ -199,6 +211,29 @@ def sections(g: Slopes, beam: str) -> SectionSlopes:
     bending = 6 * moment / (area * thick[:, None])
     bending -= known.bending_stress[g.points][..., None] * (grows + by[2] / thick[:, None])
     return SectionSlopes(moment, dn, dq, bending, dn / area - known.axial_stress[g.points][..., None] * grows)
+
+
+def axial_stress_at(g: Slopes, found: FloatArray, points: Any, index: Any) -> FloatArray:
+    """Return the derivatives of the axial stress at some rows, each at a point, (n, k) [Pa].
+
+    found: `Slopes.rows_of` segments that these rows are in; points, index (n,): which of the p points, which rows.
+    """
+    layout, sampler = g.path.layout, g.path.sampler
+    angles, areas, turns, growths = [], [], [], []
+    for number, beam in enumerate(layout.network.beams):
+        angle, width, thick, by = _geometry(g, beam, sampler.rows(number))
+        angles.append(angle)
+        areas.append(width * thick)
+        turns.append(by[0])
+        growths.append(by[1] / width + by[2] / thick[:, None])
+    by_h, by_v, by_turn = (found[points, index, _COMPILED[which]] for which in (H, V, TURN))
+    state, force = sampler.states[g.points[points], index], layout.scales.force
+    psi = np.concatenate(angles)[index] + state[:, TURN]
+    c, s = np.cos(psi)[:, None], np.sin(psi)[:, None]
+    h, v = state[:, [H]] * force, state[:, [V]] * force
+    dn = (c * by_h + s * by_v) * force + (v * c - h * s) * (np.concatenate(turns)[index] + by_turn)
+    area = np.concatenate(areas)[index][:, None]
+    return np.asarray((dn - (h * c + v * s) * np.concatenate(growths)[index]) / area)
 
 
 def _geometry(g: Slopes, beam: str, at: Any) -> tuple[FloatArray, float, FloatArray, tuple[Any, Any, Any]]:
@@ -367,6 +402,10 @@ class Gradient(Slopes):
     def sections(self, beam: str) -> SectionSlopes:
         """Return the derivatives of `Path.sections`; arrays (p, n, k)."""
         return sections(self, beam)
+
+    def axial_stress_at(self, found: FloatArray, points: Any, index: Any) -> FloatArray:
+        """Return the derivatives of axial stress at single rows, (n, k); see the function of this name."""
+        return axial_stress_at(self, found, points, index)
 
     def stress_extremes(self, beam: str, axial: bool = True) -> FloatArray:
         """Return the derivatives of the values of `Path.stress_extremes`, (p, 2, 2, k).

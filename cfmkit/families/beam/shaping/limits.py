@@ -8,22 +8,23 @@ between them around the joint, up to the full one; that also asks for an angle b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.objective_and_constraints import LimitRows
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.beam.shaping.response import BeamAtPoses
-from cfmkit.numerics.sampled_extremes import largest, soft_least
+from cfmkit.families.beam.shaping.response import Spots
+from cfmkit.numerics.sampled_extremes import largest, largest_of_three, soft_least
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.designing.objective_and_constraints import LimitRows
     from cfmkit.elastica import Network
-    from cfmkit.families.beam.shaping.response import View
+    from cfmkit.families.beam.shaping.response import SlopesAtSpots, View
 
 
 SIDES = {
@@ -35,7 +36,42 @@ SIDES = {
 }
 
 
-def stress(view: View) -> list[LimitRows]:
+@dataclass(frozen=True)
+class PendingRows:
+    """Rows of one limit whose derivatives are computed later, those of all limits at once.
+
+    Attributes
+    ----------
+    name, values, about
+        As of `LimitRows`.
+    slopes : callable
+        From the derivatives of the state at the spots to those of the rows, (m, k).
+    spots : tuple of Spots
+        Where those of the state are needed.
+    """
+
+    name: str
+    values: FloatArray
+    slopes: Callable[[SlopesAtSpots], FloatArray]
+    about: Callable[[], list[str]]
+    spots: tuple[Spots, ...] = ()
+
+
+def rows_of(view: View) -> list[LimitRows]:
+    """Return the rows of all limits, with derivatives if the view has them: the engine computes those once."""
+    pending = view.kept.get("limits")
+    if pending is None:  # else the derivatives are requested where the values were
+        pending = view.kept["limits"] = [rows for make in LIMITS.values() for rows in make(view)]
+    if not view.sloped:
+        return [LimitRows(one.name, one.values.ravel(), None, one.about) for one in pending]
+    found = view.response.slopes_at(spots for one in pending for spots in one.spots)
+    return [
+        LimitRows(one.name, one.values.ravel(), one.slopes(found).reshape(one.values.size, -1), one.about)
+        for one in pending
+    ]
+
+
+def stress(view: View) -> list[PendingRows]:
     """Signed extremes of the stress of each beam at every pose but rest, against the allowable stress."""
     task = view.response.variables.task
     allowed = task.limits.stress
@@ -45,17 +81,17 @@ def stress(view: View) -> list[LimitRows]:
     return [_extremes(view, "stress", part, slice(1, None), (allowed, allowed), allowed) for part in parts]
 
 
-def envelope(view: View) -> list[LimitRows]:
+def envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines before loading."""
     return _inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
 
 
-def deformed_envelope(view: View) -> list[LimitRows]:
+def deformed_envelope(view: View) -> list[PendingRows]:
     """Extremes of the centre lines at every pose."""
     return _inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
 
 
-def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[LimitRows]:
+def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[PendingRows]:
     size = view.response.variables.task.size
     if box is None:
         return []
@@ -63,30 +99,45 @@ def _inside(view: View, name: str, box: tuple[float, float, float, float] | None
     return [_extremes(view, name, axis, which, most, size) for axis, most in ends.items()]
 
 
-def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> LimitRows:
+def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> PendingRows:
     """Return (most - largest value along each beam) / unit at some poses, of the value and of its negative."""
     lines = view.response.state.lines
-    found = [np.zeros(0)] * len(lines)
-    by: list[FloatArray] = []
-    for number, (beam, line) in enumerate(lines.items()):
-        values = getattr(line, what)[which]
-        top, _, weights = largest(line.place, np.stack([values, -values]))
-        found[number] = (np.array(most)[:, None] - top) / unit
-        if view.sloped:
-            weights[1] *= -1
-            slopes = getattr(view.response.slopes.lines[beam], what)[which]
-            by.append(-np.matmul(weights.transpose(1, 0, 2), slopes).transpose(1, 0, 2) / unit)
-    values = np.concatenate([one.ravel() for one in found])
+    poses = np.arange(len(view.poses.at))[which]
+    top, three, weights = _highest(
+        [one.place for one in lines.values()], [getattr(one, what)[which] for one in lines.values()]
+    )
+    values = (np.array(most)[:, None] - top) / unit
+    near = values < view.near
+    share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[near]
+    rows = np.stack([at.index[which] for at, which in zip(view.response.rows.values(), three, strict=True)])[near]
+    pose = np.broadcast_to(poses, near.shape)[near]
+    spots = Spots(np.repeat(pose, 3), rows.ravel())
+
+    def slopes(found: SlopesAtSpots) -> FloatArray:
+        out = np.zeros((*values.shape, len(view.response.x)))
+        out[near] = (share[:, :, None] * found.of(what, spots).reshape(*rows.shape, out.shape[-1])).sum(axis=1)
+        return out
+
     sides = SIDES[what]
 
     def about() -> list[str]:
         at = view.poses.at[which]
         return [f"{beam}, {side}, at {1e3 * pose:.4g} mm" for beam in lines for side in sides for pose in at]
 
-    return view.rows(name, values, lambda: np.concatenate([one.reshape(-1, one.shape[-1]) for one in by]), about)
+    return PendingRows(name, values, slopes, about, (spots,))
 
 
-def length_ratio(view: View) -> list[LimitRows]:
+def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatArray, Any, FloatArray]:
+    """Return `largest_of_three` of the values (p, r) of all beams and of their negatives, (beams, 2, p, ...)."""
+    both = [np.stack([one, -one]) for one in values]
+    if len({len(place) for place in places}) == 1:  # as a rule: one call for all beams
+        return largest_of_three(np.stack(places)[:, None, None], np.stack(both))
+    found = [largest_of_three(place, one) for place, one in zip(places, both, strict=True)]
+    top, three, weights = (np.stack(one) for one in zip(*found, strict=True))
+    return top, three, weights
+
+
+def length_ratio(view: View) -> list[PendingRows]:
     """Length over chord of the beams whose shape varies."""
     task = view.response.variables.task
     if task.limits.length_ratio is None:
@@ -95,10 +146,10 @@ def length_ratio(view: View) -> list[LimitRows]:
     many = {name: one for name, one in view.lengths.items() if name in task.shaped}
     values = np.array([one.straightness - least for one in many.values()])
     slopes = np.array([one.by_straightness for one in many.values()])
-    return [view.rows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
+    return [PendingRows("max_length_ratio", values, lambda _: slopes, lambda: list(many))]
 
 
-def slenderness(view: View) -> list[LimitRows]:
+def slenderness(view: View) -> list[PendingRows]:
     """Length over the largest thickness of every beam."""
     task = view.response.variables.task
     if task.limits.slenderness is None:
@@ -107,10 +158,10 @@ def slenderness(view: View) -> list[LimitRows]:
     least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
     values = np.array([one.length for one in many.values()]) / least - 1.0
     slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
-    return [view.rows("min_slenderness", values, lambda: slopes, lambda: list(many))]
+    return [PendingRows("min_slenderness", values, lambda _: slopes, lambda: list(many))]
 
 
-def radius(view: View) -> list[LimitRows]:
+def radius(view: View) -> list[PendingRows]:
     """Signed extremes of the curvature of the beams whose shape varies, before loading."""
     variables = view.response.variables
     least = variables.task.limits.radius
@@ -129,29 +180,20 @@ def radius(view: View) -> list[LimitRows]:
             slopes[first : first + variables.order] -= sign * least / one.length * (weights @ powers)
             values = np.atleast_1d(1.0 - least * value / one.length)
             found.append(
-                view.rows("min_radius", values, lambda slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
+                PendingRows("min_radius", values, lambda _, slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
             )
     return found
 
 
-def clearance(view: View) -> list[LimitRows]:
+def clearance(view: View) -> list[PendingRows]:
     """Gap of every pair of beams, and of every beam with itself, before loading and under load."""
     task = view.response.variables.task
     if task.limits.clearance is None:
         return []
-    found = []
-    for pair in pairs(task.network):
-        value, slopes = separations(view, pair)
-
-        def about(pair: Pair = pair) -> list[str]:
-            both = " and ".join(dict.fromkeys(pair.beams))
-            return [f"{both}, at {1e3 * at:.4g} mm" for at in view.poses.at[view.poses.shown]]
-
-        found.append(view.rows("clearance", value, slopes, about))
-    return found
+    return [separations(view, pairs(task.network))]
 
 
-def force(view: View) -> list[LimitRows]:
+def force(view: View) -> list[PendingRows]:
     """Mean force over the window, against a least value and a target."""
     limits, weights = view.response.variables.task.limits, view.poses.mean
     mean = float(weights @ view.response.state.force)
@@ -165,14 +207,14 @@ def force(view: View) -> list[LimitRows]:
     if not rows:
         return []
 
-    def slopes() -> FloatArray:
-        return np.outer([factor for _, factor, _ in rows], weights @ view.response.slopes.force)
+    def slopes(_: SlopesAtSpots) -> FloatArray:
+        return np.outer([factor for _, factor, _ in rows], weights @ view.response.force_slopes)
 
     values = np.array([value for value, _, _ in rows])
-    return [view.rows("force", values, slopes, lambda: [about for _, _, about in rows])]
+    return [PendingRows("force", values, slopes, lambda: [about for _, _, about in rows])]
 
 
-LIMITS: dict[str, Callable[[View], list[LimitRows]]] = {
+LIMITS: dict[str, Callable[[View], list[PendingRows]]] = {
     "stress": stress,
     "envelope": envelope,
     "deformed_envelope": deformed_envelope,
@@ -187,6 +229,7 @@ LIMITS: dict[str, Callable[[View], list[LimitRows]]] = {
 
 SHARPNESS = 25.0
 _PLACES = 16
+_NO_WEIGHT = 1e-10  # of a pair of places in the smooth bound: its derivative is left out
 
 
 @dataclass(frozen=True)
@@ -213,49 +256,75 @@ def _pair(network: Network, first: str, second: str) -> Pair:
     return Pair((first, second), () if first == second else tuple(joints))
 
 
-def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatArray]]:
-    """Return (gap / required gap - 1) of a pair at the poses that are shown (q,), and what makes the derivatives."""
-    state, shown = view.response.state, view.poses.shown
-    a, b = (thinned(state.lines[name]) for name in pair.beams)
-    way, by_way = _way(view, pair)
-    wanted = _wanted(view, pair)
-    opening = view.response.variables.task.limits.opening
+def separations(view: View, couples: list[Pair]) -> PendingRows:
+    """Return (gap / required gap - 1) of all pairs at the poses that are shown, (pairs, q)."""
+    shown, opening = view.poses.shown, view.response.variables.task.limits.opening
+    lines = {name: _Thinned.of(view, name) for name in view.lengths}
+    ways = [_way(view, pair, *(lines[name].place for name in pair.beams)) for pair in couples]
+    way = np.stack([one.length for one in ways])
+    wanted = np.array([_wanted(view, pair) for pair in couples])[:, None, None]
     near = opening * way < wanted
     required = np.where(near, opening * way, wanted)
-    i, j = np.nonzero(_compared(pair, way, len(a.place)))
-    dx, dy = a.x[shown][:, i] - b.x[shown][:, j], a.y[shown][:, i] - b.y[shown][:, j]
+    required[~np.stack([_compared(pair, one.length) for pair, one in zip(couples, ways, strict=True)])] = np.nan
+    first, second = ([lines[pair.beams[side]] for pair in couples] for side in (0, 1))
+    dx = np.stack([one.x for one in first])[..., None] - np.stack([one.x for one in second])[:, :, None]
+    dy = np.stack([one.y for one in first])[..., None] - np.stack([one.y for one in second])[:, :, None]
     distance = np.hypot(dx, dy) + 1e-12
-    ratio = distance / required[i, j]
-    soft, weights = soft_least(ratio, SHARPNESS)
+    ratio = np.nan_to_num(distance / required[:, None], nan=np.inf)
+    soft, weights = soft_least(ratio.reshape(*ratio.shape[:2], -1), SHARPNESS)
+    share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
+    at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
+    pull = share.reshape(ratio.shape)[at] / required[p, i, j]
+    rows = (np.stack([one.row for one in side])[p, k] for side, k in ((first, i), (second, j)))
+    spots = tuple(Spots(shown[q], row) for row in rows)
 
-    def slopes() -> FloatArray:
-        by = {name: thinned(view.response.slopes.lines[name]) for name in pair.beams}
-        share = weights / required[i, j]
-        out = []
-        for q, pose in enumerate(shown):
-            pull = np.stack([share[q] * dx[q] / distance[q], share[q] * dy[q] / distance[q]])
-            total = np.zeros(view.response.x.shape)
-            for sign, name, index in ((1.0, pair.beams[0], i), (-1.0, pair.beams[1], j)):
-                count = by[name].x.shape[1]
-                total += sign * np.bincount(index, pull[0], count) @ by[name].x[pose]
-                total += sign * np.bincount(index, pull[1], count) @ by[name].y[pose]
-            push = np.where(near[i, j], opening * share[q] * ratio[q], 0.0)
-            out.append(total - np.tensordot(push, by_way[:, i, j], axes=(0, 1)))
-        return np.array(out)
+    def slopes(found: SlopesAtSpots) -> FloatArray:
+        push = np.where(near[p, i, j], opening * pull * ratio[at], 0.0)
+        by = -push[:, None] * slopes_of_ways(ways, p, i, j)
+        for axis, apart in (("x", dx), ("y", dy)):
+            along = (apart[at] / distance[at] * pull)[:, None]
+            by += along * (found.of(axis, spots[0]) - found.of(axis, spots[1]))
+        out = np.zeros((*soft.shape, len(view.response.x)))
+        np.add.at(out, (p, q), by)
+        return out
 
-    return soft - 1.0, slopes
+    def about() -> list[str]:
+        names = [" and ".join(dict.fromkeys(pair.beams)) for pair in couples]
+        return [f"{both}, at {1e3 * at:.4g} mm" for both in names for at in view.poses.at[shown]]
 
-
-def thinned(line: BeamAtPoses) -> BeamAtPoses:
-    """Return a line at about 17 of its places: a smooth bound must not depend on how finely the engine cut the beam."""
-    step = max(1, (len(line.place) - 1) // _PLACES)
-    return BeamAtPoses(line.place[::step], line.x[:, ::step], line.y[:, ::step], line.stress[:, ::step])
+    return PendingRows("clearance", soft - 1.0, slopes, about, spots)
 
 
-def _compared(pair: Pair, way: FloatArray, count: int) -> Any:
+@dataclass(frozen=True)
+class _Thinned:
+    """A beam at 17 of its places: a smooth bound must not depend on how fine the mesh is.
+
+    place, row (17,): fraction of the arc length, which of all rows; x, y (q, 17): at the poses that are shown [m].
+    """
+
+    place: FloatArray
+    row: Any
+    x: FloatArray
+    y: FloatArray
+
+    @classmethod
+    def of(cls, view: View, beam: str) -> _Thinned:
+        """Return a beam of a response."""
+        line, row = view.response.state.lines[beam], view.response.rows[beam].index
+        kept, shown = _even(len(line.place)), view.poses.shown
+        return cls(line.place[kept], row[kept], line.x[shown][:, kept], line.y[shown][:, kept])
+
+
+@cache
+def _even(count: int) -> Any:
+    """Return the indices of 17 places of so many, as even as they can be."""
+    return np.unique(np.linspace(0, count - 1, _PLACES + 1).round().astype(np.int64))
+
+
+def _compared(pair: Pair, way: FloatArray) -> Any:
     """Return which places are compared: not a joint with itself, and no neighbours on one beam."""
     if pair.alone:
-        return np.triu(np.ones((count, count), dtype=bool), 2)
+        return np.triu(np.ones(way.shape, dtype=bool), 2)
     return way > 1e-9
 
 
@@ -265,19 +334,41 @@ def _wanted(view: View, pair: Pair) -> float:
     return float((view.response.variables.task.limits.clearance or 0.0) + thickness)
 
 
-def _way(view: View, pair: Pair) -> tuple[FloatArray, FloatArray]:
-    """Return the way between places of the two beams (r, r) [m], infinite where they do not meet; and (k, r, r)."""
-    (first, second), lines = pair.beams, view.response.state.lines
-    one, other = view.lengths[first], view.lengths[second]
-    u, v = thinned(lines[first]).place[:, None], thinned(lines[second]).place[None, :]
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The way between places of two beams along them: length (r, r) [m], infinite where they do not meet.
+
+    It is `shares[0]` of the length of the first beam and `shares[1]` of that of the second (r, r).
+    """
+
+    length: FloatArray
+    shares: tuple[FloatArray, FloatArray]
+    by_lengths: tuple[FloatArray, FloatArray]
+
+
+def slopes_of_ways(ways: list[_Way], pair: Any, i: Any, j: Any) -> FloatArray:
+    """Return the derivatives of the ways of some pairs at places (n,) of both beams, (n, k)."""
+    total = 0.0
+    for side in (0, 1):
+        share = np.stack([one.shares[side] for one in ways])[pair, i, j]
+        total = total + share[:, None] * np.stack([one.by_lengths[side] for one in ways])[pair]
+    return np.asarray(total)
+
+
+def _way(view: View, pair: Pair, u: FloatArray, v: FloatArray) -> _Way:
+    """Return the way between places of the two beams."""
+    one, other = (view.lengths[name] for name in pair.beams)
+    u, v = u[:, None], v[None, :]
+    slopes = one.by_length, other.by_length
     if pair.alone:
-        return abs(u - v) * one.length, abs(u - v) * one.by_length[:, None, None]
+        apart = abs(u - v)
+        return _Way(apart * one.length, (apart, np.zeros_like(apart)), slopes)
     way = np.full((u.size, v.size), np.inf)
-    by_way = np.zeros((len(one.by_length), u.size, v.size))
+    shares = np.zeros(way.shape), np.zeros(way.shape)
     for end, at in pair.joints:
         p, q = abs(u - end), abs(v - at)
         here = p * one.length + q * other.length
-        slope = p * one.by_length[:, None, None] + q * other.by_length[:, None, None]
         shorter = here < way
-        way, by_way = np.where(shorter, here, way), np.where(shorter, slope, by_way)
-    return way, by_way
+        way = np.where(shorter, here, way)
+        shares = np.where(shorter, p, shares[0]), np.where(shorter, q, shares[1])
+    return _Way(way, shares, slopes)

@@ -7,24 +7,25 @@ leaves the band between two poses: that is seen at many more poses, where a desi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.designing.objective_and_constraints import LimitRows
 from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
+from cfmkit.elastica.outcome.sections import MOMENT, X, Y
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.variables import Length, has_vanished_beam, lengths
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterable
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
+    from cfmkit.elastica.sensitivity.output_derivatives import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
 
@@ -74,6 +75,9 @@ def poses_of(task: Task, start: float) -> PosePlan:
     shown = np.array([0, np.searchsorted(at, middle), window[-1]])
     return PosePlan(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
 
+
+_PLACES = 24
+"""Along a beam: a parabola through three of so many misses the top of a whole wave by 1e-4, less than the margin."""
 
 # A design that loses stability in the window is no answer; the audit looks at branches.
 CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
@@ -126,6 +130,26 @@ class NetworkAtPoses:
     lines: dict[str, BeamAtPoses]
 
 
+@dataclass(frozen=True)
+class RowsOfBeam:
+    """How a beam is sampled by the engine, at r places.
+
+    Attributes
+    ----------
+    place : (r,) array
+        Fraction of the arc length.
+    row, index : (r,) array
+        Which of the beam's rows, and of all rows, they are.
+    stress : (r,) array
+        Bending stress on the left side per dimensionless moment [Pa].
+    """
+
+    place: FloatArray
+    row: Any
+    index: Any
+    stress: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Response:
     """The answer for one vector of variables: the state, and on demand its derivatives by the variables (last axis)."""
@@ -145,52 +169,107 @@ class Response:
         return lengths(self.variables, self.x)
 
     @cached_property
-    def state(self) -> NetworkAtPoses:
-        """Force and beams."""
-        states = np.moveaxis(self.path.sampler.states[self.keep], 2, 0)
-        axial = {name: self.path.sections(name).axial_stress[self.keep] for name in self._pulled}
-        return NetworkAtPoses(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states, axial))
-
-    @property
-    def _pulled(self) -> tuple[str, ...]:
-        """The beams whose axial stress counts."""
-        task = self.variables.task
-        return tuple(task.network.beams) if task.total_stress else ()
+    def rows(self) -> dict[str, RowsOfBeam]:
+        """How each beam is sampled; the ends of segments occur twice there, and once here."""
+        sampler, scales = self.path.sampler, self.path.layout.scales
+        found = {}
+        for number, (name, beam) in enumerate(self.variables.task.network.beams.items()):
+            rows = sampler.rows(number)
+            place = sampler.place(number, rows.t)
+            once = np.flatnonzero(np.append(True, np.diff(place) > 0))
+            index = rows.index[once]
+            stress = _stress_of_moment(beam.section, place[once]) * scales.moment
+            found[name] = RowsOfBeam(place[once], once, index, stress)
+        return found
 
     @cached_property
-    def slopes(self) -> NetworkAtPoses:
-        """Derivatives of everything in the state.
+    def state(self) -> NetworkAtPoses:
+        """Force and beams."""
+        states, length = self.path.sampler.states[self.keep], self.path.layout.scales.length
+        lines = {}
+        for name, at in self.rows.items():
+            own = states[:, at.index]
+            pull = None
+            if self.variables.task.total_stress:
+                pull = self.path.sections(name).axial_stress[np.ix_(self.keep, at.row)]
+            x, y = own[..., X] * length, own[..., Y] * length
+            lines[name] = BeamAtPoses(at.place, x, y, own[..., MOMENT] * at.stress, pull)
+        return NetworkAtPoses(self.path.effort[self.keep] * self.variables.task.copies, lines)
+
+    @cached_property
+    def _gradient(self) -> Gradient:
+        try:
+            found = gradient(self.path, self.variables.build, self.x)
+            _ = found.unknowns  # with them the efforts are known, too
+        except (CfmError, np.linalg.LinAlgError):
+            raise NoAnswer from None
+        return found
+
+    @cached_property
+    def force_slopes(self) -> FloatArray:
+        """Derivatives of the force (p, k) [N].
 
         Raises
         ------
         NoAnswer
             Where the engine has none.
         """
-        try:
-            found = gradient(self.path, self.variables.build, self.x)
-            rows, effort = found.rows, found.effort  # in this order: with the rows the efforts are known
-            axial = {name: found.sections(name).axial_stress for name in self._pulled}
-        except (CfmError, np.linalg.LinAlgError):
-            raise NoAnswer from None
-        return NetworkAtPoses(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0), axial))
+        return self._gradient.effort * self.variables.task.copies
 
-    def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, BeamAtPoses]:
-        """Return the beams from dimensionless states (7, p, rows, ...) and axial stresses (p, rows, ...)."""
-        from cfmkit.elastica.outcome.sections import MOMENT, X, Y
+    def slopes_at(self, spots: Iterable[Spots]) -> SlopesAtSpots:
+        """Return the derivatives of the state at some spots: the engine computes them in segments of beams.
 
-        sampler, scales = self.path.sampler, self.path.layout.scales
-        lines = {}
-        for number, name in enumerate(self.variables.task.network.beams):
-            rows = sampler.rows(number)
-            place = sampler.place(number, rows.t)
-            once = np.append(True, np.diff(place) > 0)  # the ends of segments occur twice
-            at = rows.index[once]
-            stress = _stress_of_moment(self.variables.task.network.beams[name].section, place[once]) * scales.moment
-            stress = stress.reshape(-1, *[1] * (states.ndim - 3))
-            x, y, moment = (states[which][:, at] for which in (X, Y, MOMENT))
-            pull = axial[name][:, once] if name in axial else None
-            lines[name] = BeamAtPoses(place[once], x * scales.length, y * scales.length, moment * stress, pull)
-        return lines
+        Raises
+        ------
+        NoAnswer
+            Where the engine has none.
+        """
+        sampler = self.path.sampler
+        wanted = np.zeros((len(self.keep), len(sampler.cut.segment_step) - 1), dtype=np.bool_)
+        for one in spots:
+            wanted[one.pose, one.row // sampler.per_segment] = True
+        return SlopesAtSpots(self, self._gradient, self._gradient.rows_of(wanted))
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Places along beams, each at a pose: indices (n,) of poses, and of all rows of the sampling."""
+
+    pose: Any
+    row: Any
+
+
+@dataclass(frozen=True, eq=False)
+class SlopesAtSpots:
+    """Derivatives of the state by the variables at the spots that they were requested for."""
+
+    response: Response
+    gradient: Gradient
+    found: FloatArray
+
+    def of(self, what: str, spots: Spots) -> FloatArray:
+        """Return the derivatives (n, k) of x, y, stress, or of the stress on the left or right (see `BeamAtPoses`)."""
+        if what in "xy":
+            return np.asarray(self._compiled(what, spots) * self.response.path.layout.scales.length)
+        bending = self._compiled("moment", spots) * self._stress[spots.row][:, None]
+        if what == "stress":
+            return np.asarray(bending)
+        axial = self.gradient.axial_stress_at(self.found, spots.pose, spots.row)
+        return np.asarray(axial + bending if what == "left" else axial - bending)
+
+    def _compiled(self, what: str, spots: Spots) -> Any:
+        return self.found[spots.pose, spots.row, _COMPILED[what]]
+
+    @cached_property
+    def _stress(self) -> FloatArray:
+        """Bending stress on the left side per dimensionless moment at all rows [Pa]."""
+        out = np.zeros(self.found.shape[1])
+        for rows in self.response.rows.values():
+            out[rows.index] = rows.stress
+        return out
+
+
+_COMPILED = {"moment": 1, "x": 2, "y": 3}  # components of `Gradient.rows_of`
 
 
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
@@ -205,7 +284,9 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
         path = trace(network, Displacement(task.driven, task.direction, poses), CONTROL)
     except CfmError:
         return None
-    return Response(variables, x.copy(), path) if path.status is PathStatus.COMPLETE else None
+    if path.status is not PathStatus.COMPLETE:
+        return None
+    return Response(variables, x.copy(), path.sampled(-(-_PLACES // path.solver.mesh.segments)))
 
 
 def _stress_of_moment(section: Section, place: FloatArray) -> FloatArray:
@@ -219,23 +300,22 @@ def _stress_of_moment(section: Section, place: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
+    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without.
+
+    Derivatives are those of rows below `near`. kept: what was computed for either.
+    """
 
     response: Response
     poses: PosePlan
     start: float
     sloped: bool = False
+    near: float = np.inf
+    kept: dict[str, Any] = field(default_factory=dict)
 
     @property
     def lengths(self) -> dict[str, Length]:
         """Lengths of all beams."""
         return self.response.lengths
-
-    def rows(
-        self, name: str, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]
-    ) -> LimitRows:
-        """Return rows of a limit; the derivatives are computed only if they are wanted."""
-        return LimitRows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
 
     def section(self, beam: str) -> Section:
         """Return the section of a beam."""

@@ -48,6 +48,7 @@ _BACK = 0.1  # of the gain is given up where it cannot be
 _TOLERANCE = 1e-5  # of the objective
 _FLAT = 0.05  # a random network with this half band is flat enough to begin with
 _ENOUGH = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
+_NEAR_ROWS = 0.5  # of a limit: of rows that hold by more than this no derivatives are needed
 _FAR = 3.0  # times that band: so far from it, what bends only is not taken on
 _FAR_START = 0.5  # of the start of the requested window: where the window begins that starts are compared over
 _FEW = 9  # poses in that window
@@ -335,7 +336,7 @@ def met(
     """
     cap = max(_FLAT, 1.1 * found.objective)
     variables, x = Variables(task, found.order).raised(found.x, max(order, found.order))
-    program = Shaping(variables, found.start, Flattest(), give, cap)
+    program = Shaping(variables, found.start, Flattest(), give, cap, _NEAR_ROWS)
     for _ in range(_ROUNDS):
         z = program.begin(x)
         if z is None:
@@ -352,7 +353,8 @@ def met(
 def _flattened(task: Task, found: Found, order: int, plan: StartBudget, steps: int, enough: float = -np.inf) -> Found:
     """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, found.order).raised(found.x, order)
-    program = Shaping(variables, found.start, Compared() if task.objective == "paper" else Flattest())
+    goal = Compared() if task.objective == "paper" else Flattest()
+    program = Shaping(variables, found.start, goal, near=_NEAR_ROWS)
     z = program.begin(x)
     if z is None:
         return found
@@ -432,7 +434,7 @@ def _widest(task: Task, found: Found, plan: StartBudget) -> Found:
     """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
     for _ in range(_WIDENINGS):
-        program = Shaping(Variables(task, found.order), found.start, goal)
+        program = Shaping(Variables(task, found.order), found.start, goal, near=_NEAR_ROWS)
         z = program.begin(found.x)
         if z is None or plan.late():
             return found

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint, worst
-from cfmkit.families.beam.shaping.limits import LIMITS
+from cfmkit.families.beam.shaping.limits import rows_of
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
 if TYPE_CHECKING:
@@ -40,6 +40,9 @@ class Shaping(DesignProgram):
         Limits that may give way; the last variable is by how much, and is minimised in place of the goal.
     cap : float, optional
         Largest value of the goal's last own variable.
+    near : float
+        Derivatives of rows of stress, envelopes and clearance that hold by more than this are left out: no step that
+        can be trusted makes them miss. The rows themselves are all there.
     """
 
     variables: Variables
@@ -47,6 +50,7 @@ class Shaping(DesignProgram):
     goal: Goal
     elastic: tuple[str, ...] = ()
     cap: float | None = None
+    near: float = np.inf
     _last: View | None = field(default=None, repr=False)
 
     @property
@@ -71,7 +75,7 @@ class Shaping(DesignProgram):
             found = respond(self.variables, x, poses.at)
             if found is None:
                 return None
-            self._last = View(found, poses, start)
+            self._last = View(found, poses, start, near=self.near)
         return replace(self._last, sloped=sloped)
 
     def begin(self, x: FloatArray) -> FloatArray | None:
@@ -82,7 +86,7 @@ class Shaping(DesignProgram):
         z = np.concatenate([x, self.goal.start(view)])
         if not self.elastic:
             return z
-        return np.append(z, worst(rows for name in self.elastic for rows in LIMITS[name](view)))
+        return np.append(z, worst(rows for rows in self.limits(view) if rows.name in self.elastic))
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
@@ -103,7 +107,7 @@ class Shaping(DesignProgram):
 
     def limits(self, view: View) -> list[LimitRows]:
         """Return the rows of all limits."""
-        return [rows for make in LIMITS.values() for rows in make(view)]
+        return rows_of(view)
 
 
 LEAST_MIDDLE = 1e-3
@@ -200,7 +204,7 @@ class Flattest:
         if not view.sloped:
             return Aim(WEIGHT * float(band), None, np.array([0.0, WEIGHT]), rows, None, by_own)
         levelling = _levelling(view) if np.ndim(_levelling(view)) == 0 else np.asarray(_levelling(view))[:, None]
-        slope = _finer(len(view.poses.window)) @ (view.response.slopes.force[view.poses.window] * levelling) / unit
+        slope = _finer(len(view.poses.window)) @ (view.response.force_slopes[view.poses.window] * levelling) / unit
         by_x = np.concatenate([-slope, slope])
         return Aim(WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, WEIGHT]), rows, by_x, by_own)
 
@@ -266,5 +270,5 @@ class Compared:
         none = np.zeros((0, len(view.response.x)))
         if not view.sloped:
             return Aim(at / from_ - 1, None, own, own, None, np.zeros((0, 0)))
-        by_at, by_from = view.response.slopes.force[view.poses.compared]
+        by_at, by_from = view.response.force_slopes[view.poses.compared]
         return Aim(at / from_ - 1, by_at / from_ - at * by_from / from_**2, own, own, none, np.zeros((0, 0)))

@@ -64,9 +64,10 @@ class Variables:
         """Return the network of a vector of variables, which may be complex."""
         network, places = self.task.network, len(self.task.coordinates)
         nodes = dict(network.nodes)
+        moved: dict[str, dict[str, Any]] = {}
         for value, coordinate in zip(x[:places], self.task.coordinates, strict=True):
-            at = value * self.task.size
-            nodes[coordinate.node] = replace(nodes[coordinate.node], **{"xy"[coordinate.axis]: at})
+            moved.setdefault(coordinate.node, {})["xy"[coordinate.axis]] = value * self.task.size
+        nodes |= {name: replace(nodes[name], **at) for name, at in moved.items()}
         beams = dict(network.beams)
         for beam, row in zip(self.task.shaped, x[places:].reshape(len(self.task.shaped), self.order), strict=True):
             beams[beam] = replace(beams[beam], shape=Polynomial((0.0, *row)), closure="rotscale")
