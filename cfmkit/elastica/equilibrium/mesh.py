@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.elastica.kernels.network_array_types import HALVES, TABLE_COLUMNS, DiscreteNetwork
+from cfmkit.elastica.kernels.network_array_types import HALVES, LINE, SLIDE, TABLE_COLUMNS, TURN, DiscreteNetwork
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
-from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:

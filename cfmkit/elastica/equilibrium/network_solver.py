@@ -11,7 +11,17 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.elastica.kernels import compiled
-from cfmkit.elastica.kernels.status_codes import DRIVE_RATE, REACHED, REQUESTED, SHORTNESS, SOLVED, UNSTABLE
+from cfmkit.elastica.kernels.network_array_types import ANGLE, LENGTH, TIGHTENING
+from cfmkit.elastica.kernels.status_codes import (
+    DRIVE,
+    DRIVE_RATE,
+    LOG_DETERMINANT,
+    REACHED,
+    REQUESTED,
+    SHORTNESS,
+    SOLVED,
+    UNSTABLE,
+)
 from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
@@ -198,7 +208,7 @@ class Solver:
     def unstressed(self) -> FloatArray:
         """Return the unknowns of the network at rest, before any load or displacement."""
         m, y = self.model, np.zeros(self.size)
-        turns = np.exp(1j * m.table[:, :, 0]) * m.table[:, :, 1]
+        turns = np.exp(1j * m.table[:, :, ANGLE]) * m.table[:, :, LENGTH]
         runs = np.add.reduceat(turns.sum(axis=1), m.segment_step[:-1])
         places = m.beam_end[:, 0]
         first = (m.place_origin[places] + m.place_arm[places]) @ np.array([1.0, 1j])
@@ -221,7 +231,7 @@ class Solver:
         """
         m = self.model if model is None else model
         new, state, tangent = y.copy(), np.zeros(6), np.zeros(self.n + 1)
-        state[0], state[5] = drive, 1.0
+        state[DRIVE], state[LOG_DETERMINANT] = drive, 1.0
         border = self.unit if border is None else border
         goal = drive if target is None else target
         code, _ = compiled.solve(m, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
@@ -269,7 +279,7 @@ class Solver:
         if not self.layout.network.springs:
             return self.rest()
         model = assemble_model(self.layout, self.cut, self.table, PRESTRESS)
-        if np.abs(model.spring_value[:, 4]).max() <= _TIGHT:
+        if np.abs(model.spring_value[:, TIGHTENING]).max() <= _TIGHT:
             return self.rest()
         spot, step = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1)), 1.0
         while spot.drive < 1.0:

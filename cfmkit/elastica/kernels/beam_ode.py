@@ -20,13 +20,15 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.network_array_types import TABLE_COLUMNS
+from cfmkit.elastica.kernels.network_array_types import ANGLE, BENDING, LENGTH, RUN, SHEAR, STRETCH, TABLE_COLUMNS
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 from cfmkit.elastica.kernels.wide_strip import strip_drift
 
-COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
+COLUMNS = 5  # of a row of a segment's outcome: a value, then its derivatives by the start's rotation, h, v and M
+BY_ROTATION, BY_H, BY_V, BY_M = range(1, COLUMNS)
+PHI, MOMENT, X, Y = range(0, 4 * COLUMNS, COLUMNS)  # where the rows of a segment's outcome begin
 FORCE, DRIVEN = 20, 22  # of a segment's outcome: h and v at its end, derivatives by the drive; see `flow`
-ANGLE, LENGTH, TURN, PULL, SLIDE, RUN = range(6)  # columns of the table
+WX, WY, WX_RATE, WY_RATE = range(4)  # a line load, and by how much it grows with the drive
 _CLOSING = ROWS - 1
 
 
@@ -73,8 +75,8 @@ def _kick(table, step, i, h, v, a):
     That is how M, x and y change with the rotation, and how x and y change with the force: by h, by both, by v.
     """
     phi, moment, px, py = a[0]
-    s, c = sincos(table[step, i, 0] + phi)
-    length, pull, slide = table[step, i, 1], table[step, i, 3], table[step, i, 4]
+    s, c = sincos(table[step, i, ANGLE] + phi)
+    length, pull, slide = table[step, i, LENGTH], table[step, i, STRETCH], table[step, i, SHEAR]
     normal, shear = h * c + v * s, v * c - h * s
     along, across = length + pull * normal, slide * shear
     x, y = along * c - across * s, along * s + across * c
@@ -102,18 +104,19 @@ def _begin(start):
 def _end(h, v, a, out):
     """Store the outcome of a segment without a line load; its turn as a whole tells the derivative by the rotation."""
     for k in range(4):
-        out[5 * k], out[5 * k + 2], out[5 * k + 3], out[5 * k + 4] = a[0][k], a[1][k], a[2][k], a[3][k]
-        out[5 * k + 1] = v * a[1][k] - h * a[2][k]
-    out[1] += 1.0
-    out[11] -= a[0][3]
-    out[16] += a[0][2]
+        row = COLUMNS * k
+        out[row], out[row + BY_H], out[row + BY_V], out[row + BY_M] = a[0][k], a[1][k], a[2][k], a[3][k]
+        out[row + BY_ROTATION] = v * a[1][k] - h * a[2][k]
+    out[PHI + BY_ROTATION] += 1.0
+    out[X + BY_ROTATION] -= a[0][3]
+    out[Y + BY_ROTATION] += a[0][2]
     out[FORCE], out[FORCE + 1] = h, v
 
 
 @inlined
 def _acts(load):
     """Tell whether there is a line load, or will be one as the drive grows."""
-    return load[0] != 0.0 or load[1] != 0.0 or load[2] != 0.0 or load[3] != 0.0
+    return load[WX] != 0.0 or load[WY] != 0.0 or load[WX_RATE] != 0.0 or load[WY_RATE] != 0.0
 
 
 @kernel
@@ -133,12 +136,12 @@ def flow(table, steps, starts, loads, outs):
     a, b = _begin(one), _begin(other)
     for step in range(steps[2]):
         for i in range(_CLOSING):
-            a = _drift_all(table[steps[0] + step, i, 2], a)
-            b = _drift_all(table[steps[1] + step, i, 2], b)
+            a = _drift_all(table[steps[0] + step, i, BENDING], a)
+            b = _drift_all(table[steps[1] + step, i, BENDING], b)
             a, _, _ = _kick(table, steps[0] + step, i, one[1], one[2], a)
             b, _, _ = _kick(table, steps[1] + step, i, other[1], other[2], b)
-        a = _drift_all(table[steps[0] + step, _CLOSING, 2], a)
-        b = _drift_all(table[steps[1] + step, _CLOSING, 2], b)
+        a = _drift_all(table[steps[0] + step, _CLOSING, BENDING], a)
+        b = _drift_all(table[steps[1] + step, _CLOSING, BENDING], b)
     _end(one[1], one[2], a, outs[0])
     _end(other[1], other[2], b, outs[1])
 
@@ -150,7 +153,7 @@ def _wide_drift(table, step, i, a):
     Where no beam is a wide strip the turn is the moment times that slope.
     """
     if table.shape[2] == TABLE_COLUMNS:
-        w = table[step, i, 2]
+        w = table[step, i, BENDING]
         return _drift_all(w, a), w
     phi, moment, x, y = a[0]
     turn, slope, _ = strip_drift(table, step, i, moment)
@@ -165,20 +168,20 @@ def _loaded(table, first, count, start, load, out):
     h, v, dh, dv = start[1], start[2], 0.0, 0.0
     for step in range(first, first + count):
         for i in range(_CLOSING):
-            run = table[step, i, 5]
+            run = table[step, i, RUN]
             a, w = _wide_drift(table, step, i, a)
-            a, by, (hh, hv, vv) = _kick(table, step, i, h - load[0] * run, v - load[1] * run, a)
+            a, by, (hh, hv, vv) = _kick(table, step, i, h - load[WX] * run, v - load[WY] * run, a)
             turned = _carry(_drift(w, turned), by, 0.0, 0.0, 0.0)
-            p, q = dh - load[2] * run, dv - load[3] * run
+            p, q = dh - load[WX_RATE] * run, dv - load[WY_RATE] * run
             driven = _carry(_drift(w, driven), by, -by[1] * p - by[2] * q, hh * p + hv * q, hv * p + vv * q)
-        run = table[step, _CLOSING, 5]
+        run = table[step, _CLOSING, RUN]
         a, w = _wide_drift(table, step, _CLOSING, a)
         turned, driven = _drift(w, turned), _drift(w, driven)
-        h, v = h - load[0] * run, v - load[1] * run
-        dh, dv = dh - load[2] * run, dv - load[3] * run
+        h, v = h - load[WX] * run, v - load[WY] * run
+        dh, dv = dh - load[WX_RATE] * run, dv - load[WY_RATE] * run
     _end(h, v, a, out)
     for k in range(4):
-        out[5 * k + 1] = turned[k]
+        out[COLUMNS * k + BY_ROTATION] = turned[k]
     out[DRIVEN], out[DRIVEN + 1], out[DRIVEN + 2] = driven[2], driven[3], driven[0]
     out[DRIVEN + 3], out[DRIVEN + 4], out[DRIVEN + 5] = dh, dv, driven[1]
 
@@ -198,8 +201,8 @@ def plain_flow(table, steps, start, load, states):
     for step in range(first, last):
         _set_row(states[every * (step - first)], phi, moment, x, y, begin_h, begin_v, energy)
         for i in range(ROWS):
-            w, run = table[step, i, 2], table[step, i, 5]
-            h, v = begin_h - load[0] * run, begin_v - load[1] * run
+            w, run = table[step, i, BENDING], table[step, i, RUN]
+            h, v = begin_h - load[WX] * run, begin_v - load[WY] * run
             if wide:
                 turn, _, stored = strip_drift(table, step, i, moment)
                 phi += turn
@@ -208,8 +211,8 @@ def plain_flow(table, steps, start, load, states):
                 phi += w * moment
                 energy += 0.5 * w * moment * moment
             if i < _CLOSING:
-                length, pull, slide = table[step, i, 1], table[step, i, 3], table[step, i, 4]
-                c, s = np.cos(table[step, i, 0] + phi), np.sin(table[step, i, 0] + phi)
+                length, pull, slide = table[step, i, LENGTH], table[step, i, STRETCH], table[step, i, SHEAR]
+                c, s = np.cos(table[step, i, ANGLE] + phi), np.sin(table[step, i, ANGLE] + phi)
                 normal, shear = h * c + v * s, v * c - h * s
                 along, across = length + pull * normal, slide * shear
                 dx, dy = along * c - across * s, along * s + across * c

@@ -6,9 +6,19 @@ the inner loops run over them.
 
 from __future__ import annotations
 
-from cfmkit.elastica.kernels.beam_ode import sincos
+from cfmkit.elastica.kernels.beam_ode import WX, WY, sincos
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.network_array_types import HALVES, SHARE, TABLE_COLUMNS
+from cfmkit.elastica.kernels.network_array_types import (
+    ANGLE,
+    BENDING,
+    HALVES,
+    LENGTH,
+    RUN,
+    SHARE,
+    SHEAR,
+    STRETCH,
+    TABLE_COLUMNS,
+)
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS as STEP_ROWS
 from cfmkit.elastica.kernels.wide_strip import bent, by_section, strain_energy
 
@@ -36,17 +46,17 @@ def flow_slopes(table, steps, start, load, changes, at, state, rows):
         o = at + (step - steps[0]) * STEP_ROWS * columns * count
         for i in range(_CLOSING):
             phi += _drifted(table, step, i, moment, (changes, o), state, count)
-            run = table[step, i, 5]
-            place = phi, h - load[0] * run, v - load[1] * run
+            run = table[step, i, RUN]
+            place = phi, h - load[WX] * run, v - load[WY] * run
             moment += _kicked(table, step, i, place, load, (changes, o), state)
             o += columns * count
         phi += _drifted(table, step, _CLOSING, moment, (changes, o), state, count)
-        run = table[step, _CLOSING, 5]
+        run = table[step, _CLOSING, RUN]
         for q in range(count):
             longer = changes[o + 5 * count + q]
-            state[5 * count + q] -= state[7 * count + q] * run + load[0] * longer
-            state[6 * count + q] -= state[8 * count + q] * run + load[1] * longer
-        h, v = h - load[0] * run, v - load[1] * run
+            state[5 * count + q] -= state[7 * count + q] * run + load[WX] * longer
+            state[6 * count + q] -= state[8 * count + q] * run + load[WY] * longer
+        h, v = h - load[WX] * run, v - load[WY] * run
     if keep:
         for q in range(ROWS * count):
             rows[steps[1] - steps[0], q] = state[q]
@@ -58,7 +68,7 @@ def _drifted(table, step, i, moment, changed, state, n):
     changes, o = changed
     if table.shape[2] > TABLE_COLUMNS:
         return _wide_drifted(table, step, i, moment, changed, state, n)
-    turn = table[step, i, 2]
+    turn = table[step, i, BENDING]
     for q in range(n):
         by, dm = changes[o + 2 * n + q], state[n + q]
         state[q] += by * moment + turn * dm
@@ -93,18 +103,19 @@ def _kicked(table, step, i, place, load, changed, state):
     """Carry the derivatives over a kick at a place (phi, h, v); return by how much the moment grows in it."""
     (changes, o), n = changed, state.shape[0] // 9
     phi, h, v = place
-    s, c = sincos(table[step, i, 0] + phi)
-    length, pulls, slides, run = table[step, i, 1], table[step, i, 3], table[step, i, 4], table[step, i, 5]
+    s, c = sincos(table[step, i, ANGLE] + phi)
+    length, run = table[step, i, LENGTH], table[step, i, RUN]
+    pulls, slides = table[step, i, STRETCH], table[step, i, SHEAR]
     normal, shear = h * c + v * s, v * c - h * s
     along, across = length + pulls * normal, slides * shear
     x, y = along * c - across * s, along * s + across * c
-    stiff, loaded = pulls == 0.0 and slides == 0.0, load[0] != 0.0 or load[1] != 0.0
+    stiff, loaded = pulls == 0.0 and slides == 0.0, load[WX] != 0.0 or load[WY] != 0.0
     for q in range(n):
         turn, dh, dv = state[q] + changes[o + q], state[5 * n + q], state[6 * n + q]
         dh, dv = dh - state[7 * n + q] * run, dv - state[8 * n + q] * run
         if loaded:
             longer = changes[o + 5 * n + q]
-            dh, dv = dh - load[0] * longer, dv - load[1] * longer
+            dh, dv = dh - load[WX] * longer, dv - load[WY] * longer
         a, b = changes[o + n + q], 0.0
         if not stiff:
             pull, slide = changes[o + 3 * n + q], changes[o + 4 * n + q]

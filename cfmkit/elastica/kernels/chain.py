@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica.kernels.beam_ode import DRIVEN, FORCE, flow
+from cfmkit.elastica.kernels.beam_ode import BY_H, BY_M, BY_ROTATION, BY_V, DRIVEN, FORCE, MOMENT, PHI, X, Y, flow
 from cfmkit.elastica.kernels.compiler import inlined, kernel
+from cfmkit.elastica.kernels.status_codes import OUTCOMES
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 LARGEST, LIMIT = 3.0, 50.0  # values of a, see `sweep`, that larger ones count as: under thrust, in tension
@@ -57,7 +58,7 @@ def _start_of(m, j, e, y, n, drive):
 @inlined
 def flows(m, y, n, drive, work):
     """Integrate over all segments, two at a time; their outcomes go into the work space."""
-    outs = work[3]
+    outs = work[OUTCOMES]
     count, first, j, e = m.segment_step.shape[0] - 1, m.segment_step, 0, 0
     while j < count:
         while m.beam_segment[e + 1] <= j:
@@ -81,7 +82,7 @@ def sweep(m, e, y, first_slot, ends, rel, store, work):
     a^2 the thrust of a segment times its length over its bending rigidity that is the smallest cos a, or TENSION/cosh a
     in tension. The equations of a straight segment have dM1/dM0 = cos a; a step that is too long for its load has not.
     """
-    outs = work[3]
+    outs = work[OUTCOMES]
     for k in range(6):
         for i in range(3):
             for j in range(3):
@@ -101,17 +102,17 @@ def sweep(m, e, y, first_slot, ends, rel, store, work):
             b = first_slot[0] + 3 * e
             qx, qy, qr = ends[1, 0], ends[1, 1], ends[1, 2]
             ph, pv, pm = y[b], y[b + 1], y[b + 2]
-        rq = (y[at] + out[10] - qx, y[at + 1] + out[15] - qy, out[0] - qr)
-        rp = (h - ph, v - pv, out[5] - pm)
+        rq = (y[at] + out[X] - qx, y[at + 1] + out[Y] - qy, out[PHI] - qr)
+        rp = (h - ph, v - pv, out[MOMENT] - pm)
         pivot = _append(rel, store, j, out, rq, rp)
-        own = out[9]
-        pulled = m.segment_turn[j] * (y[at + 3] * out[10] + y[at + 4] * out[15])
+        own = out[MOMENT + BY_M]
+        pulled = m.segment_turn[j] * (y[at + 3] * out[X] + y[at + 4] * out[Y])
         if pulled < 0.0:
             least = min(least, np.cos(min(np.sqrt(-pulled), LARGEST)))
         elif pulled > 1.0:
             least = min(least, TENSION / np.cosh(min(np.sqrt(pulled), LIMIT)))
         if j > begin and own != 0.0 and pivot / own < 0.0:
-            index += 1 if out[6] / own < 0.0 else -1
+            index += 1 if out[MOMENT + BY_ROTATION] / own < 0.0 else -1
         if pivot == 0.0:
             return index, np.nan
     return index, least
@@ -132,10 +133,10 @@ def _append(rel, store, n, out, rq, rp):
         for j in range(3):
             store[n, E, i, j], store[n, F, i, j] = rel[E, i, j], rel[F, i, j]
             store[n, C_D, i, j], store[n, BEFORE, i, j] = rel[C_D, i, j], rel[E2, i, j]
-    turn = out[6]  # dM1 by the start's rotation: the only entry of dp1/dq0
-    g0, g1 = out[7] + turn * rel[F, 2, 0], out[8] + turn * rel[F, 2, 1]
-    pivot = out[9] + turn * rel[F, 2, 2]
-    floor = LEAST * (abs(out[9]) + abs(turn * rel[F, 2, 2]))
+    turn = out[MOMENT + BY_ROTATION]  # dM1 by the start's rotation: the only entry of dp1/dq0
+    g0, g1 = out[MOMENT + BY_H] + turn * rel[F, 2, 0], out[MOMENT + BY_V] + turn * rel[F, 2, 1]
+    pivot = out[MOMENT + BY_M] + turn * rel[F, 2, 2]
+    floor = LEAST * (abs(out[MOMENT + BY_M]) + abs(turn * rel[F, 2, 2]))
     if abs(pivot) < floor:
         pivot = -floor if pivot < 0.0 else floor
     if pivot == 0.0:
@@ -160,13 +161,13 @@ def _append(rel, store, n, out, rq, rp):
 @kernel
 def _propagate(rel, store, n, out, rq):
     """Replace the relation by that after segment n."""
-    ax, ay, ar = out[11], out[16], out[1]  # dX, dY, dphi by the start's rotation
+    ax, ay, ar = out[X + BY_ROTATION], out[Y + BY_ROTATION], out[PHI + BY_ROTATION]
     store[n, E2, 0, 2], store[n, E2, 1, 2], store[n, E2, 2, 2] = ax, ay, ar
     k0, k1, k2 = store[n, SMALL, 0, 0], store[n, SMALL, 0, 1], store[n, SMALL, 0, 2]
     for i in range(3):  # P = A F + B
-        store[n, G, 0, i] = store[n, F, 0, i] + ax * store[n, F, 2, i] + out[12 + i]
-        store[n, G, 1, i] = store[n, F, 1, i] + ay * store[n, F, 2, i] + out[17 + i]
-        store[n, G, 2, i] = ar * store[n, F, 2, i] + out[2 + i]
+        store[n, G, 0, i] = store[n, F, 0, i] + ax * store[n, F, 2, i] + out[X + BY_H + i]
+        store[n, G, 1, i] = store[n, F, 1, i] + ay * store[n, F, 2, i] + out[Y + BY_H + i]
+        store[n, G, 2, i] = ar * store[n, F, 2, i] + out[PHI + BY_H + i]
     for r in range(3):
         last, own = store[n, G, r, 2], (0.0 if r == 2 else 1.0)
         along = ax if r == 0 else (ay if r == 1 else ar)

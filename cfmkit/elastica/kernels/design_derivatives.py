@@ -16,8 +16,9 @@ from cfmkit.elastica.kernels.beam_ode_design_derivatives import flow_slopes
 from cfmkit.elastica.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, lu_solve
+from cfmkit.elastica.kernels.network_array_types import DIRECTION_X, DIRECTION_Y, LINE, REST, REST_GAP, STIFFNESS, TURN
 from cfmkit.elastica.kernels.newton import all_values, assemble
-from cfmkit.elastica.kernels.springs_and_loads import LINE, TURN, spring_law
+from cfmkit.elastica.kernels.springs_and_loads import spring_law
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 
 
@@ -313,23 +314,24 @@ def _law_slope(kind, value, change, gap, force, dforce):
 
     gap: vector from the first place to the second; force: on the second.
     """
-    k = value[0]
+    k = value[STIFFNESS]
     if kind == TURN:
-        dforce[2] += -change[0] * (gap[2] - value[1]) + k * change[1]
+        dforce[2] += -change[STIFFNESS] * (gap[2] - value[REST]) + k * change[REST]
         return
     dx, dy = gap[0], gap[1]
     if kind == LINE:
         length = np.sqrt(dx * dx + dy * dy)
         if length > 0.0:
-            pull = k * change[1] - change[0] * (length - value[1])
+            pull = k * change[REST] - change[STIFFNESS] * (length - value[REST])
             dforce[0] += pull * dx / length
             dforce[1] += pull * dy / length
         return
-    ex, ey = value[1], value[2]
-    far = dx * ex + dy * ey - value[3]
-    pull = -change[0] * far - k * (dx * change[1] + dy * change[2] - change[3])
-    dforce[0] += pull * ex - k * far * change[1]
-    dforce[1] += pull * ey - k * far * change[2]
+    ex, ey = value[DIRECTION_X], value[DIRECTION_Y]
+    far = dx * ex + dy * ey - value[REST_GAP]
+    by = dx * change[DIRECTION_X] + dy * change[DIRECTION_Y] - change[REST_GAP]
+    pull = -change[STIFFNESS] * far - k * by
+    dforce[0] += pull * ex - k * far * change[DIRECTION_X]
+    dforce[1] += pull * ey - k * far * change[DIRECTION_Y]
 
 
 @kernel
@@ -363,13 +365,13 @@ def spring_slopes(m, design, k, values, dvalues, w, out):
 def _energy_slope(kind, value, change, gap):
     """Return the derivative of a spring's energy by its own values at unchanged places."""
     if kind == TURN:
-        far, by = gap[2] - value[1], -change[1]
+        far, by = gap[2] - value[REST], -change[REST]
     elif kind == LINE:
-        far, by = np.sqrt(gap[0] * gap[0] + gap[1] * gap[1]) - value[1], -change[1]
+        far, by = np.sqrt(gap[0] * gap[0] + gap[1] * gap[1]) - value[REST], -change[REST]
     else:
-        far = gap[0] * value[1] + gap[1] * value[2] - value[3]
-        by = gap[0] * change[1] + gap[1] * change[2] - change[3]
-    return 0.5 * change[0] * far * far + value[0] * far * by
+        far = gap[0] * value[DIRECTION_X] + gap[1] * value[DIRECTION_Y] - value[REST_GAP]
+        by = gap[0] * change[DIRECTION_X] + gap[1] * change[DIRECTION_Y] - change[REST_GAP]
+    return 0.5 * change[STIFFNESS] * far * far + value[STIFFNESS] * far * by
 
 
 @kernel

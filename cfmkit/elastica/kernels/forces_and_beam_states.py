@@ -7,6 +7,7 @@ from cfmkit.elastica.kernels.chain import places_of, pose_of
 from cfmkit.elastica.kernels.compiler import kernel
 from cfmkit.elastica.kernels.newton import all_values, assemble
 from cfmkit.elastica.kernels.springs_and_loads import add_force, add_loads, add_springs, jacobian, wires_of
+from cfmkit.elastica.kernels.status_codes import JACOBIANS, OF_BEAMS, VECTORS
 
 STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's start
 
@@ -19,8 +20,8 @@ def forces(m, n_free, ys, drives, out, scratch):
     """
     h, _, _, residual, values, _, _, _, work, _ = scratch
     n, beams = values.shape[0], m.beam_end.shape[0]
-    room, jacobians = work[0], work[1]
-    pose, jac, force = room[4, 0], jacobians[0], room[4, 1]
+    vectors, jacobians = work[VECTORS], work[JACOBIANS]
+    pose, jac, force = vectors[OF_BEAMS, 0], jacobians[0], vectors[OF_BEAMS, 1]
     places, wires = places_of(m), wires_of(m)
     for p in range(ys.shape[0]):
         y = ys[p]

@@ -12,6 +12,7 @@ from cfmkit.elastica.kernels.status_codes import (
     CHANGE,
     DENIED,
     DONE,
+    DRIVE,
     DRIVE_RATE,
     FULL,
     HIGHEST,
@@ -21,6 +22,7 @@ from cfmkit.elastica.kernels.status_codes import (
     KEPT,
     KEPT_WITH_SLOPES,
     LANDINGS,
+    LEAST_SHORTNESS,
     LONG,
     LONGEST,
     LOWEST,
@@ -38,6 +40,7 @@ from cfmkit.elastica.kernels.status_codes import (
     STEP,
     TOLERANCE,
     UNSTABLE,
+    UNSTABLE_COUNT,
     WATCHED,
     WEIGHT,
 )
@@ -161,9 +164,9 @@ def aim(y, state, border, tangent, paths, natural, goal, ahead):
         guess[size] += tangent[n] * ahead
     copy(y, guess)
     if natural:
-        state[0] = goal
+        state[DRIVE] = goal
         return goal
-    state[0] = guess[size]
+    state[DRIVE] = guess[size]
     level = border[n] * past[0, size] + ahead
     for i in range(n):
         level += border[i] * past[0, i]
@@ -175,9 +178,9 @@ def _store(k, y, state, number, t, iterations, along, outs):
     """Store point k; number: index of its value, -1 for none; t: parameter; along: d(drive)/ds."""
     out_y, out_drive, out_info = outs
     copy(out_y[k], y)
-    out_drive[k] = state[0]
-    out_info[k, UNSTABLE], out_info[k, REQUESTED], out_info[k, REACHED] = state[1], number, t
-    out_info[k, SPENT], out_info[k, DRIVE_RATE], out_info[k, SHORTNESS] = iterations, along, state[2]
+    out_drive[k] = state[DRIVE]
+    out_info[k, UNSTABLE], out_info[k, REQUESTED], out_info[k, REACHED] = state[UNSTABLE_COUNT], number, t
+    out_info[k, SPENT], out_info[k, DRIVE_RATE], out_info[k, SHORTNESS] = iterations, along, state[LEAST_SHORTNESS]
 
 
 @kernel
@@ -213,7 +216,7 @@ def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
     if not (natural or fresh):
         return 0, False
     copy(new, y)
-    state[0] = drive
+    state[DRIVE] = drive
     code, iterations = solve(
         m, n_free, new, state, unit, drive, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
     )
@@ -262,9 +265,9 @@ def _passed(state, index, count, natural, watched, length):
     """
     if length <= SHORTER:
         return False
-    lost = state[1] - index if watched and natural else 0.0
-    unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
-    return (lost > 1.0 and length > APART) or state[1] < min(index, 0.0) or unborne
+    lost = state[UNSTABLE_COUNT] - index if watched and natural else 0.0
+    unborne = state[LEAST_SHORTNESS] < SHORT and (lost > 0.0 or (natural and count == 1))
+    return (lost > 1.0 and length > APART) or state[UNSTABLE_COUNT] < min(index, 0.0) or unborne
 
 
 @kernel
@@ -308,9 +311,9 @@ def _strays(code, known, ahead, options, points, both, state, index, n_free, n):
         return False
     old, new = both
     if options[BY_DRIVE] > 0.5:
-        calm = known and state[1] == index and abs(ahead) > SHORTER * options[SMALLEST]
+        calm = known and state[UNSTABLE_COUNT] == index and abs(ahead) > SHORTER * options[SMALLEST]
         return calm and _veers(points[0], points[1], old, new, ahead, n_free, n)
-    changed, last = abs(state[1] - index), new.shape[0] - 1
+    changed, last = abs(state[UNSTABLE_COUNT] - index), new.shape[0] - 1
     several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
     if several and options[WATCHED] > 0.5 and ahead > LOOKED_INTO * options[LONGEST]:
         return True
@@ -337,7 +340,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     Returns why the march ended and the number of points stored.
     """
     natural, step, smallest = options[BY_DRIVE] > 0.5, options[STEP], options[SMALLEST]
-    greatest, turn = options[LONGEST], options[CHANGE]
+    greatest, turn, most = options[LONGEST], options[CHANGE], KEPT_WITH_SLOPES if natural else KEPT
     n, size = tangent.shape[0] - 1, y.shape[0]
     kept, (new, guess, slope), state, (border, new_tangent, unit, unused), between = room
     times, past, slopes = kept
@@ -346,8 +349,8 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
         return NO_START, 0
-    t, number, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[INERTIA_BEFORE])
-    most = KEPT_WITH_SLOPES if natural else KEPT
+    t, number = (drive if natural else 0.0), 0
+    index = state[UNSTABLE_COUNT] if stored == 1 else options[INERTIA_BEFORE]
     count, slow, denied = remember(kept, 0, t, y, drive, slope, most), 0, 0
     while number < targets.shape[0]:
         if stored + targets.shape[0] - number + 1 >= outs[0].shape[0]:
@@ -372,7 +375,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
             if count > 1 and abs(step) < SECANT * abs(times[0] - times[1]):
                 count = 1
             continue
-        if state[2] < SHORT:
+        if state[LEAST_SHORTNESS] < SHORT:
             return LONG, stored
         slow = _creeps(slow, ahead, moved, new, old, options, n_free, n) if natural and not landing else 0
         if slow > CREEPS:
@@ -385,13 +388,13 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
         t += ahead
         _store(stored, new, state, number if landing else -1, t, iterations, new_tangent[n], outs)
         stored, number, denied = stored + 1, number + (1 if landing else 0), (0 if landing else denied)
-        count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
+        count = remember(kept, count if known or not natural else 0, t, new, state[DRIVE], slope, most)
         known = True
         copy(tangent, new_tangent)
-        if options[WATCHED] > 0.5 and state[1] != index:
+        if options[WATCHED] > 0.5 and state[UNSTABLE_COUNT] != index:
             return INERTIA, stored
-        index = state[1]
-        if state[0] < options[LOWEST] or state[0] > options[HIGHEST]:
+        index = state[UNSTABLE_COUNT]
+        if state[DRIVE] < options[LOWEST] or state[DRIVE] > options[HIGHEST]:
             return OUTSIDE, stored
         if _longer(moved, missed, turn, count, landing, options[TOLERANCE]):
             step = np.sign(step) * min(greatest, 1.6 * abs(step))
@@ -409,7 +412,7 @@ def _between(m, n_free, old, new, state, targets, number, stored, options, outs,
     n_all = targets.shape[0]
     scratch, (y, s, tangent) = spaces
     s[4] = s[5] = 0.0
-    before, after = old[size], state[0]
+    before, after = old[size], state[DRIVE]
     rising = after > before
     first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1
     for i in range(n_all):

@@ -23,7 +23,18 @@ from cfmkit.elastica.kernels.passing_arrays_by_address import Packed, floats, in
 
 IntArray = NDArray[Any]
 
-TABLE_COLUMNS = 6  # see `Model`
+TABLE_COLUMNS = 6
+ANGLE, LENGTH, BENDING, STRETCH, SHEAR, RUN = range(TABLE_COLUMNS)
+"""Columns of the table: reference angle and arc length L of a kick, integral of ds/EI of the drift before it, L/EA and
+L/GA of the kick, arc length from the start of the step to it."""
+
+LINE, TURN, SLIDE = range(3)
+"""Kinds of springs: along the line between two places, against their rotation, along a direction."""
+
+STIFFNESS, REST, TIGHTENING = 0, 1, 4
+DIRECTION_X, DIRECTION_Y, REST_GAP = 1, 2, 3
+"""Values of a spring: stiffness, free length or angle, by how much that or the gap grows with the drive; the direction
+(cos, sin) and the free gap of a slide."""
 
 SHARE, HALVES = 6, (7, 10)
 """Columns that a table with wide strips has beside those: nu^2/(1 - nu^2), and where the halves of a drift begin.
@@ -87,7 +98,7 @@ class DiscreteNetwork(Packed, _ModelArrays):
     load_place, load_value, load_follows :
         (n,) int attachment; (n, 2, 3) (constant, per unit of the drive) x (fx, fy, m); (n,) bool.
     spring_place, spring_kind, spring_value :
-        (n, 2) int attachments; (n,) int; (n, 5) values, see `cfmkit.elastica.kernels.springs_and_loads`.
+        (n, 2) int attachments; (n,) int; (n, 5) values, see `STIFFNESS`.
     """
 
     kinds = _ModelArrays(

@@ -8,6 +8,7 @@ from cfmkit.elastica.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, copy_matrix, lu_solve, positive_count
 from cfmkit.elastica.kernels.follower_stability import diverging
+from cfmkit.elastica.kernels.network_array_types import LENGTH, STRETCH
 from cfmkit.elastica.kernels.springs_and_loads import (
     acts,
     add_block,
@@ -17,7 +18,23 @@ from cfmkit.elastica.kernels.springs_and_loads import (
     jacobian,
     wires_of,
 )
-from cfmkit.elastica.kernels.status_codes import DIVERGED, SINGULAR, SLOW, SOLVED
+from cfmkit.elastica.kernels.status_codes import (
+    COMPLIANCE,
+    DIVERGED,
+    DRIVE,
+    GROWTH,
+    INCREMENT,
+    JACOBIANS,
+    LEAST_SHORTNESS,
+    LOG_DETERMINANT,
+    OF_BEAMS,
+    OF_INCREMENTS,
+    SINGULAR,
+    SLOW,
+    SOLVED,
+    UNSTABLE_COUNT,
+    VECTORS,
+)
 
 EPSILON = np.finfo(np.float64).eps
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
@@ -45,8 +62,8 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     n_beams = m.beam_end.shape[0]
     n_dofs = values.shape[0]
     n = n_free + 3 * n_beams
-    room, jacobians = work[0], work[1]
-    ja, jb, force = jacobians[0], jacobians[1], room[4, 0]
+    vectors, jacobians = work[VECTORS], work[JACOBIANS]
+    ja, jb, force = jacobians[0], jacobians[1], vectors[OF_BEAMS, 0]
     places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
     add_loads(m, values, drive, h, residual, work)
@@ -177,8 +194,8 @@ def rounding(m, y, n_free, n):
         length, stretch = 0.0, 0.0
         for step in range(m.segment_step[j], m.segment_step[j + 1]):
             for row in range(m.table.shape[1]):
-                length += m.table[step, row, 1]
-                stretch += m.table[step, row, 3]
+                length += m.table[step, row, LENGTH]
+                stretch += m.table[step, row, STRETCH]
         bent = 12.0 / (length * length * m.segment_turn[j])
         stiffest = max(stiffest, 1.0 / stretch if stretch > 0.0 else bent)
     for i in range(n_free, y.shape[0]):
@@ -201,20 +218,20 @@ def _log_determinant(factors, advance):
 
 @kernel
 def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
-    """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
+    """Newton's method for equilibrium with border . (z, drive) = target; y and the state's drive are updated.
 
-    limits: (tolerance, most iterations). On return tangent holds d(z, drive) per unit along the border and
-    state[1:4] the number of unstable directions, the shortness measure and the last increment. state[4] carries from
-    one solution to the next how the increment follows from the square of the one before. If state[5] is not zero, it
-    is set to the logarithm of the size of the determinant of d(residual)/dz.
+    limits: (tolerance, most iterations). On return tangent holds d(z, drive) per unit along the border and the state
+    the number of unstable directions, the shortness measure and the last increment. Its GROWTH carries from one
+    solution to the next how the increment follows from the square of the one before. If its LOG_DETERMINANT is not
+    zero, it is set to the logarithm of the size of the determinant of d(residual)/dz.
     Returns a code and the number of iterations.
     """
     h, h2, rhs, residual, values, ends, rel, store, work, dy = scratch
     n = h.shape[0] - 1
     before = 0.0
     for iteration in range(int(limits[1])):
-        index, least = assemble(m, y, state[0], n_free, h, residual, values, ends, rel, store, work)
-        right_sides(m, residual, h, y, state[0], n_free, border, target, rhs)
+        index, least = assemble(m, y, state[DRIVE], n_free, h, residual, values, ends, rel, store, work)
+        right_sides(m, residual, h, y, state[DRIVE], n_free, border, target, rhs)
         copy_matrix(h2, h)
         if not lu_solve(h2, rhs):
             return SINGULAR, iteration
@@ -227,24 +244,24 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
         share = min(1.0, LARGEST_TURN / pose) if pose > 0.0 else 1.0
         for i in range(dy.shape[0]):
             y[i] += share * dy[i]
-        state[0] += share * rhs[n, 0]
+        state[DRIVE] += share * rhs[n, 0]
         size = max(pose, force)
         if before > 1e-6:
-            state[4] = max(0.5 * state[4], size / (before * before))
-        growth = max(30.0, 10.0 * state[4])
+            state[GROWTH] = max(0.5 * state[GROWTH], size / (before * before))
+        growth = max(30.0, 10.0 * state[GROWTH])
         solved = share == 1.0 and (growth * size * size < limits[0] or size < 1e-2 * limits[0])
         if not solved and iteration + 1 == int(limits[1]) and share == 1.0 and growth * pose * pose < limits[0]:
             solved = force <= rounding(m, y, n_free, n)
-            state[4] = 0.0 if solved else state[4]
+            state[GROWTH] = 0.0 if solved else state[GROWTH]
         if solved:
             for i in range(n + 1):
                 tangent[i] = rhs[i, 1]
-            if state[5] != 0.0:
-                state[5] = _log_determinant(h2, tangent[n])
-            state[1] = tangent_index(h, n_free, index, h2)
-            if m.load_follows.shape[0] > 0 and state[1] > 0.0:
-                state[1] = diverging(m, h, int(state[1]), h2, rhs, residual, work[4])
-            state[2], state[3] = least, size
+            if state[LOG_DETERMINANT] != 0.0:
+                state[LOG_DETERMINANT] = _log_determinant(h2, tangent[n])
+            state[UNSTABLE_COUNT] = tangent_index(h, n_free, index, h2)
+            if m.load_follows.shape[0] > 0 and state[UNSTABLE_COUNT] > 0.0:
+                state[UNSTABLE_COUNT] = diverging(m, h, int(state[UNSTABLE_COUNT]), h2, rhs, residual, work[COMPLIANCE])
+            state[LEAST_SHORTNESS], state[INCREMENT] = least, size
             return SOLVED, iteration + 1
         before = size
         if size > 1e6:
@@ -261,9 +278,9 @@ def solve_each(m, n_free, ys, drives, limits, changes, scratch, room):
     """
     _, (before, _, _), state, (_, tangent, unit, _), _ = room
     n = unit.shape[0] - 1
-    state[5] = 0.0
+    state[LOG_DETERMINANT] = 0.0
     for p in range(ys.shape[0]):
-        state[0], state[4] = drives[p], 0.0
+        state[DRIVE], state[GROWTH] = drives[p], 0.0
         for i in range(before.shape[0]):
             before[i] = ys[p, i]
         code, _ = solve(m, n_free, ys[p], state, unit, drives[p], limits, tangent, scratch)
@@ -286,8 +303,8 @@ def solve_each(m, n_free, ys, drives, limits, changes, scratch, room):
 def _unfold_all(m, n_free, errors, ddrive, dy, scratch):
     """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive; see `unfold`."""
     h, _, _, _, values, _, _, store, work, _ = scratch
-    room, jacobians = work[0], work[1]
-    n, dpose, jac, pose = h.shape[0] - 1, room[7, 0], jacobians[0], room[7, 1]
+    vectors, jacobians = work[VECTORS], work[JACOBIANS]
+    n, dpose, jac, pose = h.shape[0] - 1, vectors[OF_INCREMENTS, 0], jacobians[0], vectors[OF_INCREMENTS, 1]
     places = places_of(m)
     for e in range(m.beam_end.shape[0]):
         ia = m.beam_end[e, 0]

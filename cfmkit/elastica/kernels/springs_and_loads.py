@@ -7,11 +7,17 @@ import numpy as np
 from cfmkit.elastica.kernels.chain import places_of, pose_of
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear
-
-LINE, TURN, SLIDE = 0, 1, 2
-"""Kinds: along the line between two places (stiffness, free length), between two rotations (stiffness, free
-angle), along a fixed direction (stiffness, cos, sin, free gap). The last of five values is what is added to the free
-length, angle or gap per unit of the drive."""
+from cfmkit.elastica.kernels.network_array_types import (
+    DIRECTION_X,
+    DIRECTION_Y,
+    REST,
+    REST_GAP,
+    SLIDE,
+    STIFFNESS,
+    TIGHTENING,
+    TURN,
+)
+from cfmkit.elastica.kernels.status_codes import BLOCK, JACOBIANS, OF_LOADS, OF_SPRINGS, VECTORS
 
 
 @kernel
@@ -78,8 +84,8 @@ def add_force(wires, h, residual, i, arm, jac, force):
 @kernel
 def add_loads(m, values, drive, h, residual, work):
     """Add the point loads, dead or turning with their node."""
-    room, jacobians = work[0], work[1]
-    pose, jac, force, column = room[5, 0], jacobians[0], room[5, 1], room[5, 2]
+    vectors, jacobians = work[VECTORS], work[JACOBIANS]
+    pose, jac, force, column = vectors[OF_LOADS, 0], jacobians[0], vectors[OF_LOADS, 1], vectors[OF_LOADS, 2]
     n = h.shape[0] - 1
     places, wires = places_of(m), wires_of(m)
     for k in range(m.load_place.shape[0]):
@@ -116,20 +122,20 @@ def spring_law(kind, value, more, pa, pb, force, block):
     """
     clear(block)
     force[0] = force[1] = force[2] = 0.0
-    k = value[0]
+    k = value[STIFFNESS]
     if kind == TURN:
-        gap = pb[2] - pa[2] - value[1] - more
+        gap = pb[2] - pa[2] - value[REST] - more
         force[2] = -k * gap
         block[2, 2] = -k
         return 0.5 * k * gap * gap
     dx, dy = pb[0] - pa[0], pb[1] - pa[1]
     if kind == SLIDE:
-        ex, ey = value[1], value[2]
-        gap = dx * ex + dy * ey - value[3] - more
+        ex, ey = value[DIRECTION_X], value[DIRECTION_Y]
+        gap = dx * ex + dy * ey - value[REST_GAP] - more
         across = 0.0
     else:
         length = np.sqrt(dx * dx + dy * dy)
-        gap = length - value[1] - more
+        gap = length - value[REST] - more
         if length > 0.0:
             ex, ey, across = dx / length, dy / length, k * gap / length
         else:
@@ -150,13 +156,13 @@ def _tighten(wires, h, places, jacobians, kind, value, poses):
     if kind == TURN:
         turn = 1.0
     elif kind == SLIDE:
-        ex, ey = value[1], value[2]
+        ex, ey = value[DIRECTION_X], value[DIRECTION_Y]
     else:
         dx, dy = poses[1][0] - poses[0][0], poses[1][1] - poses[0][1]
         length = np.sqrt(dx * dx + dy * dy)
         if length > 0.0:
             ex, ey = dx / length, dy / length
-    pull, n = value[0] * value[4], h.shape[0] - 1
+    pull, n = value[STIFFNESS] * value[TIGHTENING], h.shape[0] - 1
     for side in range(2):
         jac, sign = jacobians[side], 1.0 if side == 1 else -1.0
         for a in range(4):
@@ -168,8 +174,9 @@ def _tighten(wires, h, places, jacobians, kind, value, poses):
 @kernel
 def add_springs(m, values, drive, h, residual, work):
     """Add the springs; return their energy."""
-    room, jacobians, block = work[0], work[1], work[2]
-    pa, pb, force, ja, jb = room[6, 0], room[6, 1], room[6, 2], jacobians[0], jacobians[1]
+    vectors, jacobians, block = work[VECTORS], work[JACOBIANS], work[BLOCK]
+    pa, pb, force = vectors[OF_SPRINGS, 0], vectors[OF_SPRINGS, 1], vectors[OF_SPRINGS, 2]
+    ja, jb = jacobians[0], jacobians[1]
     places, wires = places_of(m), wires_of(m)
     energy = 0.0
     for k in range(m.spring_kind.shape[0]):
@@ -178,8 +185,8 @@ def add_springs(m, values, drive, h, residual, work):
         jacobian(m.place_frame, i, arm_a, ja)
         jacobian(m.place_frame, j, arm_b, jb)
         value = m.spring_value[k]
-        energy += spring_law(m.spring_kind[k], value, drive * value[4], pa, pb, force, block)
-        if value[4] != 0.0:
+        energy += spring_law(m.spring_kind[k], value, drive * value[TIGHTENING], pa, pb, force, block)
+        if value[TIGHTENING] != 0.0:
             _tighten(wires, h, m.spring_place[k], (ja, jb), m.spring_kind[k], value, (pa, pb))
         add_force(wires, h, residual, j, arm_b, jb, force)
         for r in range(3):

@@ -88,7 +88,7 @@ def work_space(n: int, beams: int, dofs: int, segments: int) -> WorkSpace:
             np.zeros((beams, 6, 3, 3)),
             np.zeros((segments, 7, 3, 3)),
             (
-                np.zeros((11, 12, 20)),
+                np.zeros((4, 3, 3)),
                 np.zeros((2, 3, 4)),
                 np.zeros((3, 3)),
                 np.zeros((segments, 28)),

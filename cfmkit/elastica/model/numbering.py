@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.kernels.network_array_types import LINE, SLIDE, TURN
 from cfmkit.elastica.model.drive import Drive, Loading, Rotation
 from cfmkit.elastica.model.network import LineLoad, Network, PointLoad, SlideSpring, TorsionSpring, same_direction
 from cfmkit.errors import InputError
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from cfmkit.elastica.kernels.network_array_types import IntArray
     from cfmkit.elastica.model.network import LoadOn, Spring
 
-LINE, TURN, SLIDE = 0, 1, 2  # as in cfmkit.elastica.kernels.springs_and_loads
 GROUND, NOWHERE = -1, -1
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import Mesh, assemble_model, grid, si_rows, table
+from cfmkit.elastica.kernels.network_array_types import ANGLE, LENGTH
 from cfmkit.elastica.kernels.symplectic_splitting_coefficients import ROWS
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class Sampler:
 
     def rest(self, m: Any) -> Any:
         """Return the rows' places before any load, (rows, 2), dimensionless; for stepped models too."""
-        turn, length = m.table[:, :, 0], m.table[:, :, 1]
+        turn, length = m.table[:, :, ANGLE], m.table[:, :, LENGTH]
         runs = np.stack([(f(turn) * length).sum(axis=1) for f in (np.cos, np.sin)], axis=1)
         whole = np.result_type(runs, m.place_origin)
         out = np.empty((len(runs) + len(m.segment_step) - 1, 2), dtype=whole)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.kernels.network_array_types import SLIDE, TURN
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.model.numbering import SLIDE, TURN
 from cfmkit.elastica.vibration.beam_basis import ENDS, panels, quadratic, states_at
 from cfmkit.errors import InputError
 
