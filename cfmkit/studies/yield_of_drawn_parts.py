@@ -192,8 +192,10 @@ def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
     wanted: list[tuple[str, Any]] = [(f"{prefix}_mean{_first_branch(curve)}", over)]
     for one in spec.part_requirements:
         wanted.append((one.metric, one.over))
-        if split_name(one.metric)[0] == "deviation_from_target":
-            wanted += [(f"{prefix}_{end}", one.over) for end in ("max", "min")]
+        name, branch = split_name(one.metric)
+        if name == "deviation_from_target":
+            bracket = f"[{branch}]" if branch else ""
+            wanted += [(f"{prefix}_{end}{bracket}", one.over) for end in ("max", "min")]
     return tuple(
         replace(metrics_of(spec, [name], curve)[0], over=over, label=f"{k}") for k, (name, over) in enumerate(wanted)
     )
