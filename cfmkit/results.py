@@ -33,6 +33,9 @@ OLD_KEY = "old_key"
 PART_NOT_DRAWN = "part_not_drawn"
 """Name of the finding that a design has no part that can be cut as it is."""
 
+THIN_WALL = "thin_wall"
+"""Name of the finding that a part is thinner somewhere than its process makes."""
+
 OVERWRITTEN = "overwritten"
 """Finding that a design replaces a value that was stated."""
 

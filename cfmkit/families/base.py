@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families import it from here
-from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, WINDOW_OUTSIDE
+from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -203,6 +203,7 @@ def article(word: str) -> str:
 SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
     PART_NOT_DRAWN: "the part of a design cannot be cut as it is: nothing is drawn",
+    THIN_WALL: "the part as drawn has walls that are thinner than its process makes",
     OLD_KEY: "a key has been renamed; this version still reads the old name",
     OVERWRITTEN: "the design replaces a stated value with its own",
 }

@@ -5,6 +5,7 @@ Nothing here touches a disk.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,11 @@ from cfmkit.errors import UsageError
 from cfmkit.families import family
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.export.contours import Drawing
     from cfmkit.families.base import Family
+    from cfmkit.results import Finding
     from cfmkit.specs.spec import Spec
 
 DECK = "inp"
@@ -69,7 +71,36 @@ def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Dr
     if record.outline is None:
         raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
-    return engraved(import_module(record.outline).drawing(spec, *given), spec.name)
+    drawn = import_module(record.outline).drawing(spec, *given)
+    drawn = replace(drawn, warnings=(*drawn.warnings, *_thin(drawn, spec)))
+    return engraved(drawn, spec.name)
+
+
+NAMED = 3
+"""Thin walls that one line names."""
+
+
+def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
+    """Yield which walls of a part are thinner than the process makes that is stated for it."""
+    from cfmkit.export.thin_walls import thin_walls
+    from cfmkit.results import THIN_WALL, Finding
+    from cfmkit.specs.units import format_short
+
+    process = getattr(getattr(getattr(spec, "mechanism", None), "part", None), "process", None)
+    if process is None or not (least := process.thinnest) or not (walls := thin_walls(drawn.contours, least)):
+        return
+    first, *others = [
+        f"{format_short(one.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in one.at)})"
+        for one in walls[:NAMED]
+    ]
+    named = "; ".join([first.format(" thick"), *(one.format("") for one in others)])
+    more = len(walls) - NAMED
+    beyond = f", and thin in {more} other place{'s' if more > 1 else ''}" if more > 0 else ""
+    key = "process" if process.least_feature is None else "process.least_feature"
+    yield Finding(
+        THIN_WALL,
+        f"the part is only {named}{beyond}: 'mechanism.part.{key}' makes walls from {format_short(least, 'length')}",
+    )
 
 
 def _on_paper(drawn: Drawing, spec: Spec, formats: Sequence[str]) -> dict[str, bytes]:

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
+from cfmkit.export.thin_walls import facing_lines
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -252,22 +253,11 @@ def _radius_at(ring: Ring, arc: FloatArray) -> FloatArray:
 
 def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray, reach: float) -> FloatArray:
     """Return how far rays from places (m, 2) along normals run through material, (m,) [m]; infinite beyond `reach`."""
-    from shapely import STRtree, linestrings
-
     starts = np.concatenate([ring.points for ring in rings])
     along = np.concatenate([np.roll(ring.points, -1, axis=0) - ring.points for ring in rings])
-    tree = STRtree(linestrings(np.stack([starts, starts + along], 1)))
-    ray, line = tree.query(linestrings(np.stack([places, places + reach * normals], 1)))
-    way, side = starts[line] - places[ray], along[line]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        det = normals[ray, 0] * side[:, 1] - normals[ray, 1] * side[:, 0]
-        depth = (way[:, 0] * side[:, 1] - way[:, 1] * side[:, 0]) / det
-        share = (way[:, 0] * normals[ray, 1] - way[:, 1] * normals[ray, 0]) / det
-        # a wall looks back: lines that the ray meets at less than 45 degrees belong to a corner, not to a wall
-        steep = np.abs(det) > 0.7 * np.hypot(*side.T)
-    met = steep & (share >= 0) & (share <= 1) & (depth > 1e-8 * reach) & (depth <= reach)
+    ray, _, depth = facing_lines(starts, along, places, normals, reach)
     found = np.full(len(places), math.inf)
-    np.minimum.at(found, ray[met], depth[met])
+    np.minimum.at(found, ray, depth)
     return found
 
 

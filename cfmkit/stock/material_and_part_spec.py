@@ -295,6 +295,13 @@ class PartProcess(Model):
             return self.least_radius
         return PROCESSES[self.name].least_radius if self.name else None
 
+    @property
+    def thinnest(self) -> float | None:
+        """Thinnest wall [m]; None where neither a name nor a value says it."""
+        if self.least_feature is not None:
+            return self.least_feature
+        return PROCESSES[self.name].least_feature if self.name else None
+
     def accuracy(self, usual: ProcessAccuracy) -> ProcessAccuracy:
         """Return what the process holds, and what the usual one does where it has no name."""
         known = PROCESSES[self.name] if self.name else usual

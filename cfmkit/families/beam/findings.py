@@ -372,11 +372,13 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
             f"the gap between beams {still.one} and {still.other} is {format_short(still.size, 'length')}: smaller "
             f"than can be cut ({format_short(least, 'length')})",
         )
+    made = (part.process and part.process.thinnest) or 0.0
+    made = max(made, part.min_feature)
     for name, beam in solution.path.layout.network.beams.items():
         thinnest = thinnest_of(beam.section)
-        if thinnest < part.min_feature:
+        if thinnest < made * (1 - NEGLIGIBLE):
             yield finding(
                 "feature_small",
                 f"beam {name} is {format_short(thinnest, 'length')} thick: less than can be made "
-                f"({format_short(part.min_feature, 'length')})",
+                f"({format_short(made, 'length')})",
             )
