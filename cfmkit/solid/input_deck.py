@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import Delaunay
 
+from cfmkit.errors import UsageError
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -49,8 +50,15 @@ def deck(name: str, driven: DrivenPart) -> bytes:
         For its heading.
     driven : DrivenPart
         Its travel is taken in as many even increments as it has stops.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If constant loads act on it.
     """
     part, stops = driven.part, driven.stops
+    if any(place.load.any() for place in part.places):
+        raise UsageError("--format inp: decks have no constant loads; leave out 'mechanism.loads'")
     lines = _lines(name, part, part.meshed(driven.size), stops[-1], len(stops))
     return ("\n".join(lines) + "\n").encode("ascii", "replace")
 

@@ -79,6 +79,8 @@ class HeldOrDriven:
         As of `Group`.
     seams : tuple of (2, 2) arrays
         Lines at which it begins [m].
+    load : (3,) array
+        Constant, as of `Group`.
     """
 
     name: str
@@ -87,6 +89,7 @@ class HeldOrDriven:
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
     seams: tuple[FloatArray, ...] = ()
+    load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -175,7 +178,7 @@ class Part:
         for place in self.places:
             inside = np.flatnonzero(within(nodes, place.shapes, ON) & ~taken)
             if len(inside):
-                found.append(Group(place.name, inside, place.at, place.driven, place.free))
+                found.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
                 taken[inside] = True
             elif not any(one.name == place.name.rstrip("'") for one in found):
                 raise GeometryError(f"no node of the mesh lies where {place.name} is held")

@@ -45,6 +45,8 @@ BEYOND = (2.0, 8.0, 32.0)
 """How far beyond a bifurcation its branch is looked for, in smallest steps."""
 MODE_ROUNDS = 30
 """Of inverse iteration: next to a bifurcation the lowest eigenvalue is hundreds of times smaller than the second."""
+LOAD_STEP, SMALLEST_LOAD_STEP = 0.25, 2.0**-6
+"""First and smallest step in which constant loads are put on, in parts of them."""
 SOFT = 30.0
 """The path has a limit point where it ends while its tangent has grown by so much against the travel's first pose."""
 
@@ -57,6 +59,7 @@ class PathEnd(enum.Enum):
     UNSTABLE = "the part loses its stability, and no stable branch was found"
     LOST = "no equilibrium was found within the smallest step"
     NO_START = "the part has no equilibrium at rest"
+    OVERLOADED = "the part has no stable equilibrium under its constant loads"
     CONTACT = "the part touches itself"
 
 
@@ -131,9 +134,9 @@ def follow(
     enough : callable
         Is given the effort of a pose [N or N m], and tells whether it is the last.
     """
-    start = problem.solve(np.zeros(problem.supports.size), stops[0])
+    start = _start(problem, stops[0])
     if start is None:
-        return PosePath((), PathEnd.NO_START)
+        return PosePath((), PathEnd.OVERLOADED if problem.supports.loaded else PathEnd.NO_START)
     span = stops[-1] - stops[0]
     course, state, step = PosePath((start.kept(),), PathEnd.COMPLETE), start, stops[1] - stops[0]
     smooth: list[Balance] = []  # earlier poses from the last corner on
@@ -173,6 +176,28 @@ def follow(
             if enough(state.effort):
                 return course
     return course
+
+
+def _start(problem: SolidProblem, travel: float) -> Balance | None:
+    """Return the first pose, under the constant loads, which grow from nothing; None where they grow too large.
+
+    They are put on by steps: from afar Newton's method may come to a form that the part snaps into later, if at all.
+    """
+    unknowns = np.zeros(problem.supports.size)
+    if not problem.supports.loaded:
+        return problem.solve(unknowns, travel)
+    found, share, step = None, 0.0, LOAD_STEP
+    while share < 1.0:
+        ahead = min(1.0, share + step)
+        part = problem if ahead == 1.0 else replace(problem, supports=problem.supports.under(ahead))
+        found = part.solve(unknowns, travel)
+        if found is not None and found.unstable == 0:
+            share, unknowns = ahead, found.unknowns
+        elif step > SMALLEST_LOAD_STEP:
+            step *= 0.5
+        else:
+            return None
+    return found
 
 
 def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:

@@ -7,7 +7,7 @@ turn.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,8 @@ class Group:
         Motion per unit of travel: x, y [m], turn [rad].
     free : (3, f) array
         Orthonormal columns: motions that are left to equilibrium.
+    load : (3,) array
+        Constant force x, y [N], which keeps its direction, and moment [N m] on it about its centre.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Group:
     center: FloatArray
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
+    load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 def within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
@@ -118,10 +121,23 @@ class Supports:
         return found
 
     def reactions(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
-        """Return force x, y [N] and moment about its centre [N m] on every group, (groups, 3), that hold it there."""
+        """Return force x, y [N] and moment about its centre [N m] on every group, (groups, 3), that hold it there.
+
+        They come on top of its constant load.
+        """
         levers = self._levers(self.motions(unknowns, travel))
         pairs = zip(self.groups, levers, strict=True)
-        return np.array([lever.T @ forces[group.nodes].ravel() for group, lever in pairs]).reshape(-1, 3)
+        found = [lever.T @ forces[group.nodes].ravel() - group.load for group, lever in pairs]
+        return np.array(found).reshape(-1, 3)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether constant loads act on groups."""
+        return any(group.load.any() for group in self.groups)
+
+    def under(self, share: float) -> Supports:
+        """Return the same under a share of the constant loads."""
+        return replace(self, groups=tuple(replace(group, load=share * group.load) for group in self.groups))
 
     def residual(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
         """Return what is out of balance in each unknown [N or N m]."""

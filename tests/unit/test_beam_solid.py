@@ -84,8 +84,26 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
         ),
         (
             "beam_lan2010",
-            "mechanism.loads is not known to it: nothing but the drive acts on the part; leave",
-            {"mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N"}]},
+            "mechanism.loads is not known to it: constant loads act on nodes, and keep their direction; leave",
+            {"mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N", "follows": True}]},
+        ),
+        (
+            "beam_lan2010",
+            "mechanism.loads is not known to it: constant loads act on nodes, and keep their direction; leave",
+            {"mechanism.loads": [{"kind": "line", "beam": "b1", "wx": "1 N/m"}]},
+        ),
+        (
+            "beam_lan2010",
+            "analysis.loads_first is not known to it: constant loads act from the start; leave",
+            {
+                "mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N"}],
+                "analysis.loads_first": False,
+            },
+        ),
+        (
+            "beam_design_arch",
+            "mechanism.loads is not known to it: its force, with them, does not grow as its width does; leave",
+            {"mechanism.loads": [{"kind": "point", "node": "b", "fx": "1 N"}], "design.verify": "solid"},
         ),
         (
             "beam_lan2010",

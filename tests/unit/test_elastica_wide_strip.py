@@ -139,9 +139,11 @@ def test_the_splitting_converges_fast_with_the_law():
     assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.3)
 
 
-def test_derivatives_are_those_of_differences():
+@pytest.mark.parametrize("tapered", [False, True])
+def test_derivatives_are_those_of_differences(tapered):
     def build(x: Any) -> Network:
-        section = Section(x[0] * 1e9, x[1] * 1e-3, x[2] * 1e-3, poisson_ratio=x[3], wide=True)
+        taper = Taper(np.array([0.0, 0.4, 1.0]), np.array([x[2], 0.7 * x[2], x[2]]) * 1e-3)
+        section = Section(x[0] * 1e9, x[1] * 1e-3, taper if tapered else x[2] * 1e-3, poisson_ratio=x[3], wide=True)
         nodes = {"a": Node(0, 0, CLAMPED), "b": Node(x[4] * 1e-2, 0.02), "c": Node(0.1, 0, CLAMPED)}
         beams = {
             "ab": Beam("a", "b", section, arc(x[5])),

@@ -211,6 +211,13 @@ def on_axis(assembly: Assembly, node: str) -> bool:
     return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
 
 
+def constant_load(assembly: Assembly, node: str) -> FloatArray:
+    """Return the constant point loads on a node (3,): force x, y [N], moment [N m]."""
+    loads = [load for load in assembly.network.loads if isinstance(load, engine.PointLoad) and load.node == node]
+    each = np.array([(load.fx, load.fy, load.moment) for load in loads], dtype=float).reshape(-1, 3)
+    return np.asarray(each.sum(axis=0))
+
+
 def moving_nodes(assembly: Assembly) -> set[str]:
     """Return the nodes that the drive moves: its own, and those of further stages, which have a number behind a dot."""
     first = assembly.spec.mechanism.drive.node

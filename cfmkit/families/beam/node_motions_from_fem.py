@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.network_from_spec import mirror_axis, on_axis
+from cfmkit.families.beam.network_from_spec import constant_load, mirror_axis, on_axis
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,11 +60,12 @@ class SolidNodes:
         ]
         if any(on_axis(self.assembly, other) for other in others):
             return lambda travel: np.full((len(travel), 3), np.nan)
-        return lambda travel: -np.sum([self._about(name, other, travel) for other in others], axis=0)
+        load = constant_load(self.assembly, name)
+        return lambda travel: -np.sum([self._about(name, other, travel) for other in others], axis=0) - load
 
     def _about(self, name: str, other: str, travel: FloatArray) -> FloatArray:
         """Return the reaction at another node with its moment about this one, (n, 3)."""
-        found = self.reaction(other)(travel)
+        found = self.reaction(other)(travel) + constant_load(self.assembly, other)
         here, there = ((self._place(node) + self.motion(node)(travel)[:, :2]).T for node in (name, other))
         arm = there - here
         return np.asarray(found + np.outer(arm[0] * found[:, 1] - arm[1] * found[:, 0], [0.0, 0.0, 1.0]))

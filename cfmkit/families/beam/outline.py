@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.elastica import PointLoad
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.export.contours import (
     TOLERANCE,
@@ -35,7 +36,7 @@ from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_d
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
@@ -86,7 +87,7 @@ class HeldPlace:
 
 
 def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ...]:
-    """Return where the part of `drawing` is held and driven: pads from the root plane on, the holes of eyes.
+    """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes.
 
     Parameters
     ----------
@@ -99,17 +100,20 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
     beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
-    return tuple(_held_places(assembly, beams, tolerance))
+    loaded = {load.node for load in network.loads if isinstance(load, PointLoad)}
+    return tuple(_held_places(assembly, beams, tolerance, loaded))
 
 
-def _held_places(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> Iterator[HeldPlace]:
+def _held_places(
+    assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float, loaded: Collection[str] = ()
+) -> Iterator[HeldPlace]:
     network, axis = assembly.network, mirror_axis(assembly)
     moving = moving_nodes(assembly)
     bars = _bars(assembly, beams, *axis) if axis is not None else {}
     for node, about in network.nodes.items():
         ends = _ends(assembly, beams, node)
         held = about.support.along or about.support.across or about.support.rotation
-        if not ends or not (held or node in moving):
+        if not ends or not (held or node in moving or node in loaded):
             continue
         region = _region(assembly, node, ends, SHARE * tolerance)
         joined = (bars[node],) if node in bars else ()

@@ -18,11 +18,19 @@ from cfmkit.errors import GeometryError
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.largest_stress_in_each_fillet import fillets
 from cfmkit.families.beam.network_elements.spec import PartSpec
-from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, resolve, thinnest_of
+from cfmkit.families.beam.network_from_spec import (
+    assemble,
+    constant_load,
+    mirror_axis,
+    on_axis,
+    resolve,
+    thinnest_of,
+)
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.beam.strips_and_gaps import mirrored
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
 from cfmkit.families.fem_results import fillet_table, largest_concentration
@@ -265,7 +273,10 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     beam = next(iter(spec.mechanism.beams.values()))
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[material.law](material.modulus, material.poisson)
-    places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
+    places = [
+        HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
+        for one in regions(spec)
+    ]
     fillet = (spec.mechanism.part or PartSpec()).fillet
     rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut))
     thinnest = _thinnest(assembly)
@@ -355,6 +366,15 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
     c, s = np.cos(direction), np.sin(direction)
     ways = ((along, (c, s, 0.0)), (across, (-s, c, 0.0)), (turn, (0.0, 0.0, 1.0)))
     return driven, np.array([way for held, way in ways if not held]).reshape(-1, 3).T
+
+
+def _load(assembly: Assembly, place: HeldPlace) -> FloatArray:
+    """Return the constant load on a region (3,): force [N] and moment [N m]; on the mirror axis of both halves."""
+    own, axis = constant_load(assembly, place.node), mirror_axis(assembly)
+    if axis is None:
+        return own
+    image = np.array([*mirrored(own[None, :2], 0j, axis[1])[0], -own[2]])
+    return own + image if on_axis(assembly, place.node) else own if place.name == place.node else image
 
 
 def _ended(solution: SolidSolution) -> str:
