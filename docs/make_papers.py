@@ -20,12 +20,13 @@ PAGE = Path(__file__).with_name("papers.md")
 HEAD = """\
 # Compared with the papers
 
-Every number that the five papers print in a table, an abstract or a conclusion, and what their text says of each
-figure; numbers of equations and of the text where a result hangs on them. None is left out because it disagrees.
-`cfmkit papers` computes all of it again and ends with 5 where a verdict does not hold; `--all` computes what takes a
-minute, too, and `cfmkit papers lan-2010 -v` shows the command behind each row. This page is made from the same rows
-(`docs/make_papers.py`, from `cfmkit/runs/printed_numbers.yaml`). The texts at hand have no page breaks: a place is a
-section, table, figure or equation. Models and settings of instruments are not listed.
+This page lists every number that the five papers print in a table, an abstract or a conclusion, and every number that
+their text states about a figure. It also lists numbers in equations and in the text if a result depends on them. None
+is left out because it disagrees. `cfmkit papers` recomputes all of them and ends with exit code 5 if a verdict does not
+hold; `--all` also computes those that take a minute, and `cfmkit papers lan-2010 -v` shows the command behind each row.
+The page is made from the same rows (`docs/make_papers.py`, from `cfmkit/runs/printed_numbers.yaml`). The texts that
+were available have no page breaks, so the place is a section, table, figure or equation. Models and settings of
+instruments are not listed.
 
 ```console
 $ cfmkit papers cam -q

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 VERDICTS: Mapping[str, str] = {
-    "agrees": "computed here, the same to its last digit, or to the tolerance that the row gives a reason for",
-    "given": "an input: the example holds it as printed, or the command beside it sets it",
-    "misprint": "wrong as printed: the row says why, and what is right",
-    "disagrees": "computed here with another result; the row says what is known of the reason",
+    "agrees": "computed here; equal to the last printed digit, or within a tolerance for which the row gives a reason",
+    "given": "an input: the example states it as printed, or the command of the row sets it",
+    "misprint": "wrong as printed; the row says why, and gives the right value",
+    "disagrees": "computed here with a different result; the row says what is known about the reason",
     "measured there": "an experiment of the authors; if the model has the same quantity, its value is shown beside it",
     "not modelled": "cfmkit has no such model or part",
 }
