@@ -190,7 +190,7 @@ def _of_shell(verb: str, text: str) -> Any:
 def _before_the_verb(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-    show_completion: Annotated[str | None, _of_shell("show", "Print what makes a shell complete commands")] = None,
+    show_completion: Annotated[str | None, _of_shell("show", "Print the script that completes commands")] = None,
     install_completion: Annotated[str | None, _of_shell("install", "Make a shell complete commands")] = None,
 ) -> Any:
     if version:

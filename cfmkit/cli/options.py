@@ -79,7 +79,7 @@ Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Pr
 Timeout = Annotated[
     float | None, option("--timeout-per-point", metavar="S", text="Stop the computation of a point after S seconds.")
 ]
-Fresh = Annotated[bool, flag("--fresh", text="Reuse nothing of an earlier run.")]
+Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
 Tables = Annotated[
     str,
     option(
@@ -117,7 +117,7 @@ class Changing(Common):
             metavar="A.B=VALUE",
             text="Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
             """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
-            "With a family in front, for the specs of that family only: cam:design.force='60 N'.",
+            "With a family in front it applies only to specs of that family: cam:design.force='60 N'.",
             autocompletion=completion_candidates.changes,
         ),
     ] = None
@@ -147,7 +147,7 @@ class FigureChoice(Common):
     no_titles: Annotated[bool, flag("--no-titles", text="Omit the titles of the figures.")] = False
     figure_style: Annotated[
         str | None,
-        option("--figure-style", metavar="FILE", text="Style file of matplotlib (.mplstyle), on top of cfmkit's own."),
+        option("--figure-style", metavar="FILE", text="Matplotlib style file (.mplstyle), applied over cfmkit's own."),
     ] = None
 
     @property
@@ -198,7 +198,7 @@ class Studying(Computing):
         option(
             "--cluster",
             metavar="ADDRESS|local",
-            text="Dask scheduler to work on, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
+            text="Dask scheduler to use, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
         ),
     ] = None
     max_points: Annotated[
@@ -225,7 +225,8 @@ class Measuring(Common):
         option(
             "--tare",
             metavar="FORCE",
-            text="Reading of the force sensor without load, to subtract, e.g. '0.4 N'; 'start': the first one.",
+            text="Subtract this reading of the force sensor without load, e.g. '0.4 N'; 'start': the mean reading "
+            "before the machine moves.",
         ),
     ] = None
     zero: Annotated[
@@ -233,7 +234,8 @@ class Measuring(Common):
         option(
             "--zero",
             metavar="LENGTH",
-            text="Reading of the displacement sensor at the mechanism's zero, to subtract; 'start': the first one.",
+            text="Subtract this reading of the displacement sensor at the mechanism's zero; 'start': the mean reading "
+            "before the machine moves.",
         ),
     ] = None
     flip: Annotated[
@@ -241,7 +243,7 @@ class Measuring(Common):
         option(
             "--flip",
             metavar="NAMES",
-            text="Recorded with the opposite sign: force, displacement (or torque, angle), or both, with a comma.",
+            text="Reverse the sign of force, displacement (or torque, angle), or of both, separated by a comma.",
         ),
     ] = None
 

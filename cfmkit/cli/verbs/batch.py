@@ -84,12 +84,12 @@ class BatchOptions(Changing, FigureChoice):
         option(
             "--compare",
             metavar="OLDDIR",
-            text="Compare the metrics with those of an earlier batch; return 5 if one has changed.",
+            text="Compare the metrics with those of an earlier batch; end with exit code 5 if one has changed.",
         ),
     ] = None
     compare_tolerance: Annotated[
         str | None,
-        option("--compare-tolerance", metavar="SHARE", text="Relative change that counts as none; default: 0.0001 %."),
+        option("--compare-tolerance", metavar="SHARE", text="Relative change that is tolerated; default: 0.0001 %."),
     ] = None
     fail_fast: Annotated[bool, flag("--fail-fast", text="Start no more specs once one has failed.")] = False
     jobs: Jobs = None
@@ -104,8 +104,8 @@ class BatchOptions(Changing, FigureChoice):
 def run(options: BatchOptions, terminal: Terminal) -> Answer:
     """Design or analyse many specs, check their requirements and summarise; the exit code is that of the worst.
 
-    A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
-    cfmkit, nor a file that was written.
+    The results of an earlier batch are reused if nothing has changed: the spec, the options, cfmkit, and the files
+    that were written.
     """
     from cfmkit.cli import run_study_in_folder
     from cfmkit.cli.progress import watching

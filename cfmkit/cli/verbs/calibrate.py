@@ -32,7 +32,7 @@ class CalibrateOptions(Computing, Measuring):
         option(
             "--fit",
             metavar="A.B,C.D",
-            text="Numbers of the spec to fit, e.g. mechanism.rolling_friction; several with commas.",
+            text="Numbers of the spec to fit, e.g. mechanism.rolling_friction; separate several with commas.",
         ),
     ]
     bounds: Annotated[

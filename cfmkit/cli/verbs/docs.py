@@ -26,7 +26,7 @@ EXAMPLE = "cfmkit docs tutorial"
 class DocsOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[str | None, argument("PAGE", "Print this one, in Markdown; default: list all.")] = None
+    name: Annotated[str | None, argument("PAGE", "Page to print, in Markdown; default: list all pages.")] = None
 
 
 def run(options: DocsOptions, terminal: Terminal) -> Answer:

@@ -32,7 +32,7 @@ class DoctorOptions(Common):
 
 
 def run(options: DoctorOptions, terminal: Terminal) -> Answer:
-    """Report versions, packages, folders, compiled code and families, and what is wrong with them.
+    """Report versions, packages, folders, compiled code and families, and any problems with them.
 
     Families of other packages are imported for this, which runs installed code.
     """

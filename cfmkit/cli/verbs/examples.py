@@ -31,7 +31,7 @@ LONG = (
 class ExamplesOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[str | None, argument("NAME", "Copy this one, with its data; default: list all.")] = None
+    name: Annotated[str | None, argument("NAME", "Example to copy, with its data; default: list all.")] = None
     out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Folder to copy to; default: this one.")] = (
         None
     )
@@ -40,14 +40,14 @@ class ExamplesOptions(Common):
         option(
             "--run",
             metavar="NAME|quick|all",
-            text="Run one, those that take seconds, or all, to check this installation; no files are kept.",
+            text="Run one example, the quick ones or all of them to check this installation; no files are kept.",
         ),
     ] = None
     schema: Annotated[
         bool | None,
         flag(
             "--schema/--no-schema",
-            text="With a copy: write the JSON schema, too, and the line by which editors find it; default: yes.",
+            text="When copying, also write the JSON schema and the line through which editors find it; default: yes.",
         ),
     ] = None
     jobs: Jobs = None

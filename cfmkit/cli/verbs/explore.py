@@ -34,7 +34,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     """Change the numbers of a spec with sliders in the browser; curve, metrics and requirements follow.
 
     The page is available on this computer only, at an address with a token. No file outside the spec's folder is read
-    or written. Ctrl-C ends it.
+    or written. Ctrl-C ends the server.
     """
     from cfmkit.errors import UsageError
     from cfmkit.runs.explorer_server import Explorer, ExplorerServer

@@ -39,7 +39,7 @@ class FigureOptions(Changing, FigureChoice):
 
 
 def run(options: FigureOptions, terminal: Terminal) -> Answer:
-    """Combine plots of several runs in one lettered figure; a file states which plots, and how wide."""
+    """Combine plots of several runs in one figure with lettered panels; a file states the plots and the width."""
     from cfmkit.errors import UsageError
     from cfmkit.runs.composed_figure import panels, read
     from cfmkit.store import RunFolder

@@ -33,7 +33,7 @@ class NewOptions(Common):
     schema: Annotated[
         bool,
         flag(
-            "--schema/--no-schema", text="Write the JSON schema beside it, too, and the line by which editors find it."
+            "--schema/--no-schema", text="Also write the JSON schema, and the line through which editors will find it."
         ),
     ] = True
 

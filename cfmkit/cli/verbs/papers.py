@@ -43,7 +43,7 @@ class PapersOptions(Common):
     name: Annotated[
         str | None, argument("PAPER|FAMILY", "Only this paper, or those of this family: lan-2010, cam; default: all.")
     ] = None
-    everything: Annotated[bool, flag("--all", text="Compute what takes a minute, too.")] = False
+    everything: Annotated[bool, flag("--all", text="Also compute the numbers that take a minute.")] = False
     quiet: Annotated[bool, flag("-q", "--quiet", text="Print only problems.")] = False
 
 

@@ -42,7 +42,7 @@ class ShowOptions(Common):
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Answer:
-    """Explain a family with every key of its spec, list units, metrics, materials or papers, or explain one by name."""
+    """Explain a family with every key of its spec; list units, metrics, materials or papers; or explain one by name."""
     from cfmkit.cli.show_topics import explain, skipped
 
     if options.figure is not None:
