@@ -32,7 +32,9 @@ from cfmkit.families.beam.shaping.sqp_program import Compared, Flattest, Shaping
 from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.families.run_control import Run
+from cfmkit.numerics.monotone_interpolation import ThroughPoints
 from cfmkit.results import Status
+from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 TABLE_3 = np.array([0.0, 30.5, 18.77, 12.44, 24.0, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148])
 
@@ -153,6 +155,17 @@ def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
     assert view is not None
     assert kept.objective == view.half_band(found.start)
     assert kept.objective > 1.5 * found.objective  # the largest force lies between the two
+
+
+def test_a_design_that_is_to_follow_a_curve_is_ranked_by_how_well_it_does() -> None:
+    task, found = seen_at(33)
+    plain = looked_at(task, Variables(task, 2).build(found.x))
+    assert plain is not None
+    own = ThroughPoints(tuple(plain.at.tolist()), tuple(plain.force.tolist()))  # what it does is what it is to do
+    task = replace(task, limits=TaskLimits(), shape=TargetCurve(own, "force"))
+    kept = confirmed(task, replace(found, objective=0.0), StartBudget(), lambda _, design: design)
+    assert plain.half_band(found.start) > 0.004
+    assert kept.objective < 1e-5
 
 
 def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_them() -> None:

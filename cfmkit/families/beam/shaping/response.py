@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.sensitivity.output_derivatives import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
+    from cfmkit.specs.evaluable_target_curve import TargetCurve
 
 
 _EACH = 8  # poses of the window for one before it
@@ -331,11 +332,17 @@ _CLOSE_CONTROL = Control(tolerance=1e-7, branch="stop")
 
 @dataclass(frozen=True)
 class CloseView:
-    """Force of the mechanism [N] and largest stress [Pa] at even poses from rest to the end of the window [m]."""
+    """Force of the mechanism [N] and largest stress [Pa] at even poses from rest to the end of the window [m].
+
+    curve, layers: force [N] that is to be followed, by the displacement [m] of so many layers. The force is divided by
+    it, as it is in the search.
+    """
 
     at: FloatArray
     force: FloatArray
     stress: FloatArray
+    curve: TargetCurve | None = None
+    layers: int = 1
 
     @cached_property
     def _between(self) -> tuple[FloatArray, FloatArray]:
@@ -343,7 +350,11 @@ class CloseView:
         from scipy.interpolate import CubicSpline
 
         fine = np.linspace(self.at[0], self.at[-1], _BETWEEN * (len(self.at) - 1) + 1)
-        return fine, CubicSpline(self.at, self.force)(fine)
+        force = CubicSpline(self.at, self.force)(fine)
+        if self.curve is None:
+            return fine, force
+        with np.errstate(divide="ignore", invalid="ignore"):  # outside the window the curve may be zero
+            return fine, force / self.curve.at(fine * self.layers)
 
     @cached_property
     def bands(self) -> FloatArray:
@@ -374,4 +385,4 @@ def looked_at(task: Task, network: Network) -> CloseView | None:
         return None
     keep = path.at_requested
     stress = path.peak_stress(axial=task.total_stress).value[keep]
-    return CloseView(at, path.effort[keep] * task.copies, stress)
+    return CloseView(at, path.effort[keep] * task.copies, stress, task.shape, task.layers)
