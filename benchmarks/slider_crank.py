@@ -22,7 +22,7 @@ from timing import best
 import cfmkit
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, minimax
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
 from cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block import analyze_block
 from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.kept_batch_runs import KeptRuns
+    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
     from cfmkit.studies.metric_changes_since_earlier_batch import Known
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
@@ -428,7 +428,7 @@ def batch(
     from cfmkit.studies.batch_sources_and_outcomes import folders, sources
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
-    from cfmkit.studies.kept_batch_runs import KeptRuns
+    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():

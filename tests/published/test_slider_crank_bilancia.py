@@ -15,7 +15,7 @@ from slider_crank import ALPHA, BILANCIA, TABLE_1, config, force
 import cfmkit
 from cfmkit import api
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, least_squares
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, least_squares
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.metrics import Window
 

@@ -22,7 +22,7 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 )
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
-from cfmkit.studies.kept_batch_runs import KeptRuns
+from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
 
 @pytest.fixture
@@ -248,7 +248,7 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
     monkeypatch.setattr(
-        "cfmkit.studies.kept_batch_runs.origin", lambda libraries: origin(libraries) | {"content": "another"}
+        "cfmkit.studies.finished_batch_specs_in_journal.origin", lambda libraries: origin(libraries) | {"content": "another"}
     )
     assert recalled() is None
 

@@ -11,7 +11,7 @@ from slider_crank import DEG, LI, START, config
 
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, reactions
 from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
 from cfmkit.numerics.box_search import BoxAxis, lowest

@@ -55,7 +55,7 @@ def test_least_squares_holds_a_slope_too(caps, slope):
     """Equal to the best of a general solver, slope included."""
     from scipy.optimize import minimize
 
-    from cfmkit.families.slider_crank.springs.fit_rates import least_squares
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import least_squares
     from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
 
     design = {

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.stock.springs.helical import Wound
+from cfmkit.stock.springs.helical_spring_formulas import Wound
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 WIRE = {"wire": "1.25 mm", "coil": "12.5 mm", "turns": 40}

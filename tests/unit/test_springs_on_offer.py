@@ -16,10 +16,10 @@ from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.springs.bought_springs import best_sets
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.stock.springs.helical import Wound
+from cfmkit.stock.springs.helical_spring_formulas import Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
 

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning
 from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
-from cfmkit.stock.springs.helical import tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost

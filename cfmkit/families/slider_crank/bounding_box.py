@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.spec import Springs
     from cfmkit.results import Result
-    from cfmkit.stock.springs.helical import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
 
 POSES = 13
 """Places of the motion at which a printed part is looked at."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal, minimax
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
 from cfmkit.stock.springs.made_to_measure import stiffest
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from cfmkit.stock.springs.made_to_measure import extension_spring, shortest_tors
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.wishes import Wish
-    from cfmkit.stock.springs.helical import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
 
 STILL = 1e-9
 """Share of the slider's travel that is none."""

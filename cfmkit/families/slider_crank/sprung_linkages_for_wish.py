@@ -24,7 +24,7 @@ from cfmkit.families.slider_crank.springs_wound_for_wish import depth_of_springs
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
-from cfmkit.stock.springs.helical import YOUNGS_MODULUS, tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:

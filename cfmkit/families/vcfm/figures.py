@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.families.fem_results import numbered
-from cfmkit.families.vcfm.largest_stress_in_each_fillet import fillets
+from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.model import rest_of

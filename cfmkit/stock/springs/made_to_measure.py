@@ -1,6 +1,6 @@
 """Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
-The formulas and the wire are those of `cfmkit.stock.springs.helical`, the share of the strength is that of the generic
+The formulas and the wire are those of `cfmkit.stock.springs.helical_spring_formulas`, the share of the strength is that of the generic
 series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are close-wound, loops
 are as high as the inside of the coil.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
 
 if TYPE_CHECKING:

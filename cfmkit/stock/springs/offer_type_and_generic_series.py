@@ -1,6 +1,6 @@
 """What springs are on offer: those of a list, or the generic series; and which of them come nearest where none fits.
 
-The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical`) from preferred numbers of wire
+The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical_spring_formulas`) from preferred numbers of wire
 diameters, spring indices and turns. It says what can be had; the spring itself is then bought by its dimensions.
 Its limits are assumed: extension and compression springs up to 40 % of the tensile strength of music wire in shear,
 torsion springs up to 60 % in bending, both below what the wire holds under a load at rest, because the springs of a
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from cfmkit.stock.springs.helical import Kind, Wound, tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

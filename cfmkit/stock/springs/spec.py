@@ -13,13 +13,13 @@ from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
 from cfmkit.stock.material_and_part_spec import Fatigue
-from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
+from cfmkit.stock.springs.helical_spring_formulas import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.stock.springs.helical import Kind
+    from cfmkit.stock.springs.helical_spring_formulas import Kind
 
 Positive = Field(gt=0)
 AGREE = 0.1

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
-    from cfmkit.stock.springs.helical import Wound
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 WIRE_DEFINITIONS = {

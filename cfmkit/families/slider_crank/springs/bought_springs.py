@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.families.findings import percent
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.springs.fit_rates import minimax, ranges
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax, ranges
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign
-    from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
 
 

@@ -37,7 +37,7 @@ from cfmkit.families.slider_crank.springs.design_outcome import (
     search_of,
     too_far,
 )
-from cfmkit.families.slider_crank.springs.fit_rates import least_squares, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import least_squares, minimax, preferred, ranges
 from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.rates_for_widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.springs.solution import EDGE
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
     from cfmkit.results import Finding
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
 from cfmkit.families.slider_crank.springs.sprung_linkage import assemble, mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS

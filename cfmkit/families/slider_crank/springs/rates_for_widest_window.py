@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.fit_rates import minimax
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax
 from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE
 
 if TYPE_CHECKING:

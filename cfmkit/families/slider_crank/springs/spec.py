@@ -13,7 +13,7 @@ from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
-    from cfmkit.stock.springs.helical import Kind, Wound
+    from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound
 
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
