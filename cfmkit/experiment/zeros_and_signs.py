@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
 
 START = "start"
-"""In place of a value: what the first point says, where the machine has not moved yet."""
+"""In place of a value: the mean of the first points, where the machine has not moved yet."""
 
 _STANDS = 1e-3
 """The machine has not moved where it is this near to its first place, in parts of the travel."""
@@ -85,7 +85,7 @@ def _shown(value: str | float | None, first: FloatArray, option: str, dimension:
     try:
         return read_quantity(value, dimension)
     except QuantityError as error:
-        raise UsageError(f"{option}: {error}; or say {START!r} for the value at the first point") from None
+        raise UsageError(f"{option}: {error}; or say {START!r} for the mean before the machine moves") from None
 
 
 def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:

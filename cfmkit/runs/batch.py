@@ -426,9 +426,9 @@ def batch(
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_sources_and_outcomes import folders, sources
+    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
-    from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():

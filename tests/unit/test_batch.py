@@ -20,9 +20,9 @@ from cfmkit.studies.batch_sources_and_outcomes import (
     results_table,
     sources,
 )
+from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
-from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 
 
 @pytest.fixture
@@ -248,7 +248,8 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
     monkeypatch.setattr(
-        "cfmkit.studies.finished_batch_specs_in_journal.origin", lambda libraries: origin(libraries) | {"content": "another"}
+        "cfmkit.studies.finished_batch_specs_in_journal.origin",
+        lambda libraries: origin(libraries) | {"content": "another"},
     )
     assert recalled() is None
 

@@ -14,8 +14,8 @@ from cfmkit.families.wishes import Candidate
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging
-from cfmkit.studies.suggest.redesign_for_wished_yield import Moved, moved_for_yield
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
+from cfmkit.studies.suggest.redesign_for_wished_yield import Moved, moved_for_yield
 from cfmkit.studies.suggest.search import _key, _Making, _Times
 from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 

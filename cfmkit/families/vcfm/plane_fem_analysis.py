@@ -20,8 +20,8 @@ from cfmkit.export.arc_outlines import outlines
 from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
-from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
+from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring

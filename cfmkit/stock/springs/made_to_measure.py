@@ -1,8 +1,8 @@
 """Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
-The formulas and the wire are those of `cfmkit.stock.springs.helical_spring_formulas`, the share of the strength is that of the generic
-series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are close-wound, loops
-are as high as the inside of the coil.
+The formulas and the wire are those of `cfmkit.stock.springs.helical_spring_formulas`, the share of the strength is that
+of the generic series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are
+close-wound, loops are as high as the inside of the coil.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """What springs are on offer: those of a list, or the generic series; and which of them come nearest where none fits.
 
-The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical_spring_formulas`) from preferred numbers of wire
-diameters, spring indices and turns. It says what can be had; the spring itself is then bought by its dimensions.
+The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical_spring_formulas`) from preferred
+numbers of wire diameters, spring indices and turns. It says what can be had; the spring itself is then bought by its
+dimensions.
 Its limits are assumed: extension and compression springs up to 40 % of the tensile strength of music wire in shear,
 torsion springs up to 60 % in bending, both below what the wire holds under a load at rest, because the springs of a
 constant-force mechanism move. Extension springs are taken as wound without initial tension, with full loops at both

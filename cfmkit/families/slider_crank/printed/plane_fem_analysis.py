@@ -23,9 +23,9 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.beam_chain_from_spec import elasticity, travel_direction
+from cfmkit.families.slider_crank.printed.fem_stress_in_each_fillet import fillets
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
-from cfmkit.families.slider_crank.printed.fem_stress_in_each_fillet import fillets
 from cfmkit.families.slider_crank.printed.model import as_run, chain_of
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
