@@ -4,6 +4,9 @@ Each command runs several times, interleaved with the others, and its best time 
 Ratios are against an interpreter that only imports numpy (or numpy and matplotlib where
 pictures are drawn), measured in the same run: the machine's mood cancels.
 
+Last, what it takes to list the families among 500 other installed packages (goal: 20 ms), beside what
+importlib.metadata takes to look through the same folder.
+
 Run: python benchmarks/startup.py
 """
 
@@ -62,6 +65,38 @@ def best_times(folder: str) -> dict[str, float]:
     return best
 
 
+LISTING = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+import cfmkit.families
+best = 1.0
+for _ in range(5):
+    cfmkit.families.entry_point_plugins._offers_on.cache_clear()
+    began = time.process_time()
+    cfmkit.families.names()
+    best = min(best, time.process_time() - began)
+import importlib.metadata
+peer = 1.0
+for _ in range(5):
+    importlib.metadata.FastPath.__new__.cache_clear()
+    began = time.process_time()
+    importlib.metadata.entry_points(group="cfmkit.families")
+    peer = min(peer, time.process_time() - began)
+print(best, peer)
+"""
+
+
+def listing(folder: Path) -> tuple[float, float]:
+    """Return the processor time to list families among 500 packages [s], and that of importlib.metadata."""
+    for number in range(500):
+        info = folder / f"package_{number}-1.0.dist-info"
+        info.mkdir()
+        (info / "entry_points.txt").write_text("[console_scripts]\nprogram = module:function\n")
+    done = subprocess.run([sys.executable, "-c", LISTING, str(folder)], capture_output=True, text=True, check=True)
+    own, peer = map(float, done.stdout.split())
+    return own, peer
+
+
 def main() -> None:
     """Print one line per command."""
     with tempfile.TemporaryDirectory() as folder:
@@ -72,6 +107,9 @@ def main() -> None:
     for name, (_, limit, peer) in COMMANDS.items():
         goal = f"goal {limit:.1f} s" if limit else ""
         print(f"cfmkit {name:25s} {best[name]:6.2f} s   {best[name] / best[peer]:5.1f} x {peer}   {goal}")
+    with tempfile.TemporaryDirectory() as folder:
+        own, other = listing(Path(folder))
+    print(f"families among 500 packages {1e3 * own:8.1f} ms   {own / other:5.2f} x importlib.metadata   goal 20 ms")
 
 
 if __name__ == "__main__":

@@ -156,20 +156,15 @@ def test_an_entry_point_that_names_no_module_breaks_nothing(site, target):
 
 
 LIST = """
-import sys, time
+import sys
 sys.path.insert(0, sys.argv[1])
 import cfmkit.families
-best = 1.0
-for _ in range(5):
-    cfmkit.families.entry_point_plugins._offers_on.cache_clear()
-    began = time.process_time()
-    names = cfmkit.families.names()
-    best = min(best, time.process_time() - began)
-print(best, "soft" in names, "importlib.metadata" in sys.modules, "numpy" in sys.modules)
+names = cfmkit.families.names()
+print("soft" in names, "importlib.metadata" in sys.modules, "numpy" in sys.modules)
 """
 
 
-def test_listing_takes_a_few_milliseconds_among_five_hundred_packages(site):
+def test_listing_among_five_hundred_packages_imports_neither_numpy_nor_metadata(site):
     for number in range(500):
         info = site / f"package_{number}-1.0.dist-info"
         info.mkdir()
@@ -178,6 +173,4 @@ def test_listing_takes_a_few_milliseconds_among_five_hundred_packages(site):
     done = subprocess.run(
         [sys.executable, "-c", LIST, str(site)], capture_output=True, text=True, check=True, cwd=Path(__file__).parent
     )
-    seconds, *known = done.stdout.split()
-    assert known == ["True", "False", "False"]
-    assert float(seconds) < 0.02
+    assert done.stdout.split() == ["True", "False", "False"]
