@@ -30,7 +30,7 @@ from cfmkit.metrics.metric_definitions import words
 from cfmkit.runs.run import Request, carry_out
 from cfmkit.runs.specfile import STDIN
 from cfmkit.specs.units import border_unit, format_short, to_border
-from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -128,7 +128,7 @@ def metrics_page() -> Answer:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
-    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     records = [
         {
@@ -348,7 +348,7 @@ def _materials() -> Records:
 def _metrics() -> Records:
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
-    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]
     known += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]

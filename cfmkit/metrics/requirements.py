@@ -15,7 +15,7 @@ from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_me
 from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
-from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_figure_types import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
 
 
 MOST_PANELS = 8

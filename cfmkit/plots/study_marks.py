@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.study_figure_types import DrawnScale, StudyMarks
+    from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
 
 COLOURS = "viridis"
 EMPTY = "#EFEFEF"

@@ -9,7 +9,7 @@ from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.metrics.requirements import of_many
 from cfmkit.results import Result, Status
-from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:

@@ -219,7 +219,7 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
 def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
     from cfmkit.specs.spec import DesignKeys
-    from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+    from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     said = False

@@ -26,7 +26,7 @@ from cfmkit.specs.units import (
     dimension_of_end,
     ends_increase,
 )
-from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 
 class OldWords:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.errors import UsageError, visible
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_figure_types import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
+from cfmkit.plots.study_data_to_draw import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.results import Status
 from cfmkit.specs.keys_and_schema import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv

@@ -22,7 +22,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.metrics import split_name, windows_judged
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.spec import DesignKeys
-from cfmkit.specs.yield_metric_definitions import OF_MANY_PARTS
+from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed

@@ -7,7 +7,7 @@ import pytest
 
 import cfmkit
 from cfmkit.plots.study import figures
-from cfmkit.plots.study_figure_types import DrawnScale, StudyCurve, StudyMarks
+from cfmkit.plots.study_data_to_draw import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings

@@ -11,7 +11,7 @@ from cfmkit import api
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block import analyze_block
 from cfmkit.plots.study import draw_map, draw_metric
-from cfmkit.plots.study_figure_types import DrawnScale, StudyMarks
+from cfmkit.plots.study_data_to_draw import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.plan import grid, zipped

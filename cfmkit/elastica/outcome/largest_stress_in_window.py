@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.outcome.stress import extremes
+from cfmkit.elastica.outcome.largest_stress_along_beam import extremes
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:

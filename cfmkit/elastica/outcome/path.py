@@ -12,8 +12,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import LineLoad
+from cfmkit.elastica.outcome.largest_stress_along_beam import StressExtremes, extremes, signed_extremes
 from cfmkit.elastica.outcome.sections import Sampler, Sections, along_beam
-from cfmkit.elastica.outcome.stress import StressExtremes, extremes, signed_extremes
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -19,8 +19,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.outcome.largest_stress_along_beam import STENCIL
 from cfmkit.elastica.outcome.sections import ENERGY, MOMENT, TURN, H, V, X, Y
-from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.array_derivatives import slope
 from cfmkit.errors import InputError
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
-from cfmkit.elastica.outcome.stress import STENCIL
+from cfmkit.elastica.outcome.largest_stress_along_beam import STENCIL
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
