@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from half_vee import VEE
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -18,30 +19,6 @@ from cfmkit.solid.point_motions_and_reactions import MaterialPoint
 if TYPE_CHECKING:
     from cfmkit.results import Result
 
-VEE = """
-cfmkit: 1
-family: beam
-name: vee
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
-  thickness: 0.5 mm
-  width: 10 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    middle: {at: [8.2 mm, 1.1 mm]}
-    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
-  beams:
-    outer: {start: root, end: middle}
-    inner: {start: middle, end: shuttle}
-  drive: {kind: displacement, node: shuttle, direction: -90 deg}
-  part: {fillet: 0.3 mm}
-analysis:
-  travel: 0.2 mm
-  points: 9
-  fidelity: solid
-  solid: {poses: 3, mesh: 0.4 mm}
-  outputs: {nodes: [middle, shuttle], reactions: [root, shuttle]}
-"""
 FORCES = ("fx", "fy", "m")
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from half_vee import VEE
 
 import cfmkit
 from cfmkit.errors import UsageError
@@ -14,37 +15,20 @@ from cfmkit.results import Status
 if TYPE_CHECKING:
     from cfmkit.results import Result
 
-LOADED = """
-cfmkit: 1
-family: beam
-name: loaded vee
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
-  thickness: 0.25 mm
-  width: 10 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    middle: {at: [8.2 mm, 1.1 mm]}
-    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
-  beams:
-    outer: {start: root, end: middle}
-    inner: {start: middle, end: shuttle}
-  drive: {kind: displacement, node: shuttle, direction: -90 deg}
-  part: {fillet: 0 mm}
-analysis:
-  travel: 0.4 mm
-  points: 9
-  fidelity: solid
-  solid: {poses: 3, mesh: 0.125 mm}
-  outputs: {nodes: [middle], reactions: [root, shuttle]}
-"""
+SLENDER = {
+    "mechanism.thickness": "0.25 mm",
+    "mechanism.part.fillet": "0 mm",
+    "analysis.travel": "0.4 mm",
+    "analysis.solid.mesh": "0.125 mm",
+    "analysis.outputs.nodes": ["middle"],
+}
 MIDDLE = {"kind": "point", "node": "middle", "fx": "0.03 N", "fy": "0.1 N", "moment": "0.2 N*mm"}
 SHUTTLE = {"kind": "point", "node": "shuttle", "fx": "0.2 N", "fy": "0.3 N"}
 
 
 def solved(*loads: dict[str, str], fidelity: str = "solid", **changes: object) -> Result:
     keys = {"mechanism.loads": list(loads), "analysis.fidelity": fidelity}
-    return cfmkit.analyze(cfmkit.loads(LOADED).replace(keys | changes))
+    return cfmkit.analyze(cfmkit.loads(VEE).replace(SLENDER | keys | changes))
 
 
 def read(result: Result, *names: str) -> np.ndarray:
@@ -105,6 +89,6 @@ def test_a_strut_that_buckles_under_its_load_has_no_curve():
 
 
 def test_a_deck_of_a_loaded_part_is_refused():
-    spec = cfmkit.loads(LOADED).replace({"mechanism.loads": [SHUTTLE]})
+    spec = cfmkit.loads(VEE).replace(SLENDER | {"mechanism.loads": [SHUTTLE]})
     with pytest.raises(UsageError, match="decks have no constant loads"):
         cfmkit.export(spec, format="inp")
