@@ -188,6 +188,39 @@ def test_no_window_anywhere_is_wider_than_the_widest(seed):
     assert all(item is None or item.deviation > 0.01 for item in others)
 
 
+@pytest.mark.parametrize("width", [0.2, 0.1, 0.05])
+def test_the_smallest_deviation_follows_its_law_down_to_a_hundred_millionth_of_the_target(width):
+    """Deviation ~ width^3 about the stretched position: finer than the tolerance of one linear programme."""
+    from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
+    from cfmkit.families.slider_crank.springs.rates_for_widest_window import judged
+
+    task = task_of(config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "0.5 %"}))
+    middle = task.assembly.stretched
+    wide, narrow = (judged(task, middle - 0.5 * span, middle + 0.5 * span) for span in np.deg2rad([0.5, width]))
+    assert narrow.deviation == pytest.approx(wide.deviation * (width / 0.5) ** 3, rel=0.02)
+
+
+def test_a_tolerance_finer_than_rounding_is_refused():
+    with pytest.raises(SpecError, match=r"design\.tolerance: 5e-10 % is not allowed: must be >= 1e-8"):
+        config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "5e-10 %"})
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_and_the_linear_programme_agree_on_what_can_be_kept(seed):
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, can_keep, minimax
+
+    random = np.random.default_rng(seed)
+    places, upper = np.linspace(-1.0, 1.0, 40), np.where(random.random(4) < 0.5, np.inf, random.uniform(0.1, 2.0, 4))
+    sizes = 10.0 ** random.uniform(-2, 2, 4)
+    powers = np.polynomial.chebyshev.chebvander(places, 3) @ random.normal(size=(4, 4)) * sizes
+    lower = upper.clip(max=0.2) * random.random(4) if seed % 3 == 0 else None
+    goal = RateGoal(powers, 1.0 + 0.1 * np.sin(3.0 * places + random.uniform(0.0, 6.0)), upper, lower=lower)
+    smallest = goal.deviation(minimax(goal))
+    assert can_keep(goal, smallest * (1.0 + 1e-6))
+    for share in (1.0 - 1e-6, 0.9, 0.5, 0.1):
+        assert not can_keep(goal, smallest * share)
+
+
 def test_a_design_without_a_window_is_judged_over_the_one_that_was_found():
     found = cfmkit.design(config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "0.5 %"})).spec
     result = cfmkit.analyze(found)

@@ -76,6 +76,9 @@ class RateGoal:
         return replace(self, matrix=self.matrix[index], wanted=self.wanted[index])
 
 
+RESOLVED = 1e-5
+"""Below this deviation a second programme, in units of it, refines the rates: the first meets its rows to 1e-7 only."""
+
 ALL, FEW = 128, 25
 """So many places the linear programme takes at once; of more it starts with few, and adds those where it fails."""
 
@@ -100,6 +103,44 @@ def minimax(goal: RateGoal) -> FloatArray | None:
         rows = more
 
 
+def can_keep(goal: RateGoal, worst: float) -> bool:
+    """Return whether some rates leave no deviation above `worst`.
+
+    Least squares decide most cases, at a fraction of the cost: what their rates deviate at most is enough, and their
+    residual bounds from below what any rates do. The linear programme decides the rest.
+    """
+    if goal.held is None and goal.least is None:
+        fitted = least_squares(goal)
+        if fitted is not None and goal.deviation(fitted) <= worst:
+            return True
+        if fitted is not None and _least_possible(goal, fitted) > worst:
+            return False
+    rates = minimax(goal)
+    return rates is not None and goal.deviation(rates) <= worst
+
+
+ROOM = 100.0
+"""How much larger than those of least squares, and than 1, the scaled rates of the smallest largest deviation may be
+for the bound to hold; they are of the same size."""
+
+
+def _least_possible(goal: RateGoal, rates: FloatArray) -> float:
+    """Return a bound below the largest deviation of any rates, from the residual r of least squares.
+
+    With weights r / sum|r| no mean of deviations is above the largest one; for other rates the mean falls by the
+    gradient of the squares over their difference, which is zero but for rounding and where the fit ended early.
+    """
+    scales, residual = goal.scales(), -goal.residual(rates)
+    weight = float(np.abs(residual).sum())
+    if weight == 0.0:
+        return 0.0
+    gradient, scaled = (goal.matrix / scales).T @ residual, rates * scales
+    low = np.zeros(len(rates)) if goal.lower is None else goal.lower * scales
+    high = np.minimum(goal.upper * scales, ROOM * (1.0 + scaled.sum()))
+    gained = np.maximum(gradient * (high - scaled), gradient * (low - scaled)).sum()
+    return float((residual @ residual - gained) / weight)
+
+
 def _peaks(residual: FloatArray, level: float) -> Any:
     """Return where deviations above a level are largest among their neighbours."""
     padded = np.concatenate([[-1.0], residual, [-1.0]])
@@ -108,11 +149,39 @@ def _peaks(residual: FloatArray, level: float) -> Any:
 
 
 def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
-    count = goal.matrix.shape[1]
-    cost = np.zeros(count + 1)
+    found = _smallest_deviation(goal)
+    if found is None:
+        return None
+    rates, unit = found[0], goal.deviation(found[0])
+    if not 0.0 < unit < RESOLVED:
+        return found
+    more = _smallest_deviation(_enlarged(goal, rates, unit))
+    if more is not None:
+        rates = rates + more[0] * unit
+    return rates, goal.deviation(rates)
+
+
+def _smallest_deviation(goal: RateGoal) -> tuple[FloatArray, float] | None:
+    cost = np.zeros(goal.matrix.shape[1] + 1)
     cost[-1] = 1.0
     solved = _solved(goal, cost, None)
     return None if solved is None else (solved[:-1] / goal.scales(), float(solved[-1]))
+
+
+def _enlarged(goal: RateGoal, rates: FloatArray, unit: float) -> RateGoal:
+    """Return the goal for what is to be added to rates, in units of their deviation."""
+    held, least = (
+        None if row is None else (row[0], (row[1] - float(row[0] @ rates)) / unit) for row in (goal.held, goal.least)
+    )
+    low = 0.0 if goal.lower is None else goal.lower
+    return RateGoal(
+        goal.matrix,
+        -goal.residual(rates) / unit,
+        (goal.upper - rates) / unit,
+        held=held,
+        lower=(low - rates) / unit,
+        least=least,
+    )
 
 
 def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray | None:
@@ -154,7 +223,8 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
         method="highs",
         **equal,
     )
-    return None if found.status != 0 or found.x is None else np.maximum(found.x, 0.0)
+    least = np.array([*(low for low, _ in bounds), 0.0])
+    return None if found.status != 0 or found.x is None else np.maximum(found.x, least)
 
 
 def least_squares(goal: RateGoal) -> FloatArray | None:

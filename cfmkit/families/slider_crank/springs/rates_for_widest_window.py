@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import minimax
+from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import can_keep, minimax
 from cfmkit.families.slider_crank.springs.rate_fit_task import DENSE
 
 if TYPE_CHECKING:
@@ -145,8 +145,8 @@ class _Everywhere:
     def _keeps(self, low: float, high: float) -> bool:
         """Return whether springs keep the tolerance over a window."""
         self.left -= 1
-        found = _solved(self.task, low, high, COARSE)
-        return found is not None and found.deviation <= self.tolerance
+        goal = self.task.goal((low, high), COARSE)
+        return goal is not None and can_keep(goal, self.tolerance)
 
     def _end(self, low: float, high: float) -> float:
         """Return where the widest window from its beginning ends: double, then halve."""

@@ -141,8 +141,9 @@ class SpringDesign(DesignBlock):
     travel_within: tuple[Length, Length] | None = Field(
         None, description="slider travel within which the widest window is sought; default: all that can be reached"
     )
-    tolerance: Annotated[Ratio, Field(gt=0, lt=1)] | None = Field(
-        None, description="largest deviation allowed, as a fraction of the target"
+    tolerance: Annotated[Ratio, Field(ge=1e-8, lt=1)] | None = Field(
+        None,
+        description="largest deviation allowed, as a fraction of the target; at least 1e-6 % (rounding)",
     )
     objective: Literal["minimax", "least-squares"] = Field(
         "minimax", description="minimise the largest deviation, or the root mean square"
