@@ -23,6 +23,7 @@ from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
+from cfmkit.families.guide_friction import GuideFriction
 from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
@@ -145,19 +146,17 @@ def weights_of(mechanism: Mechanism) -> Weights:
 
 def losses_of(mechanism: Mechanism) -> Losses | None:
     """Return the friction of bearings, pins and guide; None where nothing rubs but the rollers."""
-    bearings, pins, guide = mechanism.bearings, mechanism.pins, mechanism.guide
+    bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.of(mechanism.guide)
     bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
     pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
-    if not bearing and not pin and not (guide and (guide.friction or guide.drag)):
+    if not bearing and not pin and not guide.there:
         return None
     return Losses(
         rolling=mechanism.rolling_friction,
         roller_radius=mechanism.roller_radius,
         bearing=bearing,
         pin=pin,
-        guide=guide.friction if guide else 0.0,
-        drag=guide.drag if guide else 0.0,
-        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+        guide=guide,
     )
 
 

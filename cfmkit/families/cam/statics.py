@@ -35,6 +35,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
+from cfmkit.families.guide_friction import FREE, GuideFriction
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
@@ -61,21 +62,15 @@ class Losses:
         [m].
     bearing, pin : float
         Friction couple per load of a roller's bearing, and of a pin (slider pin, spring hook): mu d/2 [m].
-    guide : float
-        Coulomb friction of the slider's guide.
-    drag : float
-        What the guide takes without load [N].
-    tilt : float
-        Distance of the force from the guide's middle line over half the guide's length.
+    guide : GuideFriction
+        Of the slider.
     """
 
     rolling: float = 0.0
     roller_radius: float = 1.0
     bearing: float = 0.0
     pin: float = 0.0
-    guide: float = 0.0
-    drag: float = 0.0
-    tilt: float = 0.0
+    guide: GuideFriction = FREE
 
 
 @dataclass(frozen=True)
@@ -298,7 +293,7 @@ def _forces_with_losses(states: TrackStates, loads: Loads, rolling: float, way: 
     right = _side(states, loads, losses, way, loads.sideways[0])
     left = _side(states, loads, losses, way, -loads.sideways[0]) if loads.sideways[0] else right
     free = right.along + left.along + loads.slider_weight
-    guided = _guided(free, right.across - left.across + loads.sideways[1], loads, losses, way)
+    guided = losses.guide.force(free, right.across - left.across + loads.sideways[1], loads.off_plane, way)
     return Forces(
         guided,
         np.maximum(right.contact, left.contact),
@@ -306,25 +301,6 @@ def _forces_with_losses(states: TrackStates, loads: Loads, rolling: float, way: 
         np.minimum(right.contact, left.contact),
         _lost(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
     )
-
-
-def _guided(free: FloatArray, across: FloatArray, loads: Loads, losses: Losses, way: float) -> FloatArray:
-    """Return the force on the slider with the friction of its guide [N]; NaN where the guide jams like a drawer.
-
-    The two ends of the guide carry half of what acts across the way each, in the plane of the cam and out of it, and
-    the couple of a force beside the guide's middle line: their friction depends on the force that it adds to.
-    """
-    force = free + way * losses.drag
-    if not losses.guide:
-        return force
-    for _ in range(100):
-        before = force
-        couple = 0.5 * losses.tilt * force
-        ends = (np.hypot(0.5 * across + sign * couple, 0.5 * loads.off_plane) for sign in (1.0, -1.0))
-        force = free + way * (losses.drag + losses.guide * sum(ends))
-        if np.nanmax(np.abs(force - before), initial=0.0) <= 1e-15 * np.nanmax(np.abs(force), initial=0.0):
-            break
-    return force
 
 
 def _lost(states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]) -> dict[str, FloatArray]:

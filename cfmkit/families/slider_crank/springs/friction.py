@@ -77,10 +77,9 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
     sine, cosine = np.sin(beta), np.cos(beta)
     with np.errstate(divide="ignore", invalid="ignore"):
         if torque:
-            along = -turns[3] - np.sign(way * slider_rate) * rubbing.drag
-            rubbed = _pressed(
-                rubbing.guide * np.sign(way * slider_rate), along, (sine, cosine), on_coupler, signs, assembly
-            )
+            along = -turns[3] - np.sign(way * slider_rate) * rubbing.guide.drag
+            held = rubbing.guide.friction * np.sign(way * slider_rate)
+            rubbed = _pressed(held, along, (sine, cosine), on_coupler, signs, assembly)
         else:
             rows = (link.coupler * np.stack([-sine, cosine]), link.crank * np.stack([-np.sin(angle), np.cos(angle)]))
             straight = _balance(rows, -on_coupler, -on_crank)
@@ -92,10 +91,10 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
             # The crank is in balance under the coupler's pull, its springs, and the couples of both its pins.
             moment = link.crank * (np.cos(angle) * pull[1] - np.sin(angle) * pull[0]) + on_crank
             effort = -moment + couple * (signs[0] - signs[1])
-            dragged = (rubbing.drag + rubbing.guide * np.abs(across)) * np.abs(slider_rate)
+            dragged = (rubbing.guide.drag + rubbing.guide.friction * np.abs(across)) * np.abs(slider_rate)
         else:
             free = link.branch * (-turns[3] - pull[0])
-            effort = _along_guide(free, np.abs(across), assembly, way)
+            effort = rubbing.guide.force(free, across, 0.0, way)
             dragged = np.abs(effort - free)
         swept = sum(np.abs(rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate))
         lost = {"pins": couple * swept, "guide": dragged}
@@ -163,16 +162,4 @@ def _pressed(
             pull = np.where(other & (pull[1] > 0.0), np.nan, pull)
             found = np.where(other, pull, found[0]), np.where(other, couple, found[1])
     assert found is not None
-    return found
-
-
-def _along_guide(free: FloatArray, across: FloatArray, assembly: Assembly, way: float) -> FloatArray:
-    """Return the force on the slider with its guide's friction [N]: of what presses across, or of a force beside it."""
-    rubbing = assembly.rubbing
-    force = free + way * (rubbing.drag + rubbing.guide * across)
-    if not rubbing.tilt:
-        return force
-    still = free + way * rubbing.drag
-    tilted = still / (1.0 - way * np.sign(still) * rubbing.guide * rubbing.tilt)
-    found: FloatArray = np.where(rubbing.tilt * np.abs(tilted) > across, tilted, force)
     return found

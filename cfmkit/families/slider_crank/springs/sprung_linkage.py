@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.families.guide_friction import FREE, GuideFriction
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
     UnitCurves,
@@ -51,24 +52,20 @@ class Rubbing:
     ----------
     pin : float
         Friction couple per load of each pin, mu d/2 [m].
-    guide, drag : float
-        Friction of the slider's guide, and what it takes without load [N].
-    tilt : float
-        Distance of the force from the guide's middle line over half the guide's length.
+    guide : GuideFriction
+        Of the slider.
     mirrored : bool
         Whether a mirrored pair keeps the guide free of load.
     """
 
     pin: float = 0.0
-    guide: float = 0.0
-    drag: float = 0.0
-    tilt: float = 0.0
+    guide: GuideFriction = FREE
     mirrored: bool = False
 
     @property
     def there(self) -> bool:
         """Whether anything rubs."""
-        return bool(self.pin or self.guide or self.drag)
+        return bool(self.pin) or self.guide.there
 
 
 @dataclass(frozen=True, repr=False)
@@ -260,12 +257,10 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
 
 
 def _rubbing(mechanism: Mechanism) -> Rubbing:
-    pins, guide = mechanism.pins, mechanism.guide
+    pins = mechanism.pins
     return Rubbing(
         pin=0.5 * pins.diameter * pins.friction if pins else 0.0,
-        guide=guide.friction if guide else 0.0,
-        drag=guide.drag if guide else 0.0,
-        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+        guide=GuideFriction.of(mechanism.guide),
         mirrored=mechanism.copies == "mirrored",
     )
 

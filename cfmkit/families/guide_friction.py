@@ -1,0 +1,90 @@
+"""Friction of a slider's guide, of the cam and of the slider-crank: Coulomb friction at the guide's two ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.stock.material_and_part_spec import Guide
+
+ROUNDS = 60
+"""Newton steps at most; from the force without friction some five are taken, close to jamming more."""
+
+
+@dataclass(frozen=True)
+class GuideFriction:
+    """What a guide takes.
+
+    Attributes
+    ----------
+    friction : float
+        Coefficient of Coulomb friction mu.
+    drag : float
+        What it takes without load [N].
+    tilt : float
+        Distance of the line of force from the guide's middle line over half the guide's length; mu tilt < 1.
+    """
+
+    friction: float = 0.0
+    drag: float = 0.0
+    tilt: float = 0.0
+
+    @classmethod
+    def of(cls, guide: Guide | None) -> Self:
+        """Return the friction of a guide; that of None is nothing."""
+        if guide is None:
+            return cls()
+        return cls(guide.friction, guide.drag, 2.0 * guide.offset / guide.length if guide.length else 0.0)
+
+    @property
+    def there(self) -> bool:
+        """Whether anything rubs."""
+        return bool(self.friction or self.drag)
+
+    def force(self, free: FloatArray, across: FloatArray, off_plane: float, way: float) -> FloatArray:
+        """Return the force that moves the slider against the friction of its guide.
+
+        Each end carries half of what acts across the way, half of what acts out of the plane, and the couple of the
+        force beside the middle line, which is itself F:
+        F = free + way (drag + mu (|(across + tilt F, off)| + |(across - tilt F, off)|) / 2).
+        The right side is convex in F with a slope below 1, so the root is the only one and Newton's steps lead to it.
+
+        Parameters
+        ----------
+        free : (n,) array
+            Force on the slider without its guide's friction [N].
+        across : (n,) array
+            Load across the way in the plane of the mechanism [N].
+        off_plane : float
+            Load out of that plane [N].
+        way : float
+            1 while the slider moves against the force, -1 on the way back.
+
+        Returns
+        -------
+        (n,) array
+            [N]; NaN where `free` or `across` is.
+        """
+        force = still = free + way * self.drag
+        if not self.friction:
+            return force
+        for _ in range(ROUNDS):
+            sums, slopes = np.zeros_like(force), np.zeros_like(force)
+            for sign in (1.0, -1.0):
+                inside = across + sign * self.tilt * force
+                end = np.hypot(inside, off_plane)
+                sums += 0.5 * end
+                slopes += 0.5 * sign * self.tilt * np.divide(inside, end, out=np.zeros_like(end), where=end > 0.0)
+            step = (still + way * self.friction * sums - force) / (1.0 - way * self.friction * slopes)
+            force = force + step
+            if np.nanmax(np.abs(step), initial=0.0) <= 1e-15 * np.nanmax(np.abs(force), initial=0.0):
+                break
+        return force
+
+
+FREE = GuideFriction()
+"""A guide that takes nothing."""
