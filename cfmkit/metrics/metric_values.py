@@ -31,6 +31,9 @@ from cfmkit.specs.units import Share, between
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.results import Result
     from cfmkit.specs.units import Ends
@@ -91,24 +94,27 @@ class Survey:
         known = [item for item in values if item.value is not None]
         if len(known) < len(values):
             return next(item for item in values if item.value is None)
-        return _WORST[definition.worst](known, self.subject.frame.target)
+        heights = np.array([[item.value] for item in known])
+        return known[worst_branch(definition.worst, heights, self.subject.frame.target).item()]
 
 
-def _height(item: Value) -> float:
-    return item.value if item.value is not None else 0.0
+def worst_branch(rule: str, values: FloatArray, target: FloatArray | float | None) -> NDArray[np.intp]:
+    """Return which branch of each curve counts where none is named, (n,).
 
-
-def _farthest(values: list[Value], target: float | None) -> Value:
-    if target is None:
-        return min(values, key=_height)
-    return max(values, key=lambda item: abs(_height(item) - target))
-
-
-_WORST: dict[str, Callable[[list[Value], float | None], Value]] = {
-    "largest": lambda values, _target: max(values, key=_height),
-    "smallest": lambda values, _target: min(values, key=_height),
-    "farthest-from-target": _farthest,
-}
+    Parameters
+    ----------
+    rule : {"largest", "smallest", "farthest-from-target"}
+        `Definition.worst`; without a target the smallest is the farthest from it.
+    values : (b, n) array
+        Of b branches of n curves; a NaN counts first.
+    target : (n,) array, float or None
+        Of the force or torque.
+    """
+    if rule == "largest":
+        return np.asarray(values.argmax(axis=0))
+    if rule == "smallest" or target is None:
+        return np.asarray(values.argmin(axis=0))
+    return np.asarray(np.abs(values - target).argmax(axis=0))
 
 
 def _value(function: Callable[..., float], subject: object) -> Value:

@@ -20,6 +20,9 @@ from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.metrics.branches_cut_to_window import Window
     from cfmkit.results import Quantity, Result
@@ -59,10 +62,13 @@ class Bounds:
 
     def met(self, value: float | None) -> bool:
         """Return whether a value keeps both bounds."""
-        if value is None:
-            return False
-        high = self.max is None or value <= self.max + ROUNDING * abs(self.max)
-        return high and (self.min is None or value >= self.min - ROUNDING * abs(self.min))
+        return value is not None and bool(self.met_by(np.array(value)))
+
+    def met_by(self, values: FloatArray) -> NDArray[np.bool_]:
+        """Return which of many values keep both bounds; NaN does not."""
+        high = np.inf if self.max is None else self.max + ROUNDING * abs(self.max)
+        low = -np.inf if self.min is None else self.min - ROUNDING * abs(self.min)
+        return np.asarray((values <= high) & (values >= low))
 
     def margin(self, item: Value) -> float:
         """Return how far a value is inside the bounds; least for none."""

@@ -9,7 +9,8 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
-from cfmkit.metrics.requirements import ROUNDING, Bounds
+from cfmkit.metrics.metric_values import worst_branch
+from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import Share
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
 
@@ -134,22 +135,7 @@ def _one(
     if len(found) == 1:
         return found[0]
     stack = np.stack(found)
-    if definition.worst == "largest":
-        return np.asarray(stack.max(axis=0))
-    if definition.worst == "smallest" or target is None:
-        return np.asarray(stack.min(axis=0))
-    farthest = np.abs(stack - target).argmax(axis=0)
-    return np.asarray(np.take_along_axis(stack, farthest[None], axis=0)[0])
-
-
-def _keeping(limits: Bounds, values: FloatArray) -> NDArray[np.bool_]:
-    """Return which values keep the bounds, as `Bounds.met` says it of one; NaN does not."""
-    kept: NDArray[np.bool_] = ~np.isnan(values)
-    if limits.max is not None:
-        kept &= values <= limits.max + ROUNDING * abs(limits.max)
-    if limits.min is not None:
-        kept &= values >= limits.min - ROUNDING * abs(limits.min)
-    return kept
+    return np.asarray(np.take_along_axis(stack, worst_branch(definition.worst, stack, target)[None], axis=0)[0])
 
 
 def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
@@ -162,7 +148,7 @@ def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
         by_branch = answer.values[len(study.metrics) + k]
         chosen = [values for name, values in by_branch.items() if branch in (None, name)]
         for values in chosen:
-            met[:, k] &= _keeping(limits, values)
+            met[:, k] &= limits.met_by(values)
         if not chosen:
             met[:, k] = False
     return met

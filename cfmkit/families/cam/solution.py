@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
-from cfmkit.families.cam.statics import Forces, Loads, jams, levers
+from cfmkit.families.cam.statics import Forces, Loads, jams, levers, load_on_contact, load_on_slider
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -183,8 +183,8 @@ class Sides:
             tangent = brace_tangent(x, loads.brace_length)
             turn, lever = levers(slope, tangent, friction)
             lever = np.where(lever > 0, lever, np.nan)
-            pull = pull + (spring * turn + weight * (slope - friction)) / lever
-            contacts.append(np.hypot(1.0, slope) * (spring + weight * tangent) / lever)
+            pull = pull + load_on_slider(turn, slope, friction, spring, weight) / lever
+            contacts.append(load_on_contact(slope, tangent, spring, weight) / lever)
         return pull, contacts[0], contacts[1]
 
 

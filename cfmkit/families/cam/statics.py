@@ -126,6 +126,26 @@ class Forces(ShortRepr):
     lost: dict[str, FloatArray] | None = None
 
 
+def load_on_slider(turn: Real, slope: Real, friction: Any, spring: Real, weight: Any = None) -> Real:
+    """Return what one roller pulls the slider with, times its lever: S (1 + mu f) + w (f - mu) [SS, eq. 1; N].
+
+    Parameters
+    ----------
+    turn, slope, friction : float or array
+        1 + mu f of `levers`, f, and mu.
+    spring, weight : float or array
+        Spring force and weight on the roller [N]; no weight: None.
+    """
+    load: Real = spring * turn
+    return load if weight is None else load + weight * (slope - friction)
+
+
+def load_on_contact(slope: Real, tangent: Real, spring: Real, weight: Any = None) -> Real:
+    """Return what presses one roller on the cam, times the slider's lever: sqrt(1 + f^2) (S + w t) [N]."""
+    along: Real = np.sqrt(1.0 + slope * slope)
+    return along * (spring if weight is None else spring + weight * tangent)
+
+
 def levers(slope: Real, tangent: Real, friction: Any) -> tuple[Real, Real]:
     """Return 1 + mu f, by which friction turns the load, and the slider's lever f - mu - t (1 + mu f) [SS, eq. 1]."""
     turn: Real = 1.0 + friction * slope
@@ -160,19 +180,18 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
     """
     if not loads.plain:
         return _forces_with_losses(states, loads, abs(friction), way if friction == 0.0 else float(np.sign(friction)))
-    slope, weight = states.slope, loads.roller_weight
+    slope, weight = states.slope, loads.roller_weight or None
     tangent = brace_tangent(states.x, loads.brace_length)
     turn, lever = levers(slope, tangent, friction)
     spring = spring_force(states, loads)
-    pull = over(2.0 * (spring * turn + weight * (slope - friction) if weight else spring * turn), lever)
-    along = np.sqrt(1.0 + slope * slope)
-    contact = over(along * (spring + weight * tangent if weight else spring), lever)
+    pull = over(2.0 * load_on_slider(turn, slope, friction, spring, weight), lever)
+    contact = over(load_on_contact(slope, tangent, spring, weight), lever)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
     idle = np.flatnonzero(at_rest & (np.abs(lever) < 1e-13))
     if idle.size and not weight:
         parts = loads.rest_half_width, loads.brace_length, loads.stiffness
         pull[idle] = at_dead_point(slope[idle], states.bend[idle], parts, friction)
-        contact[idle] = 0.5 * pull[idle] * along[idle] / turn[idle]
+        contact[idle] = load_on_contact(slope[idle], tangent[idle], 0.5 * pull[idle]) / turn[idle]
     return Forces(pull + loads.slider_weight, contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent))
 
 

@@ -16,7 +16,7 @@ from cfmkit.families.cam.geometry.slope_law import brace_tangent, drop, rise_rat
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
-from cfmkit.families.cam.statics import levers
+from cfmkit.families.cam.statics import levers, load_on_contact, load_on_slider, over
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.specs.units import Share
 
@@ -197,8 +197,8 @@ class Slab:
         cams, mu = self.designs, friction[:, None]
         turn, lever = levers(self.slope, self.tangent, mu)
         spring = 2.0 * cams.stiffness[:, None] * self.stretch
-        slider = 2.0 * spring * turn / lever
-        contact = (1.0 + self.slope * self.slope) ** 0.5 * spring / lever if self.contacts else None
+        slider = 2.0 * load_on_slider(turn, self.slope, mu, spring) / lever
+        contact = load_on_contact(self.slope, self.tangent, spring) / lever if self.contacts else None
         # At the first sample the springs are at rest: no force, or without friction its limit, 4 K A.
         ideal = friction == 0
         limit = 4.0 * cams.stiffness * cams.constant
@@ -375,12 +375,8 @@ def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:
     """Return the force on the slider on the way up (1) or down (-1) [N]; NaN where friction holds a roller."""
     mu, (stretch, slope, tangent) = way * cams.friction[:, None], pose
     turn, lever = levers(slope, tangent, mu)
-    spring = 4.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0) * turn
-    with np.errstate(divide="ignore", invalid="ignore"):
-        force = np.asarray(spring / lever)
-    held = ~(lever > 0)
-    if held.any():
-        force[held] = np.where(spring[held] == 0, 0.0, np.nan)
+    spring = 2.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0)
+    force = over(2.0 * load_on_slider(turn, slope, mu, spring), lever)
     if not mu.all():
         # A start without friction has no leverage and no load: the limit is the constant force.
         limit = (stretch == 0) & (mu == 0) & (np.abs(lever) < 1e-13)

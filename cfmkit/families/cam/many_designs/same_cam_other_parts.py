@@ -20,7 +20,7 @@ from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
 from cfmkit.families.cam.model import nodes
-from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, over
+from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, load_on_contact, load_on_slider, over
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.results import WINDOW_OUTSIDE
@@ -204,9 +204,7 @@ class BuiltSlab(Slab):
     def _slider(self, poses: Poses, rows: Rows, way: float | FloatArray) -> FloatArray:
         """Return the force on the slider [N], as `statics.forces` does."""
         mu, _, turn, lever, spring = self._levers(poses, rows, way)
-        weight = self.around.roller_weight[rows, None]
-        load = spring * turn
-        pull = over(2.0 * (load + weight * (poses.slope - mu) if weight.any() else load), lever)
+        pull = over(2.0 * load_on_slider(turn, poses.slope, mu, spring, self._weight(rows)), lever)
         for at in self._idle(poses, rows, lever):
             pull[at] = self._limit(poses, rows, way, at)
         return pull + self.around.slider_weight[rows, None]
@@ -214,11 +212,16 @@ class BuiltSlab(Slab):
     def _contact(self, poses: Poses, rows: Rows, way: float | FloatArray) -> FloatArray:
         """Return the force at a contact [N], as `statics.forces` does."""
         _, tangent, turn, lever, spring = self._levers(poses, rows, way)
-        weight, along = self.around.roller_weight[rows, None], np.sqrt(1.0 + poses.slope * poses.slope)
-        contact = over(along * (spring + weight * tangent if weight.any() else spring), lever)
+        contact = over(load_on_contact(poses.slope, tangent, spring, self._weight(rows)), lever)
         for at in self._idle(poses, rows, lever):
-            contact[at] = 0.5 * self._limit(poses, rows, way, at) * along[at] / turn[at]
+            pull = 0.5 * self._limit(poses, rows, way, at)
+            contact[at] = load_on_contact(poses.slope[at], tangent[at], pull) / turn[at]
         return contact
+
+    def _weight(self, rows: Rows) -> FloatArray | None:
+        """Return the weight on each roller, (r, 1) [N]; None where none weighs anything."""
+        weight = self.around.roller_weight[rows, None]
+        return weight if weight.any() else None
 
     def _idle(self, poses: Poses, rows: Rows, lever: FloatArray) -> list[tuple[int, int]]:
         """Return where nothing is loaded and nothing has a lever, so that the force is a limit."""

@@ -18,7 +18,7 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Pivot,
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
-from cfmkit.families.cam.statics import jams, levers
+from cfmkit.families.cam.statics import jams, levers, load_on_contact, load_on_slider, over
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -197,9 +197,7 @@ class CornerSlab(Slab):
         stretch, slope, mu = self.stretch, self.slope, friction[:, None]
         tangent = brace_tangent(self.half_width, self.designs.brace[:, None])
         turn, lever = levers(slope, tangent, mu)
-        moves = lever > 0
         spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(stretch, 0.0)
-        divisor = np.where(moves, lever, 1.0)
-        contact = np.sqrt(1.0 + slope * slope) * spring / divisor if self.contacts else None
-        solved = np.asarray((moves | (spring == 0)).all(axis=1))
-        return ForcesOfCams(2.0 * (spring * turn) / divisor, contact, solved)
+        contact = over(load_on_contact(slope, tangent, spring), lever) if self.contacts else None
+        slider = over(2.0 * load_on_slider(turn, slope, mu, spring), lever)
+        return ForcesOfCams(slider, contact, np.asarray(np.isfinite(slider).all(axis=1)))

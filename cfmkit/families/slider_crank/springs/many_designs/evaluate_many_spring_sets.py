@@ -36,6 +36,7 @@ from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.metrics.continuous_means_and_extremes import extremes, mean
 from cfmkit.metrics.ranges_many import (
+    BAND_RANGES,
     UNIFORM_POINTS,
     ManyBranches,
     range_95,
@@ -140,7 +141,7 @@ class Base:
             return True
         if name in EACH:
             return self.bounded
-        known = self.spreads(name) or name in BANDS or name == RMS or (name in PLACES and self.bounded)
+        known = self.spreads(name) or name in BAND_RANGES or name == RMS or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def spreads(self, name: str) -> bool:
@@ -259,8 +260,8 @@ class Slab:
             return PLACES[name](self, measure.window)
         if name == RMS:
             return _rms_to_target(self, measure.window)
-        if name in BANDS:
-            low, high = self.within(BANDS[name])
+        if name in BAND_RANGES:
+            low, high = self.within(BAND_RANGES[name])
             return high - low
         return metric_of(name, self.inside(measure.window), target_of(self.base.spec))
 
@@ -386,9 +387,6 @@ class Slab:
         unit = self.base.assembly.forces(np.zeros(1))[:, 0]
         with np.errstate(invalid="ignore"):
             return np.asarray(np.where(self.rates > 0.0, self.rates * unit, 0.0).sum(axis=1))
-
-
-BANDS = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}
 
 
 def _width(slab: Slab) -> FloatArray:
