@@ -6,7 +6,7 @@ decide and the cure.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,6 +77,33 @@ finding = finder(FINDINGS)
 """Return a finding of this family; the name must be one that `FINDINGS` explains."""
 
 
+ROUNDING = 1e-9
+"""A value that exceeds its limit by this share is on it: conversions of units and sums leave less."""
+
+SHORTER = 1e-12
+"""Springs shorter than at rest by less [m] are at rest: rounding of half widths of decimetres is smaller."""
+
+
+def yields(pressure: FloatArray | float, allowable: FloatArray | float) -> Any:
+    """Return whether a contact pressure exceeds the one at which a material with an allowable stress first yields."""
+    return np.asarray(pressure > YIELD_PRESSURE * allowable * (1 + ROUNDING))
+
+
+def sinks_first(dead_point: FloatArray | float, start: FloatArray | float, brace: FloatArray | float) -> Any:
+    """Return whether the slider's dead point lies below its start [m], by more than rounding of the brace's length."""
+    return np.asarray(dead_point < start - ROUNDING * brace)
+
+
+def is_slack(elongation: FloatArray) -> NDArray[np.bool_]:
+    """Return where springs are shorter than at rest, from their elongation [m]."""
+    return np.asarray(elongation < -SHORTER)
+
+
+def overstretched(longest: FloatArray | float, limit: float) -> Any:
+    """Return whether springs are stretched beyond their limit [m]."""
+    return np.asarray(longest > limit * (1 + ROUNDING))
+
+
 def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
     """Return what to say where the contact yields; None where it does not.
 
@@ -90,7 +117,7 @@ def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Fin
         Where that is.
     """
     contact, allowable = mechanism.contact, allowable_stress(mechanism)
-    if contact is None or allowable is None or largest is None or largest <= YIELD_PRESSURE * allowable * (1 + 1e-9):
+    if contact is None or allowable is None or largest is None or not yields(largest, allowable):
         return None
     limit = YIELD_PRESSURE * allowable
     wider = contact.width * (largest / limit) ** 2
@@ -197,7 +224,7 @@ def _jam(solution: Solution) -> Iterator[Finding]:
 
 def _dead_point(solution: Solution) -> Iterator[Finding]:
     track, loads = solution.assembly.track, solution.assembly.loads
-    if track.dead_point < track.start - 1e-9 * track.brace_length:
+    if sinks_first(track.dead_point, track.start, track.brace_length):
         yield finding(
             "dead_point",
             "at the start the slider must go down before the rollers move out, by "
@@ -219,8 +246,7 @@ def _travel_at(solution: Solution, elongation: float) -> float:
 
 
 def _springs(solution: Solution) -> Iterator[Finding]:
-    slack = solution.elongation < -1e-12
-    if slack.any():
+    if is_slack(solution.elongation).any():
         last = _travel_at(solution, 0.0)
         yield finding(
             "spring_slack",
@@ -229,7 +255,7 @@ def _springs(solution: Solution) -> Iterator[Finding]:
         )
     limit = solution.assembly.spec.mechanism.springs.max_elongation
     longest = float(solution.elongation[-1])
-    if limit and longest > limit * (1 + 1e-9):
+    if limit and overstretched(longest, limit):
         past = _travel_at(solution, limit)
         yield finding(
             "spring_overstretched",
@@ -307,7 +333,7 @@ def findings_of_built(built: Built) -> list[Finding]:
 def _built_mechanics(built: Built) -> Iterator[Finding]:
     """Yield what is wrong with the mechanism that the measured cam is built into."""
     limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
-    if limit and longest > limit * (1 + 1e-9):
+    if limit and overstretched(longest, limit):
         past = float(built.travel[np.argmax(built.elongation > limit)])
         yield finding(
             "spring_overstretched",

@@ -1,6 +1,6 @@
 """What is known of a cam mechanism that was put together and solved.
 
-Types only: every other file of this family may import them.
+Values are computed when they are first read; figures, findings and results import these types.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from cfmkit.numerics.rigid_point_registration import Registration
     from cfmkit.results import Finding
 
+
+FEW = 100
+"""Of fewer samples than these all are looked at for jams; of more, only places between which a jam may begin."""
 
 ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
 """Shares of the travel on a corner next to which an extreme of the force is looked for: its end is a kink."""
@@ -149,7 +152,7 @@ class Solution(ShortRepr):
             return ()
         total = float(self.travel[-1])
         missing = bool(np.isnan(self.up.slider).any())
-        states = self.states if missing or len(self.travel) < 100 else None
+        states = self.states if missing or len(self.travel) < FEW else None
         found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states, losses))
         return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
 

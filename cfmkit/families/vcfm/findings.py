@@ -23,6 +23,7 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     THICK,
     VBeam,
 )
+from cfmkit.families.vcfm.solution import ROUNDING, goes_beyond, leaves_plane
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -77,8 +78,6 @@ TURNING = POLE / (4.0 * np.pi**2)
 
 PRESSED, STRETCHED = 0.3, 0.12
 """Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
-
-ROUNDING = 1e-9
 
 ALIKE = 0.01
 """Stiffnesses that differ by less than this share cancel."""
@@ -260,7 +259,7 @@ def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
 
 def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
     end = solution.character.linear[1]
-    if np.isfinite(end) and push.travel[-1] > end * (1 + 1e-9):
+    if np.isfinite(end) and goes_beyond(push.travel[-1], end):
         at_end, last = float(solution.force_at(push, np.array([end]))[0]), float(push.force[-1])
         if last - at_end <= solution.spec.analysis.flatness * abs(last):
             return
@@ -329,7 +328,7 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
             f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
             "mechanism.bistable.guided=true",
         )
-    if about.width < 2.0 * about.thickness:
+    if leaves_plane(about.width, about.thickness):
         yield finding(
             "out_of_plane_buckling",
             f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: leaves narrower than twice "
@@ -407,7 +406,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
             "verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
-    elif float(solution.nominal.travel[-1]) > reach * (1 + ROUNDING):
+    elif goes_beyond(solution.nominal.travel[-1], reach):
         yield finding(
             "theory_range",
             f"the travel goes to {mm(float(solution.nominal.travel[-1]))}, beyond {RELIABLE} times the rise "

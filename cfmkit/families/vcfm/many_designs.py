@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.findings import TOO_SOFT
-from cfmkit.families.vcfm.findings import EXACT_FORM, PRESSED, ROUNDING, returns
+from cfmkit.families.vcfm.findings import EXACT_FORM, PRESSED, returns
 from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, share_of
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, measured_stiffness_for
@@ -30,7 +30,7 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     VBeam,
     overrated,
 )
-from cfmkit.families.vcfm.solution import FLAT_PLACES, is_constant
+from cfmkit.families.vcfm.solution import FLAT_PLACES, goes_beyond, is_constant, leaves_plane
 from cfmkit.metrics.continuous_means_and_extremes import extremes as extremes_next_to
 from cfmkit.metrics.longest_interval_in_band import extremes, flat_window
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
@@ -291,14 +291,14 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness) & ~_window_is_flat(slab),
         "force_reversal": bottom <= 0,
         "bistable": _stays(slab),
-        "overload": (travel > end * (1 + ROUNDING)) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
+        "overload": goes_beyond(travel, end) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
         "asymmetric_buckling": np.array(not about.guided),
-        "out_of_plane_buckling": leaf.width < 2.0 * leaf.thickness,
+        "out_of_plane_buckling": leaves_plane(leaf.width, leaf.thickness),
         "imperfection": np.array(about.waviness > 0),
         "theory_range": (
             (leaf.angle > STEEP)
             | (leaf.thickness > THICK * leaf.length)
-            | (travel > RELIABLE * rise * (1 + ROUNDING))
+            | goes_beyond(travel, RELIABLE * rise)
             | (spring.angle > STEEP)
             | (travel / (2.0 * spring.length) > PRESSED)
         )

@@ -301,6 +301,19 @@ class Solution(ShortRepr):
 FLAT_PLACES = 401
 """Even places of a constant-force window over which its mean is taken."""
 
+ROUNDING = 1e-9
+"""A force or a travel beyond its limit by this share is on it: conversions of units and sums leave less."""
+
+
+def goes_beyond(travel: FloatArray | float, end: FloatArray | float) -> Any:
+    """Return whether a travel goes beyond an end [m], by more than rounding."""
+    return np.asarray(travel > end * (1 + ROUNDING))
+
+
+def leaves_plane(width: FloatArray | float, thickness: FloatArray | float) -> Any:
+    """Return whether leaves buckle out of the plane first: narrower than twice their thickness."""
+    return np.asarray(width < 2.0 * thickness)
+
 
 def is_constant(alone: Any, flat: Any, flatness: float, ranges: tuple[tuple[Any, Any], tuple[Any, Any]]) -> Any:
     """Return whether the force of the spring alone is the force of a curve.

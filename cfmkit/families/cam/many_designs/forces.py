@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from cfmkit.families.cam.findings import overstretched
 from cfmkit.families.cam.geometry.slope_law import brace_tangent, drop, rise_rate
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
@@ -326,7 +327,7 @@ class Slab:
         corner = self.corner_travel > 0
         yield from (("undercut", corner), ("contact_not_single_valued", corner), ("up_jam", self.jammed))
         if max_elongation:
-            yield "spring_overstretched", 2.0 * self.stretch[:, -1] > max_elongation * (1 + 1e-9)
+            yield "spring_overstretched", overstretched(2.0 * self.stretch[:, -1], max_elongation)
         forces = (self.up, self.down) if self.designs.friction.any() else (self.up,)
         slack = [((self.stretch > 0) & (one.slider <= 0)).any(axis=1) for one in forces]
         yield "slack_cable", np.logical_or.reduce(slack)

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
+from cfmkit.families.cam.findings import is_slack, sinks_first, yields
 from cfmkit.families.cam.geometry.many_tracks_one_cam import Poses, sign_changes
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
 from cfmkit.families.cam.model import nodes
+from cfmkit.families.cam.solution import FEW
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, load_on_contact, load_on_slider, over
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
 from cfmkit.metrics.continuous_means_and_extremes import extremes
@@ -36,9 +38,6 @@ if TYPE_CHECKING:
     from cfmkit.specs.units import Ends
 
     Rows = NDArray[np.intp]
-
-FEW = 100
-"""Samples below which `Solution.jams` looks at all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +317,7 @@ class BuiltSlab(Slab):
     def _dead(self) -> NDArray[np.bool_]:
         """Whether the slider has no leverage on the rollers at the start, or must go down first."""
         tracks, which = self.around.tracks, self.around.which
-        down = (tracks.dead_point < tracks.start - 1e-9 * tracks.brace[:, None])[which, 0]
+        down = sinks_first(tracks.dead_point, tracks.start, tracks.brace[:, None])[which, 0]
         return np.asarray(down | np.isnan(self.up.slider[:, 0]) | np.isnan(self.down.slider[:, 0]))
 
     def warned(self, max_elongation: float | None) -> Iterator[tuple[str, NDArray[np.bool_]]]:
@@ -329,10 +328,10 @@ class BuiltSlab(Slab):
             yield "corner_pressure", found["undercut"]
         yield "up_jam", found["up_jam"]
         yield "dead_point", self._dead
-        yield "spring_slack", np.asarray((2.0 * self.stretch < -1e-12).any(axis=1))
+        yield "spring_slack", np.asarray(is_slack(2.0 * self.stretch).any(axis=1))
         yield from ((name, found[name]) for name in ("spring_overstretched", "slack_cable") if name in found)
         if self._allowable is not None:
-            yield "overstressed", self.pressure_max > YIELD_PRESSURE * self._allowable * (1 + 1e-9)
+            yield "overstressed", yields(self.pressure_max, self._allowable)
         reached, windows = self.travel[:, -1], [self.ends(window) for window in self.windows]
         short = [reached < found[1] - TOLERANCE * (found[1] - found[0]) for found in windows if found is not None]
         yield WINDOW_OUTSIDE, np.logical_or.reduce(short) if short else np.zeros(len(reached), dtype=bool)

@@ -18,6 +18,7 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import NoTrack, Pivot,
 from cfmkit.families.cam.geometry.slope_law import SlopeLaw, brace_tangent
 from cfmkit.families.cam.many_designs.forces import Begin, ForcesOfCams, Pose, Slab, force_at
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
+from cfmkit.families.cam.solution import FEW
 from cfmkit.families.cam.statics import jams, levers, load_on_contact, load_on_slider, over
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ class CornerSlab(Slab):
         for at, friction in zip(self.which.tolist(), self.designs.friction.tolist(), strict=True):
             if friction and (at, friction) not in known:
                 one = self.found[at]
-                intervals = jams(one.track, friction, one.states if self.points < 100 else None)
+                intervals = jams(one.track, friction, one.states if self.points < FEW else None)
                 known[at, friction] = tuple((low - one.track.start, high - one.track.start) for low, high in intervals)
         pairs = zip(self.which.tolist(), self.designs.friction.tolist(), strict=True)
         return [known.get(pair, ()) for pair in pairs]
