@@ -499,6 +499,44 @@ def test_a_size_scales_every_length_in_the_plane():
     np.testing.assert_allclose(4 * at(big, 2 * small.curve.motion), small.curve.force, rtol=1e-6, atol=1e-6)
 
 
+TO_STRESS = ("analysis:", "design: {rescale: {to_allowable_stress: true}}\nanalysis:")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            (("travel: 100 mm", "travel: 10 mm"),),
+            "one, 50 MPa, within a travel of 145.5 mm: state a longer",
+        ),
+        (
+            (
+                ("travel: 100 mm", "travel: 700 mm\n  fidelity: extensible"),
+                ("50 MPa", "90 GPa"),
+                ("thickness: 1 mm", "thickness: 20 mm"),
+            ),
+            "within a travel of 1094 mm, and a longer one would tear beams",
+        ),
+        ((("50 MPa", "5 GPa"),), "before the path ends: the beams are taut at 399 mm"),
+    ],
+)
+def test_a_stress_that_is_not_reached_gives_no_travel(changes, words):
+    """It gave the last travel that was looked at, 14.6 times the one of the specification."""
+    design = cfmkit.design(cantilever(TO_STRESS, *changes))
+    assert design.status is Status.INFEASIBLE
+    assert design.spec is None
+    assert words in design.message
+
+
+def test_a_stress_may_be_reached_on_a_travel_longer_than_the_one_given_whatever_its_window():
+    window = ("travel: 100 mm", "travel: 40 mm\n  window: [5 mm, 500 mm]")
+    design = cfmkit.design(cantilever(TO_STRESS, window, ("50 MPa", "5 MPa")))
+    end = design.spec.analysis.travel
+    assert 145 * MM < end < 200 * MM
+    assert value(cfmkit.analyze(design.spec), "safety_factor") == pytest.approx(1, abs=1e-3)
+    assert design.spec.analysis.window[1] == end
+
+
 def test_a_design_without_a_task_says_what_to_add():
     design = cfmkit.design(config("beam_lan2010"))
     assert design.status is Status.INVALID

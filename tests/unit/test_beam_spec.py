@@ -33,6 +33,7 @@ LOOSE = "beams:\n    beam: {start: root, end: tip}\n  springs: {s: {kind: line, 
 FORMULA = "points: 21\n  surface: {profile: {kind: formula, height: x+, length: 1 mm}, preload: 0 mm}"
 FILE = "points: 21\n  surface: {profile: {kind: file, file: no.csv}, preload: 0 mm}"
 RESCALE = "design: {rescale: {force: 1 N, free: width, width: 2 mm}}\nanalysis:"
+OTHER = "design: {rescale: {to_allowable_stress: true, material: {youngs_modulus: 1 GPa}}}\nanalysis:"
 MORE = "beams:\n    beam: {start: root, end: tip}"
 
 
@@ -81,6 +82,7 @@ MORE = "beams:\n    beam: {start: root, end: tip}"
         ("points: 21", FORMULA, "analysis.surface.profile.height", "is not a formula"),
         ("points: 21", FILE, "analysis.surface.profile.file", "there is no file 'no.csv'"),
         ("analysis:", RESCALE, "design.rescale", "'width' is given"),
+        ("analysis:", OTHER, "design.rescale.to_allowable_stress", "without a strength"),
     ],
 )  # fmt: skip
 def test_nonsense_is_refused_at_its_place(old, new, path, words):

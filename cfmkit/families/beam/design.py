@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.findings import finding
+from cfmkit.errors import InputError
+from cfmkit.families.beam.findings import ending_of, finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.network_from_spec import thickest
 from cfmkit.families.beam.scalar_results import ranges, window_of
@@ -81,7 +82,10 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
     for _ in range(ROUNDS):
         before = changed
         if wanted.to_allowable_stress:
-            changed = _to_allowable_stress(changed)
+            ended, why = _to_allowable_stress(changed)
+            if ended is None:
+                return Design(None, Status.INFEASIBLE, why)
+            changed = ended
         force = _force(changed)
         if force is None:
             return Design(
@@ -222,21 +226,43 @@ def _point(value: Any, factor: float) -> Any:
     return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
 
 
-def _to_allowable_stress(spec: BeamSpec) -> BeamSpec:
-    """Return the specification with travel and window up to where the stress reaches the allowable one."""
-    place = ranges(solve(spec))["stress_limit_displacement"]
-    for _ in range(ROUNDS):
-        if place is not None:
-            break
-        travel = Place(1.25 * float(spec.analysis.travel or 0.0))
-        spec = spec.model_copy(update={"analysis": spec.analysis.model_copy(update={"travel": travel})})
-        place = ranges(solve(spec))["stress_limit_displacement"]
+def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
+    """Return the specification with travel and window up to where the stress reaches the allowable one, or why not."""
+    place, why = _reaches_allowable_stress(spec)
     if place is None:
-        return spec
+        return (None, why) if why else (spec, "")
     end = _down(place)
     ended = _windowed(spec, 0.0, end)
     start = ranges(solve(ended))["range_start"]
-    return ended if start is None else _windowed(ended, -_down(-start), end)
+    return (ended if start is None else _windowed(ended, -_down(-start), end)), ""
+
+
+def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
+    """Return where the stress first reaches the allowable one, on longer and longer travels [m]; None, and why, if not.
+
+    The window, which is to be replaced and may end beyond the path, plays no part. Nothing is said of a curve that has
+    no force to scale either.
+    """
+    travel, more = spec.extent, ": state a longer 'analysis.travel'"
+    for number in range(ROUNDS + 1):
+        try:
+            solution = solve(_with_analysis(spec, travel=Place(travel), window=None))
+        except InputError:
+            if number == 0:
+                raise
+            more = ", and a longer one would tear beams"
+            break
+        if (place := ranges(solution)["stress_limit_displacement"]) is not None:
+            return place, ""
+        if len(solution.keep) < 2 or travel < 0:
+            return None, ""
+        if solution.motion[-1] < travel * (1 - 1e-9):
+            why = ending_of(solution).message
+            return None, f"the stress does not reach the allowable one before the path ends: {why}"
+        looked_at, travel = travel, 1.25 * travel
+    allowable = format_short(solution.assembly.allowable_stress or math.nan, "stress")
+    where = format_short(looked_at, "length")
+    return None, f"the stress does not reach the allowable one, {allowable}, within a travel of {where}{more}"
 
 
 def _down(value: float) -> float:
@@ -245,7 +271,10 @@ def _down(value: float) -> float:
 
 
 def _windowed(spec: BeamSpec, start: float, end: float) -> BeamSpec:
-    update = {"travel": Place(end), "window": (Place(start), Place(end))}
+    return _with_analysis(spec, travel=Place(end), window=(Place(start), Place(end)))
+
+
+def _with_analysis(spec: BeamSpec, **update: Any) -> BeamSpec:
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=update)})
 
 

@@ -9,9 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.mechanism.spec import Mechanism
-from cfmkit.families.beam.network_elements.spec import (
-    MaterialField,
-)
+from cfmkit.families.beam.network_elements.spec import BeamMaterial, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource
@@ -263,6 +261,10 @@ class BeamSpec(Spec):
     def _can_be_rescaled(self) -> Self:
         if obstacles := list(_rescale_faults(self)):
             refuse("BeamSpec", {("design", "rescale"): "; ".join(obstacles)})
+        wanted = self.design.rescale if self.design else None
+        if wanted and wanted.to_allowable_stress and not _has_strength(self, wanted.material):
+            text = "no stress is allowable without a strength: give the material a 'yield_strength'"
+            refuse("BeamSpec", {("design", "rescale", "to_allowable_stress"): text})
         return self
 
     @model_validator(mode="after")
@@ -437,6 +439,13 @@ def _no_density(spec: BeamSpec) -> str:
     ]
     listed = list(dict.fromkeys(keys))
     return f"natural frequencies need a density: give {', '.join(listed[:5])}, such as 1410 kg/m^3" if listed else ""
+
+
+def _has_strength(spec: BeamSpec, other: BeamMaterial | None) -> bool:
+    """Tell whether the allowable stress is known, of another material if there is one, else of the beams."""
+    usual = spec.mechanism.material
+    of = [other] if other else [beam.material or usual for beam in spec.mechanism.beams.values()]
+    return any(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
 
 
 def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
