@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from beam_support import cantilever
 
 import cfmkit
 from cfmkit.families import family
@@ -12,7 +13,11 @@ from cfmkit.families.base import function_named
 
 
 def room_of(name, **changes):
-    result = cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml").replace(changes))
+    return box(cfmkit.load(f"configs/{name}.yaml").replace(changes))
+
+
+def box(spec):
+    result = cfmkit.analyze(spec)
     return function_named(family(result.spec.family).room)(result), result
 
 
@@ -44,6 +49,20 @@ def test_a_mirrored_network_is_twice_as_wide_as_its_half_with_its_pads():
     assert room.across < 2 * 34.5e-3 + 8 * result.spec.mechanism.thickness
     assert room.along > 40e-3
     assert room.depth == pytest.approx(10e-3)
+
+
+@pytest.mark.parametrize(("beam", "deep"), [("120 mm", 120e-3), ("50 mm", 100e-3)])
+def test_the_widest_of_beams_and_pads_is_the_depth(beam, deep):
+    room, _ = box(cantilever(("end: tip}", f"end: tip, width: {beam}}}")))
+    assert room.depth == pytest.approx(deep)
+
+
+def test_a_beam_with_a_thickness_of_its_own_takes_the_same_box_as_one_with_that_of_the_mechanism():
+    usual, _ = box(cantilever(("thickness: 1 mm", "thickness: 6 mm")))
+    own, _ = box(cantilever(("end: tip}", "end: tip, thickness: 6 mm}")))
+    unused, _ = box(cantilever(("thickness: 1 mm", "thickness: 50 mm"), ("end: tip}", "end: tip, thickness: 6 mm}")))
+    assert own == usual
+    assert unused == usual
 
 
 def test_legs_side_by_side_take_the_depth():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import Room
-from cfmkit.families.beam.network_from_spec import mirror_axis, thickest
+from cfmkit.families.beam.network_from_spec import mirror_axis, thickest_of
 from cfmkit.families.beam.outline import drawing, regions
 from cfmkit.families.beam.strips_and_gaps import mirrored
 
@@ -31,30 +31,37 @@ def room(result: Result) -> Room | None:
     mechanism = solution.spec.mechanism
     angle = solution.assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi
     axes = np.array([[np.sin(angle), -np.cos(angle)], [np.cos(angle), np.sin(angle)]])
-    contours = [contour for contour in drawing(solution.spec, COARSE).contours if contour.layer == "cut"]
-    boxes = np.array([contour.extents for contour in contours])
-    points = [boxes[:, [0, 1]], boxes[:, [0, 3]], boxes[:, [2, 1]], boxes[:, [2, 3]], *_moved_pads(solution)]
-    spread = np.concatenate(points) @ axes.T
-    bent = np.concatenate(_bent(solution)) @ axes.T
-    half = 0.5 * thickest(mechanism.thickness)
-    low = np.minimum(spread.min(axis=0), bent.min(axis=0) - half)
-    high = np.maximum(spread.max(axis=0), bent.max(axis=0) + half)
+    drawn = drawing(solution.spec, COARSE)
+    boxes = np.array([contour.extents for contour in drawn.contours if contour.layer == "cut"])
+    corners = [boxes[:, [0, 1]], boxes[:, [0, 3]], boxes[:, [2, 1]], boxes[:, [2, 3]]]
+    inside = [(points, 0.0) for points in (*corners, *_moved_pads(solution))] + _bent(solution)
+    low, high = _box(inside, axes)
     across, along = (high - low).tolist()
     legs = mechanism.copies.legs if mechanism.copies else 1
-    corner = np.minimum(np.concatenate(points).min(axis=0), np.concatenate(_bent(solution)).min(axis=0) - half)
+    deepest = max([drawn.sheet.thickness or 0.0, *(one.thickness for one in drawn.sheet.regions)])
+    corner, _ = _box(inside, np.eye(2))
     sideways = bool(abs(np.cos(angle)) > abs(np.sin(angle)))
-    return Room(
-        across, along, legs * mechanism.width, legs, corner=(float(corner[0]), float(corner[1])), sideways=sideways
-    )
+    return Room(across, along, legs * deepest, legs, corner=(float(corner[0]), float(corner[1])), sideways=sideways)
 
 
-def _bent(solution: Solution) -> list[FloatArray]:
-    """Return centre lines of all beams at places of the travel, those of a mirrored half included [m]."""
+def _box(inside: list[tuple[FloatArray, float]], axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest place along two axes (2, 2) of points, with what is around each [m]."""
+    points = np.concatenate([points for points, _ in inside]) @ axes.T
+    around = np.concatenate([np.full((len(points), 1), half) for points, half in inside])
+    return (points - around).min(axis=0), (points + around).max(axis=0)
+
+
+def _bent(solution: Solution) -> list[tuple[FloatArray, float]]:
+    """Return centre lines (n, 2) of all beams at places of the travel, mirrored ones too, each with what is beside it.
+
+    That is half its largest thickness; all in m.
+    """
     chosen = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))
-    names = solution.path.layout.network.beams
-    lines = [solution.path.shape(name, int(solution.keep[pose])) for pose in chosen for name in names]
+    halves = {name: 0.5 * thickest_of(beam.section) for name, beam in solution.path.layout.network.beams.items()}
+    poses = [int(solution.keep[one]) for one in chosen]
+    lines = [(solution.path.shape(name, pose), half) for pose in poses for name, half in halves.items()]
     axis = mirror_axis(solution.assembly)
-    return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
+    return lines if axis is None else [*lines, *((mirrored(line, *axis), half) for line, half in lines)]
 
 
 def _moved_pads(solution: Solution) -> list[FloatArray]:

@@ -6,7 +6,7 @@ import itertools
 import math
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -245,6 +245,11 @@ class Mechanism(Model):
     @classmethod
     def _stations(cls, value: Thickness) -> Thickness:
         return checked_thickness(value)
+
+    def of_beams(self, key: Literal["material", "thickness", "width"]) -> dict[str, Any]:
+        """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
+        usual = getattr(self, key)
+        return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:
