@@ -54,6 +54,17 @@ def test_a_straight_cantilever_has_the_area_of_its_strip_and_its_pad():
     assert area(contours) == pytest.approx((400 + 16 + end) * 1e-6, rel=1e-3)
 
 
+def test_the_drawing_says_what_its_beams_are_made_of():
+    second = ("end: tip}", "end: tip, material: pom}\n    other: {start: tip, end: far, material: steel-1.4310}")
+    far = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm]}\n    far: {at: [500 mm, 0 mm]}")
+    one = dict(cfmkit.drawing(cantilever(("end: tip}", "end: tip, material: pom}"))).facts)["material"]
+    both = dict(cfmkit.drawing(cantilever(far, second)).facts)["material"]
+    assert one.startswith("pom: E 2800 MPa")
+    assert both.startswith("pom: E 2800 MPa")
+    assert both.endswith(": other")
+    assert dict(cfmkit.drawing(cantilever()).facts)["material"] == "E 2400 MPa, yield 50 MPa"
+
+
 def test_a_tapered_strip_has_its_thickness_everywhere():
     spec = cantilever(("thickness: 1 mm", "thickness: [[0, 2 mm], [1, 1 mm]]"))
     table = next(item for item in cfmkit.drawing(spec).tables if item.name == "beam-beam")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from beam_support import CONFIGS
+from beam_support import CONFIGS, cantilever
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -51,6 +51,24 @@ def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
 def test_a_wide_strip_is_told_of():
     (one,) = reported(STRIP, "mechanism.beam.width=30 mm", "analysis.points=15", "design=null")
     assert "more energy at" in one.message
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "beam", "words"),
+    [
+        ("2 mm", "width: 50 mm", "50 mm wide, 1 mm thick"),
+        ("50 mm", "width: 2 mm", ""),
+        ("50 mm", "material: {youngs_modulus: 2 GPa, poisson_ratio: 0}", "plane strain, 0 % more"),
+    ],
+)
+def test_a_solid_of_beams_with_a_width_or_a_material_of_their_own_is_as_wide_as_it_is_meshed(mechanism, beam, words):
+    short = ("[400 mm, 0 mm]", "[20 mm, 0 mm]"), ("travel: 100 mm", "travel: 0.5 mm\n  fidelity: solid")
+    mesh = "points: 5\n  solid: {mesh: 0.5 mm, poses: 3}"
+    own = ("width: 100 mm", f"width: {mechanism}"), ("end: tip}", f"end: tip, {beam}}}")
+    found = cfmkit.analyze(cantilever(*short, ("points: 21", mesh), *own))
+    told = [one.message for one in found.warnings if one.name == "wide_beam"]
+    assert len(told) == bool(words)
+    assert words in "".join(told)
 
 
 @pytest.mark.parametrize("value", ["3", "wide", "[true]", "null"])

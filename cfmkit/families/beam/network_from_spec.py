@@ -137,9 +137,8 @@ class Assembly(ShortRepr):
         """Return what the parts weigh; None where a density is not known."""
         mechanism = self.spec.mechanism
         # stages in series have the names of the first, with a number behind a dot
-        materials = {
-            name: mechanism.beams[name.split(".")[0]].material or mechanism.material for name in self.network.beams
-        }
+        own = mechanism.of_beams("material")
+        materials = {name: own[name.split(".")[0]] for name in self.network.beams}
         density = {name: one.density for name, one in materials.items() if one.density is not None}
         if len(density) < len(materials):
             return None
@@ -227,8 +226,7 @@ def moving_nodes(assembly: Assembly) -> set[str]:
 def allowable_stress(spec: BeamSpec) -> float | None:
     """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
     mechanism = spec.mechanism
-    materials = [beam.material or mechanism.material for beam in mechanism.beams.values()]
-    limits = [one.allowable(mechanism.safety_factor) for one in materials]
+    limits = [one.allowable(mechanism.safety_factor) for one in mechanism.of_beams("material").values()]
     return min((limit for limit in limits if limit is not None), default=None)
 
 

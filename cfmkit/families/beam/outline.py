@@ -36,7 +36,7 @@ from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_d
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
@@ -293,15 +293,22 @@ def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"],
 def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
     """Yield what the part is made of, and how thick its beams are."""
     mechanism = assembly.spec.mechanism
-    yield "material", mechanism.material.words
+    materials = {name: one.words for name, one in mechanism.of_beams("material").items()}
+    yield "material", _by_beam(materials) if len({*materials.values()}) > 1 else next(iter(materials.values()))
     yield "fillets", format_short(fillet, "length") if fillet else "none"
-    thick: dict[str, list[str]] = {}
-    for name, beam in mechanism.beams.items():
-        given = beam.thickness if beam.thickness is not None else mechanism.thickness
-        ends = [given] if isinstance(given, float) else [value for _, value in given or ()]
-        limits = dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))) if ends else {}
-        thick.setdefault(" ... ".join(limits), []).append(name)
-    yield "thickness", "; ".join(f"{size}: {', '.join(names)}" for size, names in thick.items())
+    thick = {}
+    for name, given in mechanism.of_beams("thickness").items():
+        ends = [given] if isinstance(given, float) else [value for _, value in given]
+        thick[name] = " ... ".join(dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))))
+    yield "thickness", _by_beam(thick)
+
+
+def _by_beam(texts: Mapping[str, str]) -> str:
+    """Return each text once, with the beams that it is about."""
+    named: dict[str, list[str]] = {}
+    for name, text in texts.items():
+        named.setdefault(text, []).append(name)
+    return "; ".join(f"{text}: {', '.join(names)}" for text, names in named.items())
 
 
 def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:

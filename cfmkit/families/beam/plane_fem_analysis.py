@@ -270,8 +270,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
 
     frame = standing_frame(spec)
     cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
-    beam = next(iter(spec.mechanism.beams.values()))
-    material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
+    material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
@@ -475,8 +474,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
-    thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())
-    if reported := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson, spec.mechanism.wide_beams):
+    thinnest, one = _thinnest(solution.assembly), next(iter(solution.assembly.network.beams.values())).section
+    if reported := bracket(one.width, thinnest, one.poisson_ratio, spec.mechanism.wide_beams):
         yield finding("wide_beam", reported)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:

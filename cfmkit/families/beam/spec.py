@@ -313,8 +313,7 @@ class BeamSpec(Spec):
     @property
     def durability(self) -> Durability | None:
         """Of all beams; None where they are not of one material."""
-        about = self.mechanism
-        kinds = {beam.material or about.material for beam in about.beams.values()}
+        kinds = {*self.mechanism.of_beams("material").values()}
         return kinds.pop().durability if len(kinds) == 1 else None
 
     @property
@@ -419,10 +418,9 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
             yield f"{key} is not known to it: {reason}"
 
 
-def _several(spec: BeamSpec, key: str) -> bool:
+def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:
     """Tell whether beams differ in a value that they may take from the mechanism."""
-    usual = getattr(spec.mechanism, key)
-    return len({getattr(beam, key) or usual for beam in spec.mechanism.beams.values()}) > 1
+    return len({*spec.mechanism.of_beams(key).values()}) > 1
 
 
 def _no_density(spec: BeamSpec) -> str:
@@ -443,8 +441,7 @@ def _no_density(spec: BeamSpec) -> str:
 
 def _has_strength(spec: BeamSpec, other: BeamMaterial | None) -> bool:
     """Tell whether the allowable stress is known, of another material if there is one, else of the beams."""
-    usual = spec.mechanism.material
-    of = [other] if other else [beam.material or usual for beam in spec.mechanism.beams.values()]
+    of = [other] if other else spec.mechanism.of_beams("material").values()
     return any(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
 
 
@@ -458,5 +455,5 @@ def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
     moved = any(node.moved is not None for node in mechanism.nodes.values())
     if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:
         yield "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"
-    if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:
+    if _several(spec, "material"):
         yield "Eq. 6 is about beams of one material"
