@@ -499,6 +499,53 @@ def test_a_size_scales_every_length_in_the_plane():
     np.testing.assert_allclose(4 * at(big, 2 * small.curve.motion), small.curve.force, rtol=1e-6, atol=1e-6)
 
 
+RESCALE = "design: {{rescale: {}}}\nanalysis:"
+TWO = ("end: tip}", "end: mid}\n    other: {start: mid, end: tip, thickness: 2 mm, width: 200 mm}")
+MID = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm]}\n    mid: {at: [200 mm, 0 mm]}")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "thick", "wide"),
+    [
+        ("{thickness: 2 mm}", (1.0, 2.0), (100.0, 200.0)),
+        ("{thickness: 4 mm, width: 100 mm}", (2.0, 4.0), (50.0, 100.0)),
+    ],
+)
+def test_the_largest_thickness_and_width_of_all_beams_are_those_asked_for(wanted, thick, wide):
+    changes = (TWO, MID, ("analysis:", RESCALE.format(wanted)))
+    about = cfmkit.design(cantilever(*changes)).spec.mechanism
+    assert (about.thickness, about.beams["other"].thickness) == pytest.approx([one * MM for one in thick])
+    assert (about.width, about.beams["other"].width) == pytest.approx([one * MM for one in wide])
+
+
+def test_equation_6_compares_the_moduli_of_the_beams():
+    own = ("end: tip}", "end: tip, material: {youngs_modulus: 1 GPa}}")
+    changes = (own, ("points: 21", "points: 21\n  fidelity: extensible"))
+    design = cfmkit.design(cantilever(*changes, ("analysis:", RESCALE.format("{material: {youngs_modulus: 3 GPa}}"))))
+    assert design.message == "rescaled: E 1000 MPa -> 3000 MPa"
+    assert "rescale_approximate" not in warned(design)
+
+
+def test_pads_frame_and_holes_keep_their_places_in_a_part_of_another_size():
+    """The hole is that of a screw, whatever the size."""
+    part = "part: {fillet: 0 mm, pad: [12 mm, 10 mm], holes: [{at: [-6 mm, 0 mm], diameter: 4 mm}], "
+    frame = "frame: {ground: 5 mm, clearance: 3 mm, inside: [[-20 mm, -150 mm], [450 mm, 50 mm]]}}"
+    large = ("analysis:", RESCALE.format("{size: 800 mm, thickness: 2 mm}"))
+    spec = cantilever(("width: 100 mm", f"width: 100 mm\n  {part}{frame}"), large)
+    made = cfmkit.design(spec).spec
+    small, big = (
+        np.array([one.extents for one in cfmkit.drawing(each).contours if one.layer == "cut"]) for each in (spec, made)
+    )
+    screw = np.array([4, 4, -4, -4]) * 0.5 * MM
+    assert len(small) == 3
+    np.testing.assert_allclose(big[:2], 2 * small[:2], atol=1e-5)
+    np.testing.assert_allclose(big[2], 2 * small[2] + screw, atol=1e-5)
+    assert made.mechanism.part.holes[0].at == pytest.approx((-12 * MM, 0.0))
+    assert made.mechanism.part.holes[0].diameter == 4 * MM
+    assert made.mechanism.part.fillet == 0
+    assert not {one.name for one in cfmkit.drawing(made).warnings} - {one.name for one in cfmkit.drawing(spec).warnings}
+
+
 TO_STRESS = ("analysis:", "design: {rescale: {to_allowable_stress: true}}\nanalysis:")
 
 

@@ -30,7 +30,7 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
     from cfmkit.families.beam.mechanism.spec import Mechanism
-    from cfmkit.families.beam.network_elements.spec import Thickness
+    from cfmkit.families.beam.network_elements.spec import BeamMaterial, PartSpec, Thickness
     from cfmkit.families.beam.spec import BeamSpec, Rescale
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
@@ -155,12 +155,26 @@ def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
         beams = {name: beam.model_copy(update={"material": None}) for name, beam in mechanism.beams.items()}
         mechanism = mechanism.model_copy(update={"material": wanted.material, "beams": beams})
     spec = spec.model_copy(update={"mechanism": mechanism})
-    present = {"size": size_of(mechanism), "thickness": thickest(mechanism.thickness), "width": mechanism.width}
-    for name, value in present.items():
+    for name, value in _sizes(mechanism).items():
         asked = getattr(wanted, name)
         if asked is not None and abs(asked / value - 1) > CLOSE:
             spec = _scaled(spec, name, asked / value)
     return spec
+
+
+def _sizes(mechanism: Mechanism) -> dict[str, float]:
+    """Return what a rescaling may change, by its key: size, largest thickness and largest width of the beams [m]."""
+    return {
+        "size": size_of(mechanism),
+        "thickness": max(map(thickest, mechanism.of_beams("thickness").values())),
+        "width": max(mechanism.of_beams("width").values()),
+    }
+
+
+def _modulus(mechanism: Mechanism) -> float:
+    """Return the modulus of the beams, which are of one material [Pa]."""
+    material: BeamMaterial = next(iter(mechanism.of_beams("material").values()))
+    return material.modulus
 
 
 def size_of(mechanism: Mechanism) -> float:
@@ -192,7 +206,7 @@ def _times(thickness: Thickness, factor: float) -> Thickness:
 
 
 def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
-    """Return the specification with all lengths in the plane times a factor, those of the analysis included."""
+    """Return the specification with all lengths in the plane times a factor, those of part and analysis included."""
     mechanism, analysis = spec.mechanism, spec.analysis
     nodes = {name: node.model_copy(update={"at": _point(node.at, factor)}) for name, node in mechanism.nodes.items()}
     beams = {name: _lengths(beam, ("start_offset", "end_offset"), factor) for name, beam in mechanism.beams.items()}
@@ -201,7 +215,8 @@ def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
         for name, beam in beams.items()
     }
     copies = mechanism.copies and _lengths(mechanism.copies, ("mirror", "layer_pitch"), factor)
-    update = {"nodes": nodes, "beams": beams, "copies": copies}
+    part = mechanism.part and _resized_part(mechanism.part, factor)
+    update = {"nodes": nodes, "beams": beams, "copies": copies, "part": part}
     return spec.model_copy(
         update={
             "mechanism": mechanism.model_copy(update=update),
@@ -209,6 +224,14 @@ def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
             "requirements": tuple(_lengths(one, ("over",), factor) for one in spec.requirements),
         }
     )
+
+
+def _resized_part(part: PartSpec, factor: float) -> PartSpec:
+    """Return a part whose pads, frame and places of holes are larger by a factor; screws and tools stay as they are."""
+    holes = tuple(_lengths(hole, ("at",), factor) for hole in part.holes)
+    frame = part.frame and _lengths(part.frame, ("wall", "shuttle", "ground", "clearance", "inside"), factor)
+    resized: PartSpec = _lengths(part, ("pad",), factor).model_copy(update={"holes": holes, "frame": frame})
+    return resized
 
 
 def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
@@ -300,10 +323,9 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
 
 def _force_ratio(old: Mechanism, new: Mechanism) -> float:
     """Return the force of one mechanism over that of another by Eq. 6: E b h^3 / L_x^2."""
-    moduli = [one.material.modulus for one in (new, old)]
-    widths = (new.width / old.width) ** EXPONENTS["width"]
-    thicknesses = (thickest(new.thickness) / thickest(old.thickness)) ** EXPONENTS["thickness"]
-    return float(moduli[0] / moduli[1] * widths * thicknesses * (size_of(new) / size_of(old)) ** EXPONENTS["size"])
+    before, after = _sizes(old), _sizes(new)
+    sizes = [(after[name] / before[name]) ** EXPONENTS[name] for name in ("width", "thickness", "size")]
+    return float(_modulus(new) / _modulus(old) * math.prod(sizes))
 
 
 def _stress(spec: BeamSpec) -> list[Finding]:
@@ -326,15 +348,12 @@ def _stress(spec: BeamSpec) -> list[Finding]:
 def _reported(old: BeamSpec, new: BeamSpec) -> str:
     """Return what was changed, in one sentence."""
     changes = []
-    pairs = {
-        "size": (size_of(old.mechanism), size_of(new.mechanism)),
-        "thickness": (thickest(old.mechanism.thickness), thickest(new.mechanism.thickness)),
-        "width": (old.mechanism.width, new.mechanism.width),
-    }
-    for name, (before, after) in pairs.items():
+    now = _sizes(new.mechanism)
+    for name, before in _sizes(old.mechanism).items():
+        after = now[name]
         if abs(after / before - 1) > CLOSE:
             changes.append(f"{name} {format_short(before, 'length')} -> {format_short(after, 'length')}")
-    before, after = (one.mechanism.material.modulus for one in (old, new))
+    before, after = (_modulus(one.mechanism) for one in (old, new))
     if before != after:
         changes.append(f"E {format_short(before, 'stress')} -> {format_short(after, 'stress')}")
     return "rescaled: " + ", ".join(changes) if changes else "nothing to change"

@@ -89,7 +89,7 @@ class Rescale(Model):
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
     material: MaterialField | None = Field(None, description="another material")
     thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
-    width: PositiveLength | None = Field(None, description="another width out of the plane")
+    width: PositiveLength | None = Field(None, description="another (largest) width out of the plane")
     to_allowable_stress: bool = Field(
         False, description="let travel and window end where the stress reaches the allowable one, and start at c"
     )
