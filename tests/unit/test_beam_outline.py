@@ -15,6 +15,7 @@ from cfmkit.cli.main import main
 from cfmkit.export import files
 from cfmkit.export.union import merged
 from cfmkit.families.beam import strips_and_gaps as strip_module
+from cfmkit.families.beam.network_from_spec import assemble, on_axis
 from cfmkit.families.beam.strips_and_gaps import mirrored, smallest_gap
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
@@ -114,6 +115,13 @@ def test_mirroring_twice_is_nothing():
 
 def cuts(spec):
     return [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
+
+
+@pytest.mark.parametrize(("usual", "own", "on"), [(1, 20, True), (20, 1, False)])
+def test_what_is_on_the_mirror_axis_depends_on_the_thickness_of_the_beams_there(usual, own, on):
+    thick = ("thickness: 1 mm", f"thickness: {usual} mm"), ("end: tip}", f"end: tip, thickness: {own} mm}}")
+    spec = cantilever(*thick, ("analysis:", "  copies: {mirror: [405 mm, 0 mm]}\nanalysis:"))
+    assert on_axis(assemble(spec), "tip") is on
 
 
 def test_elastica_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():

@@ -229,6 +229,15 @@ def test_what_a_design_chooses_may_move_for_its_yield_too(config, moving):
     assert all(low <= spec.at(path) <= high and low < high for path, (low, high) in found.items())
 
 
+def test_a_rescaled_beam_with_a_width_of_its_own_may_change_that_one():
+    spec = cfmkit.load("configs/beam_rescaled.yaml", ["mechanism.beams.b1.width=12 mm"])
+    found = redesign_for_yield.free_of(spec, spec)
+    assert set(found) == {"mechanism.width", "mechanism.beams.b1.width"}
+    own = [f"mechanism.beams.{name}.width=12 mm" for name in ("b1", "b2", "b3", "b4")]
+    spec = cfmkit.load("configs/beam_rescaled.yaml", own)
+    assert set(redesign_for_yield.free_of(spec, spec)) == {one.partition("=")[0] for one in own}
+
+
 def test_a_closed_model_is_moved_as_well():
     spec = cfmkit.load("configs/cam.yaml")
     tolerances = {"mechanism.springs.stiffness": {"normal": "0.5 %"}}

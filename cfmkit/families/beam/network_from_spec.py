@@ -202,12 +202,14 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
 
 
 def on_axis(assembly: Assembly, node: str) -> bool:
-    """Tell whether a node is on the mirror axis."""
+    """Tell whether a node is on the mirror axis, by the thickness of the beams that meet there."""
     found, axis = assembly.network.nodes[node], mirror_axis(assembly)
     if axis is None:
         return False
     away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
-    return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
+    beams = assembly.network.beams.values()
+    near = [beam for beam in beams if node in (beam.start, beam.end)] or beams
+    return bool(abs(away) < _ON_AXIS * max(thickest_of(beam.section) for beam in near))
 
 
 def constant_load(assembly: Assembly, node: str) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -10,6 +10,7 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.families.beam.mechanism.spec import Mechanism
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
 
@@ -32,12 +33,20 @@ def free(given: BeamSpec, designed: BeamSpec) -> dict[str, tuple[float, float]]:
         return {}
     if design.optimise is not None:
         return dict(_of_shapes(design.optimise, designed))
-    mechanism, found = designed.mechanism, dict[str, tuple[float, float]]()
-    name = None if design.rescale is None else design.rescale.adapted(sheet_of(mechanism.part))
-    if name is not None and name != "size":
-        value = getattr(mechanism, name)
-        found |= {f"mechanism.{name}": around(value)} if isinstance(value, float) else {}
-    return found
+    name = None if design.rescale is None else design.rescale.adapted(sheet_of(designed.mechanism.part))
+    if name is None or name == "size":
+        return {}
+    values = {path: designed.at(path) for path in _stated(designed.mechanism, name)}
+    return {path: around(value) for path, value in values.items() if isinstance(value, float)}
+
+
+def _stated(mechanism: Mechanism, key: Literal["thickness", "width"]) -> Iterator[str]:
+    """Yield the paths of the values that beams have: the mechanism's, if any has no other, and their own."""
+    if any(getattr(beam, key) is None for beam in mechanism.beams.values()):
+        yield f"mechanism.{key}"
+    for name, beam in mechanism.beams.items():
+        if getattr(beam, key) is not None:
+            yield f"mechanism.beams.{name}.{key}"
 
 
 def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tuple[float, float]]]:
@@ -59,14 +68,8 @@ def _of_shapes(wanted: Optimise, designed: BeamSpec) -> Iterator[tuple[str, tupl
 
 def errors(spec: BeamSpec) -> dict[str, str]:
     """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
-    mechanism = spec.mechanism
-    found = {}
-    if isinstance(mechanism.thickness, float) and any(one.thickness is None for one in mechanism.beams.values()):
-        found["mechanism.thickness"] = "thickness"
-    for name, beam in mechanism.beams.items():
-        if isinstance(beam.thickness, float):
-            found[f"mechanism.beams.{name}.thickness"] = "thickness"
-    for name, node in mechanism.nodes.items():
+    found = {path: "thickness" for path in _stated(spec.mechanism, "thickness") if isinstance(spec.at(path), float)}
+    for name, node in spec.mechanism.nodes.items():
         if node.support == "free":
             found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
     return found
