@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
+from cfmkit.elastica.equilibrium.network_solver import Points
+from cfmkit.elastica.outcome.between_points import between_points
 
 LENGTH = 35e-3
 
@@ -91,6 +94,31 @@ def test_a_stated_imperfection_does_not_depend_on_the_tolerance(tolerance: float
     assert loose.imperfection == tight.imperfection
     forces = [path.effort[path.at_requested] for path in (loose, tight)]
     np.testing.assert_allclose(forces[0], forces[1], rtol=0, atol=3 * tolerance * np.abs(forces[1]).max())
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("last", [True, False])
+def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
+    """There is no point beyond it: the index of one was an internal error, or wrapped around to the other end."""
+    angle = np.radians(7)
+    path = pressed(angle, 1e-3, np.linspace(0, 1.9 * LENGTH * np.sin(angle), 21)[1:])
+    whole = between_points(path)
+    assert whole is not None
+    place = float(whole.corners[0])
+    there, left = whole.at(np.array([place])), int(np.searchsorted(path.drive, place))
+    kept = slice(0, left) if last else slice(left, None)
+    parts = [(getattr(path.points, name)[kept], getattr(there.points, name)) for name in ("y", "drive", "info")]
+    y, drive, info = (np.concatenate(pair if last else pair[::-1]) for pair in parts)
+    names = [*path.branch[kept], path.branch[left]] if last else [path.branch[left - 1], *path.branch[kept]]
+    law = between_points(
+        replace(path, points=Points(y, drive, info), branch=np.array(names), accurate=np.ones(len(drive), bool))
+    )
+    assert law is not None
+    assert law.corners[-1 if last else 0] == pytest.approx(place)
+    near = place + (-1e-4 if last else 1e-4) * np.arange(6.0)
+    assert law.places[-1 if last else 0] == pytest.approx(place, rel=1e-14)
+    np.testing.assert_allclose(law.effort("", near), whole.effort("", near), rtol=1e-7)
+    np.testing.assert_allclose(law.stress("", near), whole.stress("", near), rtol=1e-3)
 
 
 @pytest.mark.filterwarnings("error")

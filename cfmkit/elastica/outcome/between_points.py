@@ -150,14 +150,13 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _beside(self) -> FloatArray:
-        """Of each corner a place just before it, the corner, and a place just behind it, (m, 3) [m or rad]."""
-        found = np.empty((len(self.corners), 3))
+        """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
+        found, points = np.empty((len(self.corners), 3)), self._points
         for number, corner in enumerate(self.corners):
-            points = self._points[self._points != corner]
-            after = int(np.searchsorted(points, corner))
-            room = 0.5 * min(corner - points[after - 1], points[after] - corner)
+            before, behind = points[points < corner][-1:], points[points > corner][:1]
+            room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
             aside = min(ASIDE * (points[-1] - points[0]), room)
-            found[number] = corner - aside, corner, corner + aside
+            found[number] = corner - aside * len(before), corner, corner + aside * len(behind)
         return found
 
     @cached_property

@@ -73,9 +73,12 @@ class SmoothStretch:
     def with_ends(
         self, drive: FloatArray, values: FloatArray, at_low: FloatArray | None, at_high: FloatArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return points on the stretch and values there, (n, k), with those at the corners, which may be points."""
-        if self.low is not None and at_low is not None and drive[0] != self.low.drive:
+        """Return points on the stretch and values there, (n, k), with those at the corners, which may be points.
+
+        Between a corner and an end of the path that is there, too, the corner is all.
+        """
+        if self.low is not None and at_low is not None and self.low.drive not in drive[:1]:
             drive, values = np.append(self.low.drive, drive), np.vstack([at_low, values])
-        if self.high is not None and at_high is not None and drive[-1] != self.high.drive:
+        if self.high is not None and at_high is not None and self.high.drive not in drive[-1:]:
             drive, values = np.append(drive, self.high.drive), np.vstack([values, at_high])
         return drive, values
