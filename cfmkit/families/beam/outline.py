@@ -97,11 +97,16 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
         As for `drawing` [m].
     """
     assembly = assemble(spec)
+    beams = _strips(assembly, tolerance)
+    loaded = {load.node for load in assembly.network.loads if isinstance(load, PointLoad)}
+    return tuple(_held_places(assembly, beams, tolerance, loaded))
+
+
+def _strips(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[BeamStrip]]:
+    """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
-    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
-    loaded = {load.node for load in network.loads if isinstance(load, PointLoad)}
-    return tuple(_held_places(assembly, beams, tolerance, loaded))
+    return {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
 
 
 def _held_places(
@@ -158,9 +163,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     from cfmkit.export.union import merged
 
     assembly = assemble(spec)
-    network = assembly.network
-    fits = Layout(network, assembly.drive()).fits
-    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
+    beams = _strips(assembly, tolerance)
     pieces, blocks, holes = _pieces(assembly, beams, SHARE * tolerance)
     frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for found in beams.values() for strip in found]
@@ -195,13 +198,10 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     )
 
 
-def standing_frame(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[FloatArray, ...]:
+def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
     """Return the polygons of the frame around the part and of the bars to its pads [m], if one is requested."""
     assembly = assemble(spec)
-    network = assembly.network
-    fits = Layout(network, assembly.drive()).fits
-    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
-    return _frame(assembly, beams, tolerance)
+    return _frame(assembly, _strips(assembly, TOLERANCE), TOLERANCE)
 
 
 def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
@@ -238,7 +238,7 @@ def _swept(assembly: Assembly, places: tuple[HeldPlace, ...]) -> Any:
     path = (solution := solve(spec.replace({"analysis.fidelity": "inextensible"}) if solid else spec)).path
     chosen = np.unique(np.linspace(0, max(len(solution.keep) - 1, 0), SWEPT).astype(int))
     points = [int(solution.keep[one]) for one in chosen] if len(solution.keep) else []
-    rest = list(_all_strips(assembly))
+    rest = list(itertools.chain.from_iterable(_strips(assembly).values()))
     lines = [one.points for one in rest]
     lines += [path.shape(name, point) for point in points for name in path.layout.network.beams]
     shapes = []
@@ -256,13 +256,6 @@ def _swept(assembly: Assembly, places: tuple[HeldPlace, ...]) -> Any:
         lines += [mirrored(line, *axis) for line in lines]
     half = 0.5 * max(float(one.thickness.max()) for one in rest)
     return swept(lines, half, shapes)
-
-
-def _all_strips(assembly: Assembly) -> Iterator[BeamStrip]:
-    network = assembly.network
-    fits = Layout(network, assembly.drive()).fits
-    for name in network.beams:
-        yield from strips(network, fits, name)
 
 
 def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
