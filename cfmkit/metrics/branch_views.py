@@ -58,8 +58,10 @@ class MeasuringFrame:
         Whose stress counts beside the curve's own.
     closed : ClosedForm or None
         The model at every place, for metrics that are places.
+    ends : Curve or None
+        Points at which windows end between those of the curve, with their stress.
     winding : WindingPath or None
-        The same of a branch whose motion turns back.
+        The model of a branch whose motion turns back.
     durability : Durability or None
         Fatigue and relaxation of the material.
     curve : TargetCurve or None

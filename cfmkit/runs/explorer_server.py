@@ -106,6 +106,8 @@ class Explorer:
         The file.
     document : Document
         What it says.
+    folder : Path
+        That of the file; what the page saves is written there, and nowhere else.
     """
 
     source: str

@@ -10,7 +10,7 @@ drawn anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,7 +106,6 @@ class Sight:
     made: DesignTolerances
     rows: RequirementRows
     run: Run
-    known: dict[bytes, Any] = field(default_factory=dict)
 
     def variant(self, x: FloatArray, errors: FloatArray) -> Spec:
         """Return the specification of a part."""

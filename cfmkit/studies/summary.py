@@ -79,12 +79,19 @@ class Summary:
         Columns whose values are kept for pictures.
     counts : Counter
         Points by status.
+    met : (r,) int array
+        How many points meet each requirement.
+    all_met : int
+        How many solved ones meet them all.
     ties : int
         Points that are as good as the best, it included: to 1e-9 of its value, which is what rounding leaves.
     gapped, first_gap : int, str
         Complete points without a value over some window, and what the first of them says.
-    best, best_value, best_meets : int, float, bool
+    best, best_values, best_meets : int or None, (m,) array or None, bool
         The best point so far, its metrics, and whether it meets every requirement.
+    kept : list of arrays
+        Of each block of rows for pictures: their indices, their values in the columns `shown`, and whether they meet
+        every requirement.
     """
 
     study: Study

@@ -6,13 +6,18 @@ import ast
 import doctest
 import importlib
 import inspect
+import itertools
 import pkgutil
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 import cfmkit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,6 +64,58 @@ def test_everything_public_is_documented():
             assert text.strip().splitlines()[0].rstrip().endswith((".", "::", ":")), (
                 f"{name}.{label}: {text.splitlines()[0]}"
             )
+
+
+def named_in(text: str, heading: str) -> set[str]:
+    """Return the names that a section of a docstring is about; none where there is no such section."""
+    found = re.search(rf"^{heading}\n-+\n(.*?)(?=^\S.*\n-+\n|\Z)", text, re.M | re.S)
+    heads = re.findall(r"^\S.*", found[1], re.M) if found else []
+    return {name.strip(" *") for head in heads for name in re.split(r" :(?: |$)", head)[0].split(",")}
+
+
+def taken_by(function: ast.FunctionDef) -> set[str]:
+    """Return the parameters of a function that a caller names."""
+    given = function.args
+    every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+    return {one.arg for one in every if one and one.arg not in ("self", "cls") and not one.arg.startswith("_")}
+
+
+def fields_of(item: ast.ClassDef) -> set[str]:
+    """Return the fields of a class that have no text of their own below them."""
+    below = itertools.zip_longest(item.body, item.body[1:])
+    fields = [one for one, text in below if isinstance(one, ast.AnnAssign) and not isinstance(text, ast.Expr)]
+    return {name for one in fields if not (name := ast.unparse(one.target)).startswith("_")}
+
+
+def sections_of(item: ast.FunctionDef | ast.ClassDef, classes: dict[str, ast.ClassDef]) -> Iterator[str]:
+    """Yield what sections of a docstring leave out, and what they are about that is not there."""
+    text = ast.get_docstring(item) or ""
+    parameters, attributes = named_in(text, "Parameters"), named_in(text, "Attributes")
+    if isinstance(item, ast.ClassDef):
+        methods = {one.name: one for one in item.body if isinstance(one, ast.FunctionDef)}
+        taken = taken_by(methods["__init__"]) if "__init__" in methods else fields_of(item)
+        bases = [classes[base.id] for base in item.bases if isinstance(base, ast.Name) and base.id in classes]
+        known = {*methods, *fields_of(item)}.union(*map(fields_of, bases))
+        stored = (one for one in ast.walk(item) if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store))
+        if attributes:
+            yield from (fields_of(item) - attributes) | (attributes - known - {one.attr for one in stored})
+    else:
+        taken = taken_by(item)
+    if parameters:
+        yield from parameters ^ taken
+
+
+def test_sections_of_docstrings_are_about_all_that_there_is_and_nothing_else():
+    wrong = []
+    for name in MODULES:
+        source = source_of(name)
+        if re.search(r"^ +(Parameters|Attributes)\n", source, re.M):
+            tree = ast.parse(source)
+            classes = {one.name: one for one in tree.body if isinstance(one, ast.ClassDef)}
+            methods = (one for item in classes.values() for one in item.body)
+            items = (one for one in [*tree.body, *methods] if isinstance(one, ast.FunctionDef | ast.ClassDef))
+            wrong += [f"{name}: {item.name}: {word}" for item in items for word in sections_of(item, classes)]
+    assert wrong == []
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)

@@ -30,6 +30,8 @@ class Followed(NamedTuple):
 
     Attributes
     ----------
+    trail : Trail
+        Its points and how it ended.
     share : float
         Of the constant loads and displacements that was reached.
     first : (PathProblem, Singular) or None

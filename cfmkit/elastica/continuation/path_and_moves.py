@@ -46,6 +46,12 @@ class PathProblem:
 
     Attributes
     ----------
+    layout : Layout
+        The index map of the network, and its drive.
+    mesh : Mesh
+        How beams are cut into segments and steps.
+    control : Control
+        Tolerance, steps, branch.
     first_only : bool
         Whether the path ends with the first bifurcation.
     ramp : str
@@ -191,6 +197,8 @@ class Trail:
     ----------
     solver : Solver
         That it goes on with.
+    stretch : Stretch
+        What is being followed.
     points, branches, events
         Equilibria, the names of the branches that they are on, what happened.
     branch : str
@@ -207,6 +215,8 @@ class Trail:
         How often the path was taken up again, by the place.
     again_at, fold_at : float
         Where it was taken up for the second time; where a march stalled last at what looked like a limit point.
+    ending : Ending
+        How it ended, if it did.
     """
 
     solver: Solver
@@ -330,6 +340,10 @@ class Resume(NamedTuple):
 
     Attributes
     ----------
+    trail : Trail
+        The path up to there.
+    spot : Spot
+        The equilibrium.
     step : float
         Longest first step.
     patient : bool

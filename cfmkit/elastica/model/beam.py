@@ -97,6 +97,8 @@ class Fit:
         Distance between the far end of the shape as given and its node [m].
     length : float
         Arc length as used [m].
+    course : FittedShape
+        The shape before it is turned and scaled.
     """
 
     rotation: Any

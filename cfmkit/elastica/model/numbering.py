@@ -48,7 +48,7 @@ class NumberingPlan:
     ground_of : dict
         Places on the ground to the spring that is held there.
     beam_end : (beams, 2) int array
-    spring_place, spring_kind, load_place, load_when, load_follows : int arrays
+    spring_place, spring_kind, load_place, load_follows : int arrays
     load_of, line_load_of : list of (int, int)
         Where each point load and each line load comes from: 0 for the network's, 1 for the drive's, and which.
     line_beam : list of int

@@ -67,6 +67,10 @@ class Path(ShortRepr):
 
     Attributes
     ----------
+    solver : Solver
+        That found them.
+    points : Points
+        The equilibria, dimensionless, with what a march stores with them.
     status, message : PathStatus, str
         Whether all requested points were reached, and if not, why and where.
     branch : (n,) array of str

@@ -155,9 +155,15 @@ class ExactSampler:
         How far the shuttle goes [m].
     back : float
         How far it is pulled back at most, positive [m].
+
+    Attributes
+    ----------
+    pushed, pulled : path
+        Of a leaf: of beams, or of a solid (`plane_fem_analysis.SolidPath`), which answers the same questions.
+    sides : list of such paths
+        Of the spring, pushed and pulled.
     """
 
-    # paths of beams, or of solids (`plane_fem_analysis.SolidPath`), which answer the same questions
     pushed: Any
     pulled: Any
     sides: list[Any]

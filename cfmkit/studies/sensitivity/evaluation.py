@@ -66,6 +66,8 @@ class Evaluator:
         All that was evaluated so far.
     ends : Counter
         Samples by status.
+    first_failure : str
+        What the first sample without a result says.
     """
 
     study: Study

@@ -74,12 +74,10 @@ def shapes(designs: Designs, points: int) -> tuple[list[Shape | None], NDArray[n
 
 
 class CornerSlab(Slab):
-    """Some undercut designs at all their samples.
+    """Some undercut designs whose shapes exist, at all their samples.
 
-    Parameters
+    Attributes
     ----------
-    designs : Designs
-        Those whose shapes exist.
     found : list of Shape
         Different cams.
     which : (d,) array of int
