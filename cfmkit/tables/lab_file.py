@@ -358,7 +358,7 @@ def split_header(text: str) -> tuple[str, str | None]:
     for number, pattern in enumerate(_IN_HEADER):
         match = pattern.fullmatch(text)
         # A word after "in" or a slash is a unit only if there is such a unit.
-        if match and (number < 2 or _size(match["unit"]) is not None):
+        if match and (number < 2 or _is_unit(match["unit"])):
             return match["name"], match["unit"].strip()
     return text, None
 
@@ -367,7 +367,7 @@ def is_unit_row(cells: Iterable[str]) -> bool:
     """Return whether a line holds nothing but units, bare or in brackets, and at least one of them."""
     units = [_bare_unit(cell) for cell in cells]
     bare = [cell.strip(' "') for cell in cells]
-    known = [unit is not None and _size(unit) is not None for unit in units]
+    known = [unit is not None and _is_unit(unit) for unit in units]
     return any(known) and all(good or not cell or _bracketed(cell) for good, cell in zip(known, bare, strict=True))
 
 
@@ -400,12 +400,12 @@ def _spelt(unit: str) -> str:
     return _SPELLINGS.get(unit, unit)
 
 
-def _size(unit: str) -> bool | None:
-    """Return True for a unit that there is, None otherwise."""
+def _is_unit(unit: str) -> bool:
+    """Tell whether there is a unit."""
     from cfmkit.specs.units.unit_size import is_unit
 
     spelt = _spelt(unit)
-    return True if spelt == "1" or is_unit(spelt) else None
+    return spelt == "1" or is_unit(spelt)
 
 
 def _dimension(unit: str) -> str | None:
