@@ -155,7 +155,7 @@ class RobustProblem:
         return np.asarray(np.where(np.abs(mean) > ASIDE * self.deviations, mean, 0.0))
 
     @property
-    def none(self) -> FloatArray:
+    def perfect(self) -> FloatArray:
         """The errors of a perfect part."""
         return np.zeros(len(self.deviations))
 
@@ -204,7 +204,7 @@ class RobustResult:
     x : (n,) array
         Values of the design.
     share : float
-        Of good parts: estimated to first order, or of the drawn parts that were solved.
+        Of good parts, estimated to first order, even where drawn parts were solved themselves.
     began : float
         The same where the steps began.
     steps, seen : int
@@ -246,13 +246,14 @@ class _Counted:
 
 def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | None:
     """Return a design to first order; None where it, or a neighbour that a difference needs, has no numbers."""
-    middle = seen(x, problem.none)
+    middle = seen(x, problem.perfect)
     if middle is None:
         return None
-    known = problem.slopes(x, problem.none)
-    none: FloatArray = np.zeros((len(middle), 0))  # nothing may move
-    by_x = _by_values(problem, x, problem.none, seen, None if known is None else known.by_x) if len(x) else none
-    by_error = _by_errors(problem, x, seen, None if known is None else known.by_error)
+    known = problem.slopes(x, problem.perfect)
+    no_columns: FloatArray = np.zeros((len(middle), 0))  # nothing may move
+    known_by_x, known_by_error = (None, None) if known is None else (known.by_x, known.by_error)
+    by_x = _by_values(problem, x, problem.perfect, seen, known_by_x) if len(x) else no_columns
+    by_error = _by_errors(problem, x, seen, known_by_error)
     if by_x is None or by_error is None:
         return None
     matrix = problem.matrix
@@ -330,7 +331,7 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
             break
         there = np.clip(now.x + move, *problem.bounds.T)
         # one part tells most of what the way bends: errors and slopes are looked at where that is good only
-        if not _movedtail_risk(now, there, few, scale, problem, seen) < risk:
+        if not _risk_at(now, there, few, scale, problem, seen) < risk:
             trust *= 0.5
             continue
         next_ = linear(problem, there, seen)
@@ -347,11 +348,11 @@ def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> Robus
     return RobustResult(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
 
 
-def _movedtail_risk(
+def _risk_at(
     now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: RobustProblem, seen: _Counted
 ) -> float:
     """Return the risk of other values, errors moving the rows as they do now."""
-    numbers = seen(there, problem.none)
+    numbers = seen(there, problem.perfect)
     if numbers is None:
         return np.inf
     return tail_risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)

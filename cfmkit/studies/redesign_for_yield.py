@@ -411,7 +411,7 @@ def written(sight: Sight, found: RobustResult, problem: RobustProblem) -> Spec:
     """Return the design with its values moved, as few digits of them as matter."""
     steps = 10.0**-DIGITS * problem.reach
     x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
-    return sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.none)
+    return sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.perfect)
 
 
 def costliest_path(sight: Sight, found: RobustResult, problem: RobustProblem) -> str:
