@@ -363,4 +363,4 @@ def _check_values(recording: Recording) -> None:
             )
 
 
-__all__ = ["FEWEST", "Decisions", "Recording", "read_recording"]
+__all__ = ["FEWEST", "Decisions", "Recording", "columns_of", "read_recording", "roles_of"]

@@ -137,8 +137,6 @@ def _miss(z: ComplexArray, t: ComplexArray, fraction: FloatArray) -> tuple[Float
     return gap.imag * np.abs(along), np.angle(t[1:-1] / along)
 
 
-__all__ = ["Biarc", "CoarseDataError", "biarc", "fit_arcs"]
-
 _SEARCH, _CHECK = 4, 16  # parts of each step between samples at which arcs are compared with the curve
 _TRIES = 25  # with less and less of the tolerance, before the fit is given up
 _MOST_TURN = 2.5  # of one piece [rad], so that no arc comes near a full turn

@@ -105,9 +105,6 @@ def _tone(entry: Entry) -> str:
     return ENDS.get(int(entry.code), ("bad", ""))[0] if entry.status != "skipped" else "warn"
 
 
-__all__ = ["NAME", "page"]
-
-
 MOST_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""
 

@@ -321,6 +321,3 @@ def _words(key: str, value: Any) -> str:
     if isinstance(value, dict):
         return str(value.get("name") or _listed(value))
     return format_short(value, "ratio", 3) if key in SHARES and isinstance(value, float | int) else str(value)
-
-
-__all__ = ["NAME", "page"]

@@ -422,4 +422,4 @@ def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShar
         return None, str(error)
 
 
-__all__ = ["DesignTolerances", "Yields", "common", "judge", "tolerances_of", "yields_of"]
+__all__ = ["DesignTolerances", "JudgedParts", "YieldShare", "Yields", "common", "judge", "tolerances_of", "yields_of"]

@@ -134,6 +134,17 @@ def test_the_public_names_exist_and_are_listed():
         cfmkit.simulate  # noqa: B018
 
 
+def test_the_public_names_of_a_module_stand_at_its_end_and_leave_out_nothing_that_it_defines():
+    for name in MODULES:
+        source = source_of(name)
+        if any(other.startswith(f"{name}.") for other in MODULES) or "\n__all__ = " not in source:
+            continue
+        *body, last = ast.parse(source).body
+        assert ast.unparse(last).startswith("__all__ = "), name
+        defined = {one.name for one in body if isinstance(one, ast.FunctionDef | ast.ClassDef)}
+        assert {one for one in defined if not one.startswith("_")} <= set(ast.literal_eval(last.value)), name
+
+
 @pytest.mark.parametrize("folder", sorted((ROOT / "cfmkit").rglob("__init__.py")), ids=lambda path: path.parent.name)
 def test_what_a_folder_says_of_its_files_names_files_that_there_are(folder):
     """A word in backticks is a file of the folder, or something that one of them defines or the folder exports."""

@@ -331,4 +331,15 @@ def all_slopes(m, n_free, tangent, slope, scratch):
     slope[slope.shape[0] - 1] = tangent[n]
 
 
-__all__ = ["SOLVED", "all_slopes", "all_values", "assemble", "solve", "solve_each"]
+__all__ = [
+    "SOLVED",
+    "all_slopes",
+    "all_values",
+    "assemble",
+    "largest",
+    "right_sides",
+    "rounding",
+    "solve",
+    "solve_each",
+    "tangent_index",
+]

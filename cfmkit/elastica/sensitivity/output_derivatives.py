@@ -343,19 +343,6 @@ def _rest_slope(g: Slopes, k: int, index: Any) -> FloatArray:
     return np.asarray(slope(sampler.rest(model)[index]))
 
 
-__all__ = [
-    "ENERGY",
-    "SectionSlopes",
-    "energy",
-    "load_displacement",
-    "motion",
-    "reaction",
-    "sections",
-    "shape",
-    "stress_extremes",
-]
-
-
 @dataclass(frozen=True, eq=False)
 class Gradient(Slopes):
     """Derivatives at p chosen points of a path by k design variables; each output is computed when first needed."""
