@@ -15,6 +15,7 @@ from cfmkit.elastica.kernels.status_codes import (
     DRIVE,
     DRIVE_RATE,
     FULL,
+    GROWTH,
     HIGHEST,
     INERTIA,
     INERTIA_BEFORE,
@@ -23,6 +24,7 @@ from cfmkit.elastica.kernels.status_codes import (
     KEPT_WITH_SLOPES,
     LANDINGS,
     LEAST_SHORTNESS,
+    LOG_DETERMINANT,
     LONG,
     LONGEST,
     LOWEST,
@@ -51,16 +53,13 @@ LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enou
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 STRETCH = 1.3  # factor on a step that lands on a requested value: rather than a short one after it
 CREEPING = 5e-5  # share of the drive's bounds that is a short step
-CREEPS, STRAIGHT = (
-    400,
-    100.0,
-)  # short steps in a row that are enough; change of forces for one of poses that counts for ten
+CREEPS = 400  # short steps in a row that are enough
+STRAIGHT = 100.0  # change of forces for one of poses that counts for ten
 NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
 STILL = 1e-7  # change of a pose that is none: rounding has any direction
 AGAIN = 1e-5  # change of a pose between two solutions of one point
-SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
-
-
+SHORTER = 4.0  # in smallest steps: a longer step may yet be shorter
+APART = 1e4  # in smallest steps: bifurcations farther apart are met one by one
 MISSED = 0.4  # largest share of a step by which it may miss what the points before it, or its slopes, foretell
 
 
@@ -411,7 +410,7 @@ def _between(m, n_free, old, new, state, targets, number, stored, options, outs,
     size = new.shape[0]
     n_all = targets.shape[0]
     scratch, (y, s, tangent) = spaces
-    s[4] = s[5] = 0.0
+    s[GROWTH] = s[LOG_DETERMINANT] = 0.0
     before, after = old[size], state[DRIVE]
     rising = after > before
     first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1
@@ -422,14 +421,14 @@ def _between(m, n_free, old, new, state, targets, number, stored, options, outs,
         if not inside or stored >= outs[0].shape[0] - 2:
             continue
         share = (value - before) / (after - before)
-        for i in range(size):
-            y[i] = old[i] + share * (new[i] - old[i])
-        s[0] = value
+        for r in range(size):
+            y[r] = old[r] + share * (new[r] - old[r])
+        s[DRIVE] = value
         code, iterations = solve(
             m, n_free, y, s, unit, value, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
         )
         n = unit.shape[0] - 1
-        if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + 1e-7:
+        if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + STILL:
             _store(stored, y, s, k, -1.0, iterations, 1.0 if rising else -1.0, outs)
             stored += 1
             if k == n_all - 1:
