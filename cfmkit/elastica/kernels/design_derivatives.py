@@ -120,7 +120,7 @@ def _beam_sides(m, design, y, drive, n_free, values, frames, rel, c, d, rhs, pus
                     for s in range(3):
                         d[e, k, r] += rel[e, G, r, s] * pose[s]
                         rhs[last + r, k] -= rel[e, E, r, s] * pose[s]
-                turned_force(m, design, k, ia, pose, y[own], y[own + 1], force)
+                turned_force(design, k, ia, pose, y[own], y[own + 1], force)
                 _lower(m, ia, k, force[0], force[1], force[2], 0.0, rhs, push)
             fc, fs, ox, oy = frames[e, 0, 0], frames[e, 0, 1], frames[e, 0, 2], frames[e, 0, 3]
             fx, fy = d[e, k, 0], d[e, k, 1]
@@ -129,7 +129,7 @@ def _beam_sides(m, design, y, drive, n_free, values, frames, rel, c, d, rhs, pus
                 pose_slope(m, design, k, ib, values, dvalues, pose)
                 for r in range(3):
                     rhs[last + r, k] += pose[r]
-                turned_force(m, design, k, ib, pose, -y[last], -y[last + 1], force)
+                turned_force(design, k, ib, pose, -y[last], -y[last + 1], force)
                 _lower(m, ib, k, force[0], force[1], force[2], 0.0, rhs, push)
 
 
@@ -254,7 +254,7 @@ def value_changes(m, design, k, drive, values):
 
 
 @inlined
-def turned_force(m, design, k, i, pose, fx, fy, out):
+def turned_force(design, k, i, pose, fx, fy, out):
     """Set the changes that an unchanged force at a place makes as its frame and arm turn; pose: see `pose_slope`."""
     dc, ds = design.frame[k, i, 0], design.frame[k, i, 1]
     out[0], out[1], out[2] = dc * fx + ds * fy, dc * fy - ds * fx, pose[5] * fy - pose[6] * fx
@@ -309,10 +309,10 @@ def load_slopes(m, design, k, values, dvalues, drive, w, out):
 
 
 @kernel
-def _law_slope(kind, value, change, gap, force, dforce):
+def _law_slope(kind, value, change, gap, dforce):
     """Add to `dforce` the derivative of a spring's force on its second place by its own values at unchanged places.
 
-    gap: vector from the first place to the second; force: on the second.
+    gap: vector from the first place to the second.
     """
     k = value[STIFFNESS]
     if kind == TURN:
@@ -354,7 +354,7 @@ def spring_slopes(m, design, k, values, dvalues, w, out):
                 dforce[r] += block[r, s] * (sb[s] - sa[s])
             energy -= force[r] * (sb[r] - sa[r])
         value, change = m.spring_value[q], design.spring[k, q]
-        _law_slope(m.spring_kind[q], value, change, gap, force, dforce)
+        _law_slope(m.spring_kind[q], value, change, gap, dforce)
         energy += _energy_slope(m.spring_kind[q], value, change, gap)
         _spread(m, design, k, i, sa, force, dforce, -1.0, out)
         _spread(m, design, k, j, sb, force, dforce, 1.0, out)
