@@ -312,7 +312,7 @@ class Family:
         ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
         `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
     propose : str, optional
-        ``"module:function"``, ``propose(wish, run) -> Offer``: what the family could do with a wish, by scaling laws.
+        ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws.
     room : str, optional
         ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in.
     elastic_parts : str, optional

@@ -4,9 +4,8 @@
 it on a port of this computer: reachable from this computer only, and only with its token. Changes are those of
 ``--set``: a page can say no more than a command line.
 
-The explorer on a port of this computer: reachable from this computer only, and only with its token. The server of the
-standard library does: one person asks, one answer at a time. What is checked on every request: the name by which it
-was reached (a page elsewhere that lets its own name point here is refused), the token, the size.
+The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
+name by which it was reached (a page elsewhere that lets its own name point here is refused), the token, the size.
 """
 
 from __future__ import annotations

@@ -243,7 +243,7 @@ def _cause(code: int) -> str:
 
 
 def _started(what: BinaryIO) -> _Worker:
-    """Return a new worker that will do `what` is in a file."""
+    """Return a new worker for the work that a file holds: `what`."""
     if not sys.executable:
         raise UsageError("this Python cannot start other processes; use one job (-j 1)")
     jobs_out, jobs_in = os.pipe()

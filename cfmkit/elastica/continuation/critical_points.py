@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
 
 _SEARCHES = 40  # solutions in which a bracket is closed at most: halving alone would take forty to 1e-12 of it
-_CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
-_LOOSE = 10.0  # and in units of the tolerance
+_CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest, at least
+_LOOSE = 10.0  # the same in units of the tolerance
 _HUGE = 700.0  # logarithm of a number that is not too large
 _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side
-_ASIDE = 0.03  # share of a bracket's part by which to stay off a singular point of several modes,
-_NEAREST = 1e-4  # and share of the eigenvalue at the ends: nearer, solutions may be those of branches
+_ASIDE = 0.03  # share of a bracket's part by which to stay off a singular point of several modes
+_NEAREST = 1e-4  # share of the eigenvalue at the ends by which to do so: nearer, solutions may be those of branches
 _NEAR = 0.05  # share of what it is at the ends that is near zero
 _SIZES = (0.06, 0.015, 0.0036)  # how far from a bifurcation its branch is entered [rad]: some are short
 _RIGID = 1e-14  # share of the largest compliance that is none

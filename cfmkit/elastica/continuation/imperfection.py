@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Fit
 
 _KICK = 1e-5  # of the mode, to difference its states
-_DEGREE = 14  # of the polynomials that the rotations are given as,
-_PLACES = 32  # from so many places of a beam
+_DEGREE = 14  # of the polynomials that the rotations are given as
+_PLACES = 32  # of a beam that these polynomials are made from
 _PANELS = 512  # of a smooth piece: the trapezoidal rule then knows the displacement of a whole wave to 1.3e-5
 
 

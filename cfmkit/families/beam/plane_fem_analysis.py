@@ -138,7 +138,7 @@ class SolidSolution(ShortRepr):
 
     @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """The same, by part."""
+        """Of the part, the largest stress [Pa] at every point of the curve, without a place on a beam: zero."""
         return {"part": (self.stress, np.zeros_like(self.stress))}
 
     @property

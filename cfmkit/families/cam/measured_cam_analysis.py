@@ -75,10 +75,10 @@ STRANGE = 0.01
 """Points are those of another part if they are off the design by this part of their height."""
 
 WIDTH_CERTAIN = 5.0
-"""An error of width is taken from the points where it is so many of its standard deviations,"""
+"""Standard deviations of an error of width from which on it is taken from the points, if it explains enough of them."""
 
 WIDTH_EXPLAINS = 0.6
-"""and where it leaves less than this part of the variance of their errors."""
+"""Part of the variance of the points' errors that is left at most without an error of width that is taken."""
 
 
 def analyze_built(spec: CamSpec) -> Result:

@@ -62,7 +62,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     spec : CamSpec
         The mechanism; what is left out is derived.
     run : Run
-        Not needed here: the model is a closed form.
+        Its seed, for the parts that are drawn for `analysis.manufacturing`.
 
     Returns
     -------

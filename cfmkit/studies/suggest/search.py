@@ -87,7 +87,7 @@ class _Times:
 class Answered:
     """What one family had to say: how many candidates it named and how many were made, or why there are none.
 
-    Where no family has a mechanism, `eased_wish` says with which values of a key it would have one.
+    Where no family has a mechanism, `nearest` says with which values of a key it would have one.
     """
 
     family: str

@@ -1,7 +1,7 @@
 """The paper's own laws as intended: a bar that only compresses, and a diamond that only bends. For comparison.
 
-The bar ignores buckling and clamping: its peak is 36 % too high and at twice the travel, its steepest slope is 2.8
-times that of the real leaf, and it is nowhere straight.
+The bar ignores buckling and clamping. For the leaf of Table I of [D] its peak is 36 % too high and at twice the travel,
+and its steepest slope is 2.8 times that of the real leaf. It is nowhere straight.
 
 Reference
 ---------
