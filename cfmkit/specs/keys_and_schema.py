@@ -1,19 +1,27 @@
-"""The keys of a specification as a list: path, kind of value, default and meaning, read off the models."""
+"""What a specification may say, read off the models: a JSON schema, for editors, and a list of the keys.
+
+Defaults and bounds are as they are written in YAML: text with units.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.specs.yamlio import json_schema
+from cfmkit.specs.units.fields import UnitField
+from cfmkit.specs.units.quantities import format_quantity
+from cfmkit.specs.units.table import UNITLESS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
+
+    from pydantic import BaseModel
 
     from cfmkit.specs.spec import Spec
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _NOTHING = object()
+_BOUNDS = ("gt", "ge", "lt", "le")
 _KINDS = {
     "string": "text",
     "integer": "whole number",
@@ -70,6 +78,44 @@ def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
         {key: value for key, value in _renamed(one, name).items() if key != "$defs"} for name, one in each.items()
     ]
     return {"$schema": DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
+
+
+def json_schema(spec_type: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON schema of a specification, with defaults and bounds as text with units."""
+    schema: dict[str, Any] = _with_units(spec_type.model_json_schema())
+    return schema
+
+
+def _with_units(node: Any) -> Any:
+    """Return a schema whose SI defaults and bounds are text."""
+    if isinstance(node, list):
+        return [_with_units(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    result = {key: _with_units(item) for key, item in node.items()}
+    if "default" in node:
+        result["default"] = _default_as_written(node, node["default"])
+    if isinstance(name := node.get("x-dimension"), str):
+        _bounds_as_text(result, name)
+    return result
+
+
+def _default_as_written(node: dict[str, Any], value: Any) -> Any:
+    """Return a default as it would be written where `node` describes the value."""
+    if isinstance(value, list):
+        inner: dict[str, Any] = node.get("items") or next(iter(node.get("prefixItems", ())), {})
+        return [_default_as_written(inner, item) for item in value]
+    choices = (node, *node.get("anyOf", ()))
+    dimension = next((one["x-dimension"] for one in choices if "x-dimension" in one), None)
+    if not isinstance(value, int | float) or isinstance(value, bool) or dimension is None or dimension in UNITLESS:
+        return value
+    return format_quantity(value, dimension.split(" ")[0])
+
+
+def _bounds_as_text(node: dict[str, Any], dimension: str) -> None:
+    bounds = {name: node.pop(name) for name in _BOUNDS if name in node}
+    if bounds:
+        node["x-allowed"] = UnitField((dimension.split(" ")[0],)).limits(bounds)
 
 
 def keys(model: type[Spec]) -> tuple[Key, ...]:

@@ -9,9 +9,10 @@ import pytest
 from pydantic import Field, model_validator
 
 from cfmkit.errors import SpecError, UsageError
+from cfmkit.specs.keys_and_schema import json_schema
 from cfmkit.specs.spec import Analysis, Model, Spec
 from cfmkit.specs.units import Angle, Force, Length, Mass, Ratio, RotationalStiffness, Stiffness
-from cfmkit.specs.yamlio import json_schema, read_document
+from cfmkit.specs.yamlio import read_document
 
 CORPUS = Path(__file__).parent / "bad_specs"
 

@@ -8,6 +8,5 @@ specification or a `cfmkit.errors.SpecError` that lists everything wrong at once
 from cfmkit.specs.yamlio.document import Document, read_document
 from cfmkit.specs.yamlio.dump import dump
 from cfmkit.specs.yamlio.explain_validation_errors import did_you_mean, spec_error
-from cfmkit.specs.yamlio.json_schema import json_schema
 
-__all__ = ["Document", "did_you_mean", "dump", "json_schema", "read_document", "spec_error"]
+__all__ = ["Document", "did_you_mean", "dump", "read_document", "spec_error"]
