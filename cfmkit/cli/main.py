@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit._version import __version__
-from cfmkit.cli import completion_candidates, streams
+from cfmkit.cli import shell_completion, streams
 from cfmkit.cli.commands import parse, program
 from cfmkit.cli.failures import Stopped, fail
 from cfmkit.cli.output import Terminal
@@ -181,9 +181,9 @@ def _of_shell(verb: str, text: str) -> Any:
     return typer.Option(
         f"--{verb}-completion",
         metavar="[SHELL]",
-        help=f"{text}: {', '.join(completion_candidates.SHELLS)}; default: the shell this runs in.",
-        callback=getattr(completion_candidates, verb),
-        autocompletion=completion_candidates.shells,
+        help=f"{text}: {', '.join(shell_completion.SHELLS)}; default: the shell this runs in.",
+        callback=getattr(shell_completion, verb),
+        autocompletion=shell_completion.shells,
     )
 
 

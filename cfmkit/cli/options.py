@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,7 +118,7 @@ class Changing(Common):
             text="Replace a value of the spec, with its unit, e.g. --set design.force='60 N'. Repeatable. "
             """Put a key that itself has dots in double quotes: 'a."b.c"=1 mm'. """
             "With a family in front it applies only to specs of that family: cam:design.force='60 N'.",
-            autocompletion=completion_candidates.changes,
+            autocompletion=shell_completion.changes,
         ),
     ] = None
 
@@ -174,7 +174,7 @@ class OneSpec(Changing):
     """What a verb takes that reads one specification and writes a folder."""
 
     spec: Annotated[
-        str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", completion_candidates.specs)
+        str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", shell_completion.specs)
     ]
     out: Out = None
 

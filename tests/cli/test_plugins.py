@@ -13,7 +13,7 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
 from cfmkit.families import entry_point_plugins
 
@@ -75,8 +75,8 @@ def test_a_run_says_which_package_computed_it(site):
 
 
 def test_names_are_completed():
-    assert completion_candidates.families("ob") == ["oblique"]
-    assert "oblique" in completion_candidates.topics("obl")
+    assert shell_completion.families("ob") == ["oblique"]
+    assert "oblique" in shell_completion.topics("obl")
 
 
 def test_a_family_has_its_article(monkeypatch):

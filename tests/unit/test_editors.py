@@ -14,9 +14,9 @@ import pytest
 
 import cfmkit
 from cfmkit import families
-from cfmkit.cli import completion_candidates
-from cfmkit.cli.completion_scripts import BASH, ZSH
+from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
+from cfmkit.cli.shell_completion import BASH, ZSH
 from cfmkit.runs.editor_schema import LINE, metric_names, schema
 
 ROOT = Path(__file__).parents[2]
@@ -63,7 +63,7 @@ def test_a_file_of_its_own_on_request(tmp_path, monkeypatch, capsys):
 
 
 def completed(text, **named):
-    return completion_candidates.changes(SimpleNamespace(params=named), text)
+    return shell_completion.changes(SimpleNamespace(params=named), text)
 
 
 def test_keys_of_set_are_those_of_the_family_on_the_command_line():

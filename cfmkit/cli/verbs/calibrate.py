@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_record, option, read_measured
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
 class CalibrateOptions(Computing, Measuring):
     """Arguments and options."""
 
-    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", completion_candidates.tables)]
+    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", shell_completion.tables)]
     fit: Annotated[
         str,
         option(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, flag, option
 from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verb_result import Answer
@@ -24,7 +24,7 @@ class FigureOptions(Changing, FigureChoice):
 
     file: Annotated[
         str,
-        argument("FILE", "YAML file: panels (each with run and plot), columns, width.", completion_candidates.specs),
+        argument("FILE", "YAML file: panels (each with run and plot), columns, width.", shell_completion.specs),
     ]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/FILE-figure/.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
@@ -27,7 +27,7 @@ class MeasureOptions(Measuring, FigureChoice):
     """Arguments and options."""
 
     data: Annotated[
-        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", completion_candidates.tables)
+        str, argument("DATA.csv", "Columns with displacement and force, optionally time.", shell_completion.tables)
     ]
     out: Annotated[
         str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, flag, option
 from cfmkit.cli.page_block_types import GOOD, Paragraph, Verbatim, next_command
 from cfmkit.cli.verb_result import Answer
@@ -24,7 +24,7 @@ class NewOptions(Common):
     """Arguments and options."""
 
     family: Annotated[
-        str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", completion_candidates.families)
+        str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", shell_completion.families)
     ]
     out: Annotated[
         str | None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument
 from cfmkit.cli.page_block_types import JsonText
 from cfmkit.cli.verb_result import Answer, reported_for
@@ -21,9 +21,9 @@ EXAMPLE = "cfmkit schema cam > cam.schema.json"
 class SchemaOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[
-        str | None, argument("FAMILY", "One family only; default: all.", completion_candidates.families)
-    ] = None
+    family: Annotated[str | None, argument("FAMILY", "One family only; default: all.", shell_completion.families)] = (
+        None
+    )
 
 
 def run(options: SchemaOptions, terminal: Terminal) -> Answer:

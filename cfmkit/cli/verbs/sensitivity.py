@@ -7,7 +7,7 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_block_types import (
     BAD,
@@ -95,7 +95,7 @@ class SensitivityOptions(Studying):
             metavar="A.B=SPREAD",
             text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
             "mechanism.width=uniform:2%. Repeatable; replaces the spec's parameters.",
-            autocompletion=completion_candidates.changes,
+            autocompletion=shell_completion.changes,
         ),
     ] = None
     on_failure: Annotated[

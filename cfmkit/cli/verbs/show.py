@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.cli.page_block_types import BLANK, GOOD, Paragraph, field, listed
 from cfmkit.cli.verb_result import Answer, reported_for
@@ -28,7 +28,7 @@ class ShowOptions(Common):
             "NAME",
             "What to explain: a family, units, metrics, materials, references, or anything by its name: brace_length, "
             "pla, MPa; default: list all.",
-            completion_candidates.topics,
+            shell_completion.topics,
         ),
     ] = None
     figure: Annotated[

@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli import completion_candidates
+from cfmkit.cli import shell_completion
 from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_block_types import (
     BAD,
@@ -58,7 +58,7 @@ class SweepOptions(Studying):
             metavar="A.B=VALUES",
             text="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
             "Repeatable; replaces what the spec's block sweep varies.",
-            autocompletion=completion_candidates.changes,
+            autocompletion=shell_completion.changes,
         ),
     ] = None
     zip: Annotated[bool, flag("--zip", text="Vary values in step instead of in all combinations.")] = False
