@@ -20,8 +20,7 @@ from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
-from cfmkit.families.slider_crank.springs_wound_for_wish import wound
-from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning
+from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
 from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
