@@ -124,10 +124,10 @@ class ComputedRow:
 
 def rows() -> tuple[PrintedRow, ...]:
     """Return every row, paper by paper as they are in the file."""
-    from cfmkit.specs.yamlio.parse_trusted_yaml import read_plain
+    from cfmkit.specs.yamlio.tree_builder import read_trusted
 
     text = Path(__file__).with_name("printed_numbers.yaml").read_text(encoding="utf-8")
-    papers: Mapping[str, Mapping[str, Any]] = read_plain(text)
+    papers: Mapping[str, Mapping[str, Any]] = read_trusted(text)
     return tuple(_row(paper, item["family"], entry) for paper, item in papers.items() for entry in item["rows"])
 
 

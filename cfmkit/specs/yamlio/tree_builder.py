@@ -1,8 +1,7 @@
 """From the parser's events to plain Python, with the place of every key and value.
 
-Only PyYAML's scanner and parser are used: what a scalar means is decided in
-`cfmkit.specs.yamlio.scalars`, and tags, anchors, merge keys and second documents do not
-exist here.
+Of PyYAML only the scanner and the parser read what users write: what a scalar means is decided in
+`cfmkit.specs.yamlio.scalars`, and tags, anchors, merge keys and second documents do not exist here.
 """
 
 from __future__ import annotations
@@ -89,6 +88,11 @@ def _parsed(text: str) -> Reading:
         except yaml.YAMLError as error:
             fault = fault_of(error)
     return Reading(faults=[fault], broken=True, unparsed=True)
+
+
+def read_trusted(text: str) -> Any:
+    """Return what YAML of the package's own data files holds, which no user writes: no places, limits or hints."""
+    return yaml.load(text, _LOADERS[0])
 
 
 class _Builder:
