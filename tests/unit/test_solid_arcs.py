@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from shapely import Polygon
 
-from cfmkit.solid.arcs_of_fillets import smallest_arc, with_arcs
-from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes
+from cfmkit.solid.boundary_and_element_sizes import GRADING, Ring, Sizes, smallest_arc, with_arcs
 from cfmkit.solid.mesh import _lattice, mesh
 
 TURN = np.radians(1.0)

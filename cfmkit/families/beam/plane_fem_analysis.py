@@ -264,7 +264,7 @@ def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidS
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.arcs_of_fillets import with_arcs
+    from cfmkit.solid.boundary_and_element_sizes import with_arcs
     from cfmkit.solid.meshed_part import TURN, HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
@@ -454,7 +454,7 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
 def _sharp(fillet: float) -> str:
     """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
     from cfmkit.export.union import ROUGH
-    from cfmkit.solid.arcs_of_fillets import smallest_arc
+    from cfmkit.solid.boundary_and_element_sizes import smallest_arc
 
     if 0.0 < fillet < smallest_arc(ROUGH):
         radius = format_short(fillet, "length")
