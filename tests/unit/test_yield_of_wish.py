@@ -15,8 +15,8 @@ from cfmkit.runs.read_wish import wish_of
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
-from cfmkit.studies.suggest.redesign_for_wished_yield import Moved, moved_for_yield
 from cfmkit.studies.suggest.search import _key, _Making, _Times
+from cfmkit.studies.suggest.yield_of_proposal import Moved, moved_for_yield
 from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 
 POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}

@@ -17,8 +17,7 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.studies.suggest.redesign_for_wished_yield import Moved, moved_for_yield
-from cfmkit.studies.suggest.yield_of_proposal import GoodParts, good_parts, with_made_parts
+from cfmkit.studies.suggest.yield_of_proposal import GoodParts, Moved, good_parts, moved_for_yield, with_made_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
