@@ -29,8 +29,8 @@ from cfmkit.specs.units import Place, Share, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
-    from cfmkit.families.beam.mechanism.spec import Mechanism
-    from cfmkit.families.beam.network_elements.spec import BeamMaterial, PartSpec, Thickness
+    from cfmkit.families.beam.mechanism_spec import Mechanism
+    from cfmkit.families.beam.network_elements_spec import BeamMaterial, PartSpec, Thickness
     from cfmkit.families.beam.spec import BeamSpec, Rescale
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.model.network_under_drive import Layout
-from cfmkit.families.beam.network_elements.spec import PartSpec
+from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import mirror_axis
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.fem_results import FilletRow, with_nominal

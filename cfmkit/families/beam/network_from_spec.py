@@ -28,7 +28,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
 from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
-from cfmkit.families.beam.network_elements.spec import HELD
+from cfmkit.families.beam.network_elements_spec import HELD
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
-    from cfmkit.families.beam.network_elements.spec import (
+    from cfmkit.families.beam.network_elements_spec import (
         LoadSpec,
         MemberSpec,
         NodeSpec,

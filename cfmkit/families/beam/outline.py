@@ -29,7 +29,7 @@ from cfmkit.export.contours import (
 )
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import quarter_pieces
-from cfmkit.families.beam.network_elements.spec import PartSpec
+from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
 from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_drawn_solid

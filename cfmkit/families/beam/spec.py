@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.beam.mechanism.spec import Mechanism
-from cfmkit.families.beam.network_elements.spec import BeamMaterial, MaterialField
+from cfmkit.families.beam.mechanism_spec import Mechanism
+from cfmkit.families.beam.network_elements_spec import BeamMaterial, MaterialField
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.data_file_paths import DataSource

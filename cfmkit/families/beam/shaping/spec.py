@@ -12,7 +12,7 @@ from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.beam.mechanism.spec import Mechanism
+    from cfmkit.families.beam.mechanism_spec import Mechanism
 
 Range = tuple[Length, Length]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.beam.network_elements.spec import (
+from cfmkit.families.beam.network_elements_spec import (
     HELD,
     Copies,
     DriveSpec,

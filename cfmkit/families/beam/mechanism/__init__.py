@@ -1,1 +1,0 @@
-"""A network of beams as a specification describes it."""

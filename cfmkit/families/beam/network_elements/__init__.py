@@ -1,1 +1,0 @@
-"""The parts that a planar network is made of, as a specification describes them."""

@@ -1,1 +1,0 @@
-"""How leaves and spring are cut, and what stands around them."""
