@@ -268,6 +268,11 @@ def usable_interval(
     return np.where(some, start[rows, best], np.nan), np.where(some, steps.high[rows, best], np.nan)
 
 
+def usable_stroke(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return how long the usable intervals between starts and ends are, (d,): zero where there is none."""
+    return np.where(np.isnan(start), 0.0, end - start)
+
+
 def _solved_interval(
     branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

@@ -14,6 +14,8 @@ import matplotlib
 from cfmkit.plots.style import png, styled
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from matplotlib.figure import Figure
 
 _WRITERS: Any = {
@@ -83,6 +85,12 @@ def inline(drawn: bytes, name: str) -> str:
     text = re.sub(r' id="([^"]*)"', rf' id="{name}-\1"', text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
     return _short(text)
+
+
+def first_picture(makers: Mapping[str, Callable[[], Figure]]) -> str:
+    """Return the first of some figures as a part of a page; nothing where there is none."""
+    name, draw = next(iter(makers.items()), ("", None))
+    return "" if draw is None else inline(svg(draw()), name)
 
 
 def _short(text: str) -> str:

@@ -48,6 +48,9 @@ class AnalysisView(Result):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
+        from cfmkit.plots.figures import figures
+        from cfmkit.plots.vector_formats import first_picture
+
         parts = [f"<strong>{escape(self.spec.name)}</strong> ({escape(self.spec.family)}): {escape(self.message)}"]
         if self.curves:
             lead = (*family(self.spec.family).leading, "force_mean", "torque_mean", "usable_stroke")
@@ -58,15 +61,7 @@ class AnalysisView(Result):
             met = [(one.sentence, "yes" if one.ok else "no") for one in self.requirements]
             parts.append(html_table(("requirement", "met"), met))
         parts += [f"<p>{escape(one.name)}: {escape(one.message)}</p>" for one in self.warnings]
-        return "<div>" + "".join(parts) + self._picture() + "</div>"
-
-    def _picture(self) -> str:
-        """Return the first figure as SVG; nothing where there is none."""
-        from cfmkit.plots.figures import figures
-        from cfmkit.plots.vector_formats import inline, svg
-
-        name, draw = next(iter(figures(family(self.spec.family), self).items()), ("", None))
-        return "" if draw is None else inline(svg(draw()), name)
+        return "<div>" + "".join(parts) + first_picture(figures(family(self.spec.family), self)) + "</div>"
 
 
 def _reported(quantity: Quantity) -> str:

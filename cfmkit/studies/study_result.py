@@ -62,6 +62,7 @@ class StudyResult:
         """Return what a notebook shows: how the study ended, its best point, requirements, a figure, first points."""
         from html import escape
 
+        from cfmkit.plots.vector_formats import first_picture
         from cfmkit.tables.html import first_rows, html_table
 
         parts = [f"<p>{escape(str(self.summary.get('message', '')))}</p>"]
@@ -74,7 +75,7 @@ class StudyResult:
         if required:
             met = [(f"{one['metric']}{_bounds(one)}", f"{one['met']} of {one['of']}") for one in required]
             parts.append(html_table(("requirement", "points that meet it"), met))
-        return f"<div>{''.join(parts)}{self._picture()}{first_rows(self.table)}</div>"
+        return f"<div>{''.join(parts)}{first_picture(self.figures)}{first_rows(self.table)}</div>"
 
     @property
     def figures(self) -> Mapping[str, Callable[[], Figure]]:
@@ -88,13 +89,6 @@ class StudyResult:
         from cfmkit.studies.pictures import makers_of_tables
 
         return makers_of_tables(self.spec, self.summary, self.table, self.curves)
-
-    def _picture(self) -> str:
-        """Return the first picture as SVG; nothing where there is none."""
-        from cfmkit.plots.vector_formats import inline, svg
-
-        name, draw = next(iter(self.figures.items()), ("", None))
-        return "" if draw is None else inline(svg(draw()), name)
 
     def to_pandas(self) -> Any:
         """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""

@@ -9,8 +9,6 @@ from cfmkit.elastica.kernels.newton import all_values, assemble
 from cfmkit.elastica.kernels.springs_and_loads import add_force, add_loads, add_springs, jacobian, wires_of
 from cfmkit.elastica.kernels.status_codes import JACOBIANS, OF_BEAMS, VECTORS
 
-STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's start
-
 
 @kernel
 def forces(m, n_free, ys, drives, out, scratch):
@@ -54,7 +52,8 @@ def tangent(m, n_free, y, drive, scratch):
 def states(m, n_free, y, drive, out):
     """Set the states at the step boundaries of all segments at one point; real or complex.
 
-    out (steps + segments, 7): each segment has one row more than steps.
+    out (steps + segments, 7): x, y, rotation, moment, h, v, and the strain energy since the segment's start; each
+    segment has one row more than steps.
     """
     n = n_free + 3 * m.beam_end.shape[0]
     row = 0
@@ -75,4 +74,4 @@ def states(m, n_free, y, drive, out):
             row += rows
 
 
-__all__ = ["STATE", "all_values", "forces", "pose_of", "states", "tangent"]
+__all__ = ["forces", "states", "tangent"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.scalar_results import DEFINITIONS
-from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval, usable_stroke
 from cfmkit.metrics.spread import metric_of, metrics_of
 
 if TYPE_CHECKING:
@@ -102,14 +102,9 @@ def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:
     return cams.usable
 
 
-def _usable_stroke(cams: Slab, _window: Window) -> FloatArray:
-    start, end = _usable(cams)
-    return np.where(np.isnan(start), 0.0, end - start)
-
-
 CYCLES: dict[str, Callable[[Slab, Window], FloatArray]] = {
     "hysteresis_area": _hysteresis,
-    "usable_stroke": _usable_stroke,
+    "usable_stroke": lambda cams, _window: usable_stroke(*_usable(cams)),
     "usable_start": lambda cams, _window: _usable(cams)[0],
     "usable_end": lambda cams, _window: _usable(cams)[1],
 }

@@ -42,6 +42,7 @@ from cfmkit.metrics.ranges_many import (
     range_95,
     range_95_fraction,
     usable_interval,
+    usable_stroke,
 )
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone, sharpened
@@ -414,15 +415,10 @@ EACH: dict[str, Callable[[Solution], float | None]] = {
 """Values that are found design by design, on the curves that are known of all."""
 
 
-def _usable_stroke(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
-    start, end = slab.usable(window)
-    return np.where(np.isnan(start), 0.0, end - start)
-
-
 PLACES: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
     "range_95": lambda slab, window: range_95(slab.everywhere(window)),
     "range_95_fraction": lambda slab, window: range_95_fraction(slab.everywhere(window)),
-    "usable_stroke": _usable_stroke,
+    "usable_stroke": lambda slab, window: usable_stroke(*slab.usable(window)),
     "usable_start": lambda slab, window: slab.usable(window)[0],
     "usable_end": lambda slab, window: slab.usable(window)[1],
 }
