@@ -131,21 +131,17 @@ def changes(ctx: Any, incomplete: str) -> list[str]:
     Items of lists are completed with the number of the first.
     """
     from cfmkit import families
+    from cfmkit.specs.keys_and_schema import keys
 
     path, equals, _ = incomplete.partition("=")
-    known = {key.path.replace("[]", ".0"): key for name in _families_named(ctx) for key in _keys(families.family(name))}
+    records = [families.family(name) for name in _families_named(ctx)]
+    known = {key.path.replace("[]", ".0"): key for record in records for key in keys(record.spec_type)}
     if equals:
         words = known[path].kind.split(" | ") if path in known and " | " in known[path].kind else []
         return [f"{path}={word}" for word in words if f"{path}={word}".startswith(incomplete)]
     found = [path for path in known if path.startswith(incomplete) and known[path].kind != "block"]
     # one level at a time would save no key press: names below a block are few
     return [f"{path}=" for path in found]
-
-
-def _keys(record: Any) -> Any:
-    from cfmkit.specs.keys_and_schema import keys
-
-    return keys(record.spec_type)
 
 
 def _families_named(ctx: Any) -> list[str]:

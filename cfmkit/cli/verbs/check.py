@@ -48,9 +48,11 @@ def run(options: CheckOptions, terminal: Terminal) -> Answer:
     """Check specs without computing anything: every problem of every file, with its line and column."""
     files = _files(options.specs)
     found = [_checked(name, options.changes, len(files) > 1) for name in files]
+    bad = sum(item.spec is None for item in found)
+    message = f"{bad} of {len(found)} files are not valid" if bad else ""
 
     return Answer(
-        {"files": [_record(item) for item in found], "message": _message(found)},
+        {"files": [_record(item) for item in found], "message": message},
         _lines(found, terminal.verbose > 0),
         _code([item.failure.exit_code for item in found]),
         complaints=tuple(line for item in found for line in item.failure.complaints),
@@ -80,11 +82,6 @@ def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Checked:
 def _code(codes: list[ExitCode]) -> ExitCode:
     """Return the exit code of all files: an invalid one counts before a missing one."""
     return next((code for code in (ExitCode.INVALID, ExitCode.USAGE) if code in codes), ExitCode.OK)
-
-
-def _message(found: list[Checked]) -> str:
-    bad = sum(item.spec is None for item in found)
-    return f"{bad} of {len(found)} files are not valid" if bad else ""
 
 
 def _record(item: Checked) -> dict[str, Any]:

@@ -39,7 +39,9 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
     found = {
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
         "packages": list(_packages()),
-        "folders": [_folder(what, path) for what, path in _folders().items()],
+        "folders": [
+            {"name": what, "path": str(path), "writable": _writable(path)} for what, path in _folders().items()
+        ],
         "solver": _solver(),
         "fonts": _fonts(),
         "caches": list(_caches()),
@@ -86,10 +88,6 @@ def _folders() -> Mapping[str, Path]:
     }
 
 
-def _folder(what: str, path: Path) -> Record:
-    return {"name": what, "path": str(path), "writable": _writable(path)}
-
-
 def _writable(path: Path) -> bool:
     """Return whether a folder, or the nearest one above it that is there, can be written to."""
     while not path.exists() and path != path.parent:
@@ -128,15 +126,12 @@ def _families() -> Iterator[Record]:
     from cfmkit import families
 
     for offer, found in families.examined():
-        about = {"package": "cfmkit", "version": __version__} if offer is None else _source(offer)
+        package, version = ("cfmkit", __version__) if offer is None else (offer.package, offer.version)
+        about = {"package": package, "version": version}
         if isinstance(found, str):
             yield {"name": offer.name if offer else "", **about, "state": "skipped", "reason": found}
         else:
             yield {"name": found.name, **about, "state": "ok", "reason": ""}
-
-
-def _source(offer: Any) -> Record:
-    return {"package": offer.package, "version": offer.version}
 
 
 def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
@@ -158,7 +153,8 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
     yield from listed("versions", versions, (field("name"), field("version", wraps=True)))
     yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
-    yield from listed("folders", found["folders"], (field("name"), Field("", _access), field("path", wraps=True)))
+    access = Field("", lambda one: "writable" if one["writable"] else "cannot be written to")
+    yield from listed("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
     compiled = found["solver"]["folder"] or "not yet: some 15 seconds at the first use, or `cfmkit warm`"
     yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
     fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is not whole"}
@@ -174,7 +170,3 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
 def _version(package: Mapping[str, Any]) -> str:
     wanted = f"not installed; only for cfmkit[{package['extra']}]" if package["extra"] else "missing"
     return str(package["version"] or wanted)
-
-
-def _access(folder: Mapping[str, Any]) -> str:
-    return "writable" if folder["writable"] else "cannot be written to"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import Common, Jobs, argument, flag, option
 from cfmkit.cli.page_block_types import BAD, GOOD, Paragraph, field, listed, next_command
@@ -12,7 +12,6 @@ from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
-    from cfmkit.studies.batch_sources_and_outcomes import Entry
 
 PLACE = 52
 EXAMPLE = "cfmkit examples cam"
@@ -113,7 +112,10 @@ def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
     with TemporaryDirectory(prefix="cfmkit-examples-") as place, watching(terminal, "examples") as progress:
         files = [one.path for one in chosen]
         found = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)
-    records = [_record(one.name, entry) for one, entry in zip(chosen, found.entries, strict=True)]
+    records = [
+        {"name": one.name, "status": entry.status, "exit_code": int(entry.code), "message": entry.message}
+        for one, entry in zip(chosen, found.entries, strict=True)
+    ]
     wrong = [one for one in records if one["exit_code"] != 0]
     reported = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
     page = (
@@ -121,7 +123,3 @@ def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
         Paragraph("verdict", reported, BAD if wrong else GOOD),
     )
     return Answer({"message": reported, "examples": records}, page, found.exit_code)
-
-
-def _record(name: str, entry: Entry) -> dict[str, Any]:
-    return {"name": name, "status": entry.status, "exit_code": int(entry.code), "message": entry.message}

@@ -58,10 +58,22 @@ class MeasureOptions(Measuring, FigureChoice):
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
     from cfmkit.experiment.measurement_and_calibration_outputs import files
+    from cfmkit.runs.measure_and_calibrate_api import measure
     from cfmkit.store import RunFolder
 
     out, form = _folder(options), options.form
-    report = _report(options)
+    report = measure(
+        options.data,
+        units=options.units,
+        window=options.window,
+        filter=options.filter or "default",
+        target=options.target,
+        tare=options.tare,
+        zero=options.zero,
+        flip=options.flips,
+        as_recorded=options.as_recorded,
+        one_branch=options.one_branch,
+    )
     with RunFolder(out) as folder:
         folder.check("metrics.json", "curve.csv", "cycles.csv")
         for name, data in files(report, not options.no_plots, form):
@@ -85,23 +97,6 @@ def _folder(options: MeasureOptions) -> str:
     if options.out is not None and not options.out.strip():
         raise UsageError("--out is empty; give a folder")
     return options.out or str(Path("cfm-out") / f"{Path(options.data).stem}-measure")
-
-
-def _report(options: MeasureOptions) -> MeasureReport:
-    from cfmkit.runs.measure_and_calibrate_api import measure
-
-    return measure(
-        options.data,
-        units=options.units,
-        window=options.window,
-        filter=options.filter or "default",
-        target=options.target,
-        tare=options.tare,
-        zero=options.zero,
-        flip=options.flips,
-        as_recorded=options.as_recorded,
-        one_branch=options.one_branch,
-    )
 
 
 def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator[Block]:

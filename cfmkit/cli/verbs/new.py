@@ -42,20 +42,23 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
     from cfmkit.runs.editor_schema import with_line, write_schema
-    from cfmkit.store.safe_disk_changes import discard
+    from cfmkit.store.safe_disk_changes import discard, reporting, write_new
 
     record = family(options.family)
     text = template(options.family)
     name = f"{options.family}.yaml" if options.out is None else options.out
     if name == "-":
         return Answer({"family": options.family, "text": text}, (Verbatim(text),))
-    _write(Path(name), with_line(text, record) if options.schema else text)
+    target = Path(name)
+    content = with_line(text, record) if options.schema else text
+    with reporting(target):
+        write_new(target, content.encode())
     names = [name]
     if options.schema:
         try:
-            names.append(str(write_schema(Path(name), record)))
+            names.append(str(write_schema(target, record)))
         except OutputError:
-            discard(Path(name))  # both or none: a second try would find it in its way
+            discard(target)  # both or none: a second try would find it in its way
             raise
     verb = "design" if record.design else "analyze"
     page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
@@ -78,17 +81,3 @@ def template(name: str) -> str:
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
     return packaged(record.template)
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file that is not there yet.
-
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it is, or cannot be written.
-    """
-    from cfmkit.store.safe_disk_changes import reporting, write_new
-
-    with reporting(path):
-        write_new(path, text.encode())

@@ -57,7 +57,8 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
     with watching(terminal, "rows") as progress:
         progress.total(len(asked))
         for done in check(asked, options.everything):
-            records.append(asdict(done.row) | {"command": done.row.command} | _outcome(done))
+            outcome = {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
+            records.append(asdict(done.row) | {"command": done.row.command} | outcome)
             progress.done(1, 0, False)
     counts = {verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict) for verdict in VERDICTS}
     wrong = [one for one in records if one["trouble"]]
@@ -73,10 +74,6 @@ def run(options: PapersOptions, terminal: Terminal) -> Answer:
         complaints=tuple(f"error    {one['message']}" for one in errors),
         errors=errors,
     )
-
-
-def _outcome(done: Any) -> dict[str, Any]:
-    return {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
 
 
 def _page(records: Sequence[Record], counts: Mapping[str, int], reported: str, verbose: bool) -> Iterator[Block]:

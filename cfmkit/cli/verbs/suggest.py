@@ -289,18 +289,14 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
             f"the time was up before more than design.yaml was written of {', '.join(bare)}: `cfmkit analyze` of it "
             "gives the curve and figures, `cfmkit export --format dxf,svg,png` the files to cut and a drawing",
         )
-    if data["proposals"]:
-        yield _next(data["proposals"][0], written.folder)
+    if data["proposals"]:  # files to cut or print of the best
+        best = Path(written.folder) / data["proposals"][0]["folder"] / "design.yaml"
+        yield next_command("cfmkit", "export", str(best))
 
 
 def _complete(folder: str, files: Iterable[str]) -> bool:
     """Return whether more of a proposal is there than its spec."""
     return any(name.startswith(f"{folder}/") and name != f"{folder}/design.yaml" for name in files)
-
-
-def _next(best: Mapping[str, Any], folder: str) -> TextLine:
-    """Return the line with the command that makes files to cut or print of a proposal."""
-    return next_command("cfmkit", "export", str(Path(folder) / best["folder"] / "design.yaml"))
 
 
 def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
