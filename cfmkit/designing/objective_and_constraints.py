@@ -21,11 +21,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-def _unnamed() -> list[str]:
-    """Return nothing: rows that no report speaks of."""
-    return []
-
-
 @dataclass(frozen=True)
 class LimitRows:
     """Some rows of one limit; each must be at least zero, all are of order one.
@@ -45,7 +40,7 @@ class LimitRows:
     name: str
     values: FloatArray
     slopes: FloatArray | None = None
-    about: Callable[[], list[str]] = _unnamed
+    about: Callable[[], list[str]] = list  # nothing: no report speaks of these rows
 
 
 STILL = 1e-9
