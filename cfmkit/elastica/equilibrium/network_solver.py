@@ -27,7 +27,6 @@ from cfmkit.elastica.kernels.workspace import work_space
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.kernels.network_array_types import DiscreteNetwork
-    from cfmkit.elastica.kernels.workspace import WorkSpace
     from cfmkit.elastica.model.network_under_drive import Layout
 
 ITERATIONS = 16
@@ -180,7 +179,7 @@ class Solver:
         self.n_segments = len(self.cut.segment_step) - 1
         self.n = self.n_free + 3 * self.n_beams
         self.size = self.n + 6 * self.n_segments
-        self.scratch = self._scratch()
+        self.scratch = work_space(self.n, self.n_beams, self.n_dofs, self.n_segments)
         self.limits = np.array([tolerance, float(ITERATIONS)])
         self.unit = np.zeros(self.n + 1)
         self.unit[-1] = 1.0
@@ -201,9 +200,6 @@ class Solver:
 
     def _count_free(self) -> int:
         return self.layout.plan.n_free
-
-    def _scratch(self) -> WorkSpace:
-        return work_space(self.n, self.n_beams, self.n_dofs, self.n_segments)
 
     def unstressed(self) -> FloatArray:
         """Return the unknowns of the network at rest, before any load or displacement."""

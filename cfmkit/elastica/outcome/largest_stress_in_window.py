@@ -72,7 +72,9 @@ def largest_stress(
     own = np.arange(max(0, near[0] - MARGIN), min(near[-1] + MARGIN + 1, len(motion)))
     x = motion[own]
     within = (x >= low - slack) & (x <= high + slack)
-    rows = _stresses(_taken(path, order[own]), axial, (own >= near[0]) & (own <= near[-1]), within, best)
+    some = order[own]
+    near_by = replace(path, points=path.points.take(some), branch=path.branch[some], accurate=path.accurate[some])
+    rows = _stresses(near_by, axial, (own >= near[0]) & (own <= near[-1]), within, best)
     best = float(np.nanmax(rows[:, within], initial=best))
     for name, row in zip(path.layout.network.beams, rows, strict=True):
         known = np.isfinite(row)
@@ -80,11 +82,6 @@ def largest_stress(
             if known[part[0]]:
                 best = max(best, _between(at, name, axial, (x[part], row[part]), window, best))
     return best
-
-
-def _taken(path: Path, own: NDArray[np.intp]) -> Path:
-    """Return some points of a path."""
-    return replace(path, points=path.points.take(own), branch=path.branch[own], accurate=path.accurate[own])
 
 
 def _largest_at(path: Path, axial: bool) -> float:
