@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import DataError
+from cfmkit.experiment.zeros_and_signs import words_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -154,15 +155,12 @@ def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
         pieces.append(inside[~standing[inside]])
     kept = [piece for piece in pieces if len(piece) >= _FEWEST]
     if not kept:
+        _, moved = words_of(recording.kind)
         raise DataError(
-            f"{recording.name}: no stroke has at least {_FEWEST} points: the {_word(recording)} jumps back and forth, "
+            f"{recording.name}: no stroke has at least {_FEWEST} points: the {moved} jumps back and forth, "
             "or the rows are not in the order of time"
         )
     return Strokes(_numbered(kept, motion), int(standing.sum()))
-
-
-def _word(recording: Recording) -> str:
-    return "displacement" if recording.kind == "force" else "angle"
 
 
 def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[Stroke, ...]:
