@@ -117,13 +117,9 @@ def _solid(kernel: Any, face: Any, holes: Sequence[Any], sheet: Sheet) -> Any:
             continue
         thickest = max(thickest, one.thickness)
         body = (body - stencil) + (_prism(kernel, face, one.thickness) & stencil)
-    lift = 0.5 * to_border(min(thickest, _highest(body)), "length")
+    height = float(body.bounding_box().size.Z) * 1e-3
+    lift = 0.5 * to_border(min(thickest, height), "length")
     return body.moved(kernel.Location((0.0, 0.0, float(lift))))
-
-
-def _highest(body: Any) -> float:
-    """Return how high a body is [m]."""
-    return float(body.bounding_box().size.Z) * 1e-3
 
 
 def _prism(kernel: Any, face: Any, thickness: float) -> Any:

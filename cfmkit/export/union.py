@@ -9,13 +9,11 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from cfmkit.errors import GeometryError
 from cfmkit.export.contours import Contour, Line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
 
@@ -74,18 +72,12 @@ def quarter_pieces(radius: float, bulge: float) -> int:
     return min(_MOST_PIECES, math.ceil(0.25 * math.pi / math.acos(max(1.0 - bulge / radius, 0.0)))) if radius > 0 else 1
 
 
-def _contours(part: Any, layer: str) -> list[Contour]:
-    rings = [(part.exterior, False), *((ring, True) for ring in part.interiors)]
-    return [_contour(np.asarray(ring.coords), layer, hole) for ring, hole in rings if _area(ring) > _SPECK]
-
-
-def _area(ring: Any) -> float:
+def _contours(part: Any, layer: str) -> Iterator[Contour]:
+    """Yield the outline of a polygon and its holes, without specks."""
     from shapely import Polygon
 
-    return float(Polygon(ring).area)
-
-
-def _contour(points: FloatArray, layer: str, hole: bool) -> Contour:
-    ends = [(float(x), float(y)) for x, y in points]
-    edges = tuple(Line(a, b) for a, b in itertools.pairwise(ends) if a != b)
-    return Contour(edges, layer, closed=True, hole=hole)
+    for ring, hole in ((part.exterior, False), *((ring, True) for ring in part.interiors)):
+        if Polygon(ring).area > _SPECK:
+            ends = [(float(x), float(y)) for x, y in ring.coords]
+            edges = tuple(Line(a, b) for a, b in itertools.pairwise(ends) if a != b)
+            yield Contour(edges, layer, closed=True, hole=hole)
