@@ -20,7 +20,6 @@ from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_s
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Displacement, Rotation
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.solid.meshed_part import MeshSolution
 
@@ -41,15 +40,9 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
         if (found := one.largest(*window)) is not None:
             rows.append(FilletRow(f"{node}: {', '.join(joined)}" if joined else node, one.arc, *found))
     travel = np.array([row.motion for row in rows])
-    paths = partial(both_images, assembly.network, partial(_drive, assembly))
+    drive: Any = assembly.drive()  # through a displacement or a rotation: a solid has no other
+    paths = partial(both_images, assembly.network, lambda points: replace(drive, points=points))
     return with_nominal(rows, nominal_stresses(rows, travel, paths, partial(_described, assembly)))
-
-
-def _drive(assembly: Assembly, travel: FloatArray) -> Displacement | Rotation:
-    """Return the drive through some travels [m or rad]: a solid has no other than these two."""
-    drive: Any = assembly.drive()
-    moved: Displacement | Rotation = replace(drive, points=travel)
-    return moved
 
 
 def _described(assembly: Assembly, points: FloatArray) -> FloatArray:

@@ -86,7 +86,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         values=values,
         warnings=warnings,
         travel=travel_of(solution),
-        target=_target(spec),
+        target=spec.design.rescale.force if spec.design and spec.design.rescale else None,
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
         closed=solution.everywhere,
@@ -171,11 +171,6 @@ def _ending(solution: Solution) -> tuple[Status, str]:
     if path.status is PathStatus.COMPLETE:
         return Status.COMPLETE, ""
     return Status.PARTIAL, ending_of(solution).message
-
-
-def _target(spec: BeamSpec) -> float | None:
-    rescale = spec.design.rescale if spec.design else None
-    return rescale.force if rescale else None
 
 
 def _curve(solution: Solution) -> Curve:

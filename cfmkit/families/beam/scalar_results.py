@@ -82,7 +82,8 @@ def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
         "gap_min": None if solution.gaps[0] is None else solution.gaps[0].size,
         "gap_min_moving": None if solution.gaps[1] is None else solution.gaps[1].size,
         **_closure(solution),
-        **_rest(solution),
+        "prestress_force": _significant(solution.effort, solution.path.error),
+        "prestress_stress": _significant(solution.stress, solution.path.error),
         **(_across(solution) if run.wants(ACROSS) else {}),
         **_swings(solution),
     }
@@ -213,14 +214,6 @@ def _closure(solution: Solution) -> dict[str, float | None]:
         "slenderness_min": min(
             float(np.real(fits[name].length)) / thickest_of(beam.section) for name, beam in beams.items()
         ),
-    }
-
-
-def _rest(solution: Solution) -> dict[str, float | None]:
-    """Return what happens at rest."""
-    return {
-        "prestress_force": _significant(solution.effort, solution.path.error),
-        "prestress_stress": _significant(solution.stress, solution.path.error),
     }
 
 

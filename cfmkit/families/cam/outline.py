@@ -23,6 +23,7 @@ from cfmkit.export.contours import (
     Line,
     Sheet,
     Smooth,
+    circle,
 )
 from cfmkit.families.cam.mechanism_from_spec import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm, rate
@@ -205,7 +206,7 @@ def holes(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> li
         centers += [(side * 0.3 * width, bottom - 0.5 * plate.base_height) for side in (-1.0, 1.0)]
     if _room_at_top(plate, top - bottom, across):
         centers += [(side * 0.5 * across, top - 2.0 * diameter) for side in (-1.0, 1.0)]
-    return [_circle(center, 0.5 * diameter) for center in centers]
+    return [circle((float(x), float(y)), 0.5 * diameter, "cut", hole=True) for x, y in centers]
 
 
 def _extents(flanks: tuple[Smooth, Smooth], plate: Plate) -> tuple[float, float, float]:
@@ -249,11 +250,6 @@ def plate_notes(profiles: Profiles, plate: Plate) -> tuple[str, ...]:
             f"{mm(8 * diameter)} wide, it is {mm(top - bottom)} by {mm(2 * across)} ('mechanism.plate.hole_diameter')"
         )
     return tuple(found)
-
-
-def _circle(center: tuple[float, float], radius: float) -> Contour:
-    circle = Arc((float(center[0]), float(center[1])), radius, 0.0, 2.0 * np.pi)
-    return Contour((circle,), "cut", closed=True, hole=True)
 
 
 def _tables(profiles: Profiles) -> Iterator[Curve2D]:

@@ -190,19 +190,15 @@ def _pushing(spec: SliderCrankSpec, wish: Wish) -> list[SprungMotion]:
     where there are two of the widest, then those that stand beside each other.
     """
     assembly = assemble(spec)
-    link, (first, last) = assembly.linkage, _reached(spec)
+    link = assembly.linkage
+    # between which travels a force may be held, by the analysis of the candidate
+    first, last = (float(end) for end in spec.analysis.window or (0.0, 0.0))
     ends = assembly.units(np.array([0.0, last]))
     high = max(link.offset, *(link.crank * np.sin(ends.angle)))
     beside = min(link.crank, link.coupler)
     inside = min(beside, wish.room[0] - high, wish.room[1] - float(ends.position[0]))
     windows = (first, first + wish.travel), (first, last)
     return [_sprung(wish, assembly, window, wide) for wide in (inside, beside) for window in windows if wide > 0.0]
-
-
-def _reached(spec: SliderCrankSpec) -> tuple[float, float]:
-    """Return between which travels a force may be held, by the analysis of a candidate [m]."""
-    first, last = (float(end) for end in spec.analysis.window or (0.0, 0.0))
-    return first, last
 
 
 def _plates(wish: Wish) -> dict[str, Any]:
@@ -294,16 +290,14 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and wish.depth is not None:
             deep = room - max((height_of(other, coil) for other, coil in bought.items()), default=0.0)
-        coil = _coil(name, turns[name], deep, rest if pulled else 0.0)
+        if name == "slider":
+            coil = extension_spring(*turns[name], rest if pulled else 0.0)
+        else:
+            coil = torsion_spring(*turns[name], deep)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil
     return spec.replace({"mechanism.springs.bought": tuple(_wound_to_measure(name, bought[name]) for name in turns)})
-
-
-def _coil(name: str, turn: tuple[float, float], deep: float, rest: float) -> Wound | None:
-    """Return the slimmest spring of a rate for a joint that can be turned, or stretched from its rest, so far."""
-    return extension_spring(*turn, rest) if name == "slider" else torsion_spring(*turn, deep)
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.pose_outlines import Scene
-    from cfmkit.families.vcfm.solution import Push, Solution
+    from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
 
 TRAVEL = Scale("displacement", "length")
@@ -151,20 +151,15 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
         curves.append(Curve(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
     plot_curve(curves, ax, CurveLook(arrows=False))
     for number, (push, window) in enumerate(zip(solution.pushes, solution.windows, strict=True)):
-        if window is not None:
-            _mark(ax, push, window, (push.rest or 0.0) if shifted else 0.0, LINES[number % len(LINES)])
+        if window is not None:  # both of its ends are marked on the curve
+            places, back = np.array(window), (push.rest or 0.0) if shifted else 0.0
+            ax.plot(
+                parts.mm(places - back), np.interp(places, push.travel, push.force), linestyle="", marker="|",
+                markersize=9, markeredgewidth=1.2, color=LINES[number % len(LINES)], zorder=4, gid="window",
+            )  # fmt: skip
     if shifted:
         ax.set_xlabel("displacement from rest [mm]")
     return figure
-
-
-def _mark(ax: Axes, push: Push, window: tuple[float, float], back: float, color: str) -> None:
-    """Mark both ends of a constant-force window on its curve."""
-    places = np.array(window)
-    ax.plot(
-        parts.mm(places - back), np.interp(places, push.travel, push.force), linestyle="", marker="|", markersize=9,
-        markeredgewidth=1.2, color=color, zorder=4, gid="window",
-    )  # fmt: skip
 
 
 def adjustability(result: Result) -> Figure:

@@ -14,7 +14,7 @@ family's own design.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, product
 from math import asin, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -136,18 +136,34 @@ def _designs(wish: Wish, material: dict[str, Any]) -> Any:
     """Yield (specification, sizes) of every choice that the closed forms allow."""
     base, adjustment = wish.target, LITTLE * wish.target
     if wish.adjustable is not None:
-        base = wish.target
         adjustment = 1.03 * max(wish.adjustable[1] - base, base - wish.adjustable[0], adjustment)
-    for share in MIDDLE:
-        for slender in SLENDERNESS:
-            stroke = wish.travel / share
-            rise = 0.75 * stroke / sqrt(1.0 - (pi / slender) ** 2)
-            for pairs in PAIRS:
-                for thicker in THICKER:
-                    data = _data(
-                        (material, SAFETY / wish.strength_used), base, adjustment, stroke, rise, slender, pairs, thicker
-                    )
-                    yield from _lengths(VcfmSpec.model_validate(data), wish)
+    for share, slender, pairs, thicker in product(MIDDLE, SLENDERNESS, PAIRS, THICKER):
+        stroke = wish.travel / share
+        rise = 0.75 * stroke / sqrt(1.0 - (pi / slender) ** 2)
+        thin = rise / slender
+        block = max(3.0 * thin * max(thicker, 1.0), 0.4 * rise, 1e-3)
+        data = {
+            "family": "vcfm",
+            "name": "suggested",
+            "mechanism": {
+                "material": material,
+                "safety_factor": SAFETY / wish.strength_used,
+                "positive": {
+                    "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
+                    "thickness": thin * thicker, "width": 5.0 * thin,
+                },
+                "bistable": {
+                    "structure": "v-beam", "half_beams": 2 * pairs, "length": 20.0 * rise, "angle": 0.05,
+                    "thickness": thin, "width": 5.0 * thin,
+                },
+                "frame": {
+                    "shuttle_width": 1.3 * block, "block": block, "spacing": 1.2 * rise + 2.0 * thin + 2.0 * block,
+                    "corner": 1.2 * block, "clearance": rise + block,
+                },
+            },
+            "design": {"force": base, "adjustment": adjustment, "stroke": stroke, "rise": rise},
+        }  # fmt: skip
+        yield from _lengths(VcfmSpec.model_validate(data), wish)
 
 
 def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
@@ -175,35 +191,6 @@ def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
             continue
         if min(sizes.leaf.thickness, sizes.side.thickness) >= wish.thinnest:
             yield made, sizes
-
-
-def _data(
-    made_of: tuple[dict[str, Any], float], force: float, adjustment: float, stroke: float, rise: float, slender: float,
-    pairs: int, thicker: float,
-) -> dict[str, Any]:  # fmt: skip
-    thin = rise / slender
-    block = max(3.0 * thin * max(thicker, 1.0), 0.4 * rise, 1e-3)
-    return {
-        "family": "vcfm",
-        "name": "suggested",
-        "mechanism": {
-            "material": made_of[0],
-            "safety_factor": made_of[1],
-            "positive": {
-                "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
-                "thickness": thin * thicker, "width": 5.0 * thin,
-            },
-            "bistable": {
-                "structure": "v-beam", "half_beams": 2 * pairs, "length": 20.0 * rise, "angle": 0.05,
-                "thickness": thin, "width": 5.0 * thin,
-            },
-            "frame": {
-                "shuttle_width": 1.3 * block, "block": block, "spacing": 1.2 * rise + 2.0 * thin + 2.0 * block,
-                "corner": 1.2 * block, "clearance": rise + block,
-            },
-        },
-        "design": {"force": force, "adjustment": adjustment, "stroke": stroke, "rise": rise},
-    }  # fmt: skip
 
 
 def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, float]:
@@ -301,11 +288,8 @@ def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
-    return _over_flattest(spec, wish, _preloads(spec, wish), float(_window(spec, wish)[1]))
-
-
-def _window(spec: VcfmSpec, wish: Wish) -> tuple[Any, Any]:
-    return spec.analysis.window or (Place(0.0, "length"), Place(wish.travel, "length"))
+    window = spec.analysis.window
+    return _over_flattest(spec, wish, _preloads(spec, wish), float(window[1]) if window else wish.travel)
 
 
 def _preloads(spec: VcfmSpec, wish: Wish) -> tuple[float, ...]:

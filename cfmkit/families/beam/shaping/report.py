@@ -222,7 +222,8 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     reported |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
     reported |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
     reported |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
-    numbers = _counts(result) | _audited(design.audit) | _drawn(drawn)
+    audit = design.audit
+    numbers = _counts(result) | {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)} | _drawn(drawn)
     if task.fidelity != REISSNER:  # else the metrics say it
         numbers |= _reissner(design)
     return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *reported[name]) for name in numbers}
@@ -242,10 +243,6 @@ def _counts(result: Explored) -> dict[str, float | None]:
     sound = sum(one.sound for one in result.audits.values())
     counts = {"starts": len(some), "starts_within_limits": feasible, "starts_sound": sound, "traces": traces}
     return {name: float(count) for name, count in counts.items()}
-
-
-def _audited(audit: Audit) -> dict[str, float | None]:
-    return {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)}
 
 
 def _drawn(drawn: Drawn) -> dict[str, float | None]:

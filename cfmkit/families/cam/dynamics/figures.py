@@ -53,7 +53,8 @@ def motion(result: Result) -> Figure:
     forces = [Series(force, "in motion", BLUE, prefer=0.3), Series(moved.static, "at rest", GREY, True, prefer=0.1)]
     ratio = [Series(force / moved.static, "in motion over at rest", BLUE, prefer=0.3)]
     found = list(_regions(moved))
-    level = Limit(constant, f"{_constant_name(moved)} = {value_text(constant, 'force')}")
+    name = "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
+    level = Limit(constant, f"{name} = {value_text(constant, 'force')}")
     diagrams = [
         Diagram(times, TIME, Scale("force", "force"), forces, [level], found),
         Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _unnamed(found)),
@@ -138,10 +139,6 @@ def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[M
 
 def _unnamed(regions: list[MarkedRange]) -> list[MarkedRange]:
     return [MarkedRange(item.start, item.stop, "") for item in regions]
-
-
-def _constant_name(moved: MotionSolution) -> str:
-    return "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
 
 
 def _motion_text(moved: MotionSolution) -> str:

@@ -27,7 +27,8 @@ def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None where a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         numbers = _shared(moved) | _own(moved)
-    return {name: Quantity(_finite(value), *DEFINITIONS[name]) for name, value in numbers.items()}
+    known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in known.items()}
 
 
 def _shared(moved: MotionSolution) -> dict[str, float]:
@@ -105,7 +106,3 @@ def _angle_effect(moved: MotionSolution) -> float:
 def _largest(values: FloatArray) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else np.nan
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -78,7 +78,10 @@ class CutWindows(ManyWindows):
             self.parts = [(np.arange(self.count), _part(sampled, window, ways[0]))]
             return
         groups = [np.flatnonzero(which.ravel() == k) for k in range(len(first)) if ways[first[k], 1]]
-        self.parts = [(rows, _part(sampled.take(rows), _of(window, rows), ways[rows[0]])) for rows in groups]
+        self.parts = []
+        for rows in groups:
+            own = None if window is None else (window[0][rows], window[1][rows])
+            self.parts.append((rows, _part(sampled.take(rows), own, ways[rows[0]])))
 
     def _each(self, number: Callable[[ManyWindows], FloatArray]) -> FloatArray:
         found = np.full(self.count, np.nan)
@@ -105,10 +108,6 @@ class CutWindows(ManyWindows):
     def work(self) -> FloatArray:
         """Integral over the travel of each cam, (d,) [J]."""
         return self._each(lambda part: part.work)
-
-
-def _of(window: Places, rows: NDArray[np.intp]) -> Places:
-    return None if window is None else (window[0][rows], window[1][rows])
 
 
 def _ways(sampled: SampledBranch, window: Places) -> NDArray[np.intp]:

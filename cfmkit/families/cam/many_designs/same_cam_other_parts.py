@@ -8,7 +8,7 @@ solved for all mechanisms and samples together; the formulas are those of `rolle
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -282,14 +282,10 @@ class BuiltSlab(Slab):
             if some.size:
                 shares = JAM_SHARES[last[some] - offset], JAM_SHARES[last[some] - offset + 1]
                 near, far = (below[some] + (above - below)[some] * share[:, None] for share in shares)
-                lever = self._lever_on(on_corner)
-                at = sign_changes(lever, near, far, some)
+                at = sign_changes(partial(self._lever_at, on_corner), near, far, some)
                 slider = tracks.on_corner(at, which[some])[0] if on_corner else tracks.on_flank(at, which[some])[0]
                 ends[some] = np.minimum(slider - start[some], self.travel[some, -1:])[:, 0]
         return jammed, ends, known
-
-    def _lever_on(self, on_corner: bool) -> Callable[[FloatArray, Rows], FloatArray]:
-        return lambda place, rows: self._lever_at(on_corner, place, rows)
 
     def _lever_at(self, on_corner: bool, place: FloatArray, rows: Rows) -> FloatArray:
         """Return the lever of the slider on the way up, rounding added, at angles or path coordinates of a stretch."""
@@ -392,14 +388,9 @@ class BuiltSlab(Slab):
         if forces.contact is None:
             return np.full(len(self.designs), np.nan)
         values = self._pressure(self._poses, self._every, forces.contact) / YIELD_PRESSURE
-        exact = self._exact_stress(way)
         known = np.isfinite(self.inside(branch, window).mean)
-        return np.where(
-            known, CutWindows(SampledBranch(self.travel, values, exact), self.ends(window)).extremes[0], np.nan
-        )
-
-    def _exact_stress(self, way: float) -> Callable[[FloatArray, Rows], FloatArray]:
-        return lambda travel, rows: self.stress_at(way, travel, rows)
+        sampled = SampledBranch(self.travel, values, partial(self.stress_at, way))
+        return np.where(known, CutWindows(sampled, self.ends(window)).extremes[0], np.nan)
 
     @cached_property
     def pressure_max(self) -> FloatArray:

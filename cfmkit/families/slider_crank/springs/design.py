@@ -164,7 +164,8 @@ def _kept(solved: Solved) -> Solved:
 
 def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
     """Return the best design, and the search that led to its lengths."""
-    axes = {name: _axis(name, getattr(wanted, name)) for name in FREE if getattr(wanted, name) is not None}
+    given = {name: ends for name in FREE if (ends := getattr(wanted, name)) is not None}
+    axes = {name: BoxAxis(low, high, log=name != "offset") for name, (low, high) in given.items()}
     if not axes:
         return solve(task_of(spec)), None
 
@@ -186,10 +187,6 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
         raise Infeasible(finding("infeasible_targets", text))
     place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
-
-
-def _axis(name: str, ends: tuple[float, float]) -> BoxAxis:
-    return BoxAxis(*ends, log=name != "offset")
 
 
 def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> float:

@@ -280,7 +280,8 @@ class Slab:
     ) -> tuple[FloatArray, FloatArray]:
         """Return largest and smallest efforts between the ends of samples, next to these and to the grid, (m,) each."""
         places, units = self.base.samples_and_grid(window)
-        return extremes(self._exact, places[None, :], self.rates @ units)
+        every = np.arange(len(self.rates))
+        return extremes(lambda at: self.somewhere(at, every), places[None, :], self.rates @ units)
 
     @cached_property
     def balanced(self) -> NDArray[np.bool_]:
@@ -296,10 +297,6 @@ class Slab:
     def cut(self) -> dict[tuple[float, float] | None, ManyWindows]:
         """What is known of windows."""
         return {}
-
-    def _exact(self, places: FloatArray) -> FloatArray:
-        """Return the efforts at places of each design, (m, k)."""
-        return self.somewhere(places, np.arange(len(self.rates)))
 
     def somewhere(self, places: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
         """Return the efforts at places of some designs, (r, k)."""
