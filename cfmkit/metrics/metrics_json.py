@@ -24,7 +24,8 @@ def as_json(quantity: Quantity) -> dict[str, Any]:
     """
     unit, definition = border_unit(quantity.dimension), quantity.definition
     if quantity.value is None:
-        return {"value": None, "unit": unit, "definition": definition} | _reason(quantity)
+        found: dict[str, Any] = {"value": None, "unit": unit, "definition": definition}
+        return found | {"reason": quantity.reason} if quantity.reason else found
     value = finite_border(quantity.value, quantity.dimension) if quantity.word is None else quantity.word
     return {"value": value, "unit": unit, "definition": definition}
 
@@ -33,10 +34,6 @@ def finite_border(value: float, dimension: str) -> float | None:
     """Return an SI value in its border unit; None where it is beyond what a float, and so JSON, can hold."""
     number = float(to_border(value, dimension))
     return number if math.isfinite(number) else None
-
-
-def _reason(quantity: Quantity) -> dict[str, str]:
-    return {"reason": quantity.reason} if quantity.reason else {}
 
 
 def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]]:

@@ -259,7 +259,11 @@ def check(
         If a requirement is not well put: see `validate_requirements`.
     """
     kind = kind_of(result)
-    known = [*known_metrics(kind, tuple(extra_definitions)), *_own(result)]
+    own = (
+        Definition(name, one.dimension, one.definition, scope="value", windowed=False)
+        for name, one in result.values.items()
+    )
+    known = [*known_metrics(kind, tuple(extra_definitions)), *own]
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:
         raise SpecError(problems)
@@ -277,11 +281,6 @@ def of_many(requirement: Requirement, found: Quantity) -> Outcome:
     return Outcome(
         requirement.metric, found.dimension, found.value, *ends, None, "force", limits.met(found.value), reported
     )
-
-
-def _own(result: Result) -> Iterator[Definition]:
-    for name, quantity in result.values.items():
-        yield Definition(name, quantity.dimension, quantity.definition, scope="value", windowed=False)
 
 
 @np.errstate(all="ignore")

@@ -58,8 +58,10 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
     if cycle.frame.winding is not None:
         travel = winding_branches.reach(cycle.frame.winding)
-    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
-        return _solved_interval(cycle, reference, (cycle.frame.valid or (travel,))[0][0])
+    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:  # known at every place: its ends are solved for
+        valid = np.array([(cycle.frame.valid or (travel,))[0][0]])
+        start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, valid)
+        return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
     bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference, curve))
     allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
     gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
@@ -114,12 +116,6 @@ class LevelledModel:
     def stress(self, branch: str, places: FloatArray) -> FloatArray:
         """Return that of the model [Pa]."""
         return self.model.stress(branch, places)
-
-
-def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
-    """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
-    start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
-    return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
 
 
 def _mean(cycle: Cycle) -> float:
