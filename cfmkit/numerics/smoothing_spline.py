@@ -62,12 +62,14 @@ def smoothed(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFu
     ValueError
         If there are too few points, or they do not increase.
     """
+    from scipy.interpolate import BSpline
+
     if len(places) < FEWEST or np.diff(places).min() <= 0:
         raise ValueError(f"at least {FEWEST} points in increasing order are needed")
     low, high = float(places[0]), float(places[-1])
     unit = (high - low) / (len(places) - 1)
     spline = _chosen((places - low) / unit, values, noise)
-    moved = _in_places(spline, low, unit)
+    moved = BSpline(spline.t * unit + low, spline.c, spline.k)
     residual = float(np.sqrt(np.mean((moved(places) - values) ** 2)))
     return SmoothedFunction(moved, residual, low, high)
 
@@ -102,9 +104,3 @@ def _crossing(excess: Any) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if excess(middle) > 0 else (middle, high)
     return 0.5 * (low + high)
-
-
-def _in_places(spline: Any, low: float, unit: float) -> Any:
-    from scipy.interpolate import BSpline
-
-    return BSpline(spline.t * unit + low, spline.c, spline.k)
