@@ -86,7 +86,8 @@ def length(ax: Axes, start: Point, end: Point, name: str, off: float = 0.0, besi
         if off:
             over = foot + np.sign(off) * 1.2 * left
             ax.plot(*np.array([point, over]).T, color=GREY, linewidth=0.5, zorder=4)
-    _arrow(ax, first, last, "<|-|>")
+    look = {"arrowstyle": "<|-|>", "color": NAME, "linewidth": 0.7, "mutation_scale": 6, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", _pair(last), _pair(first), arrowprops=look, zorder=5)
     _name(ax, (first + last) / 2 + beside * left * (1 if off >= 0 else -1), name)
 
 
@@ -183,11 +184,6 @@ def spiral(ax: Axes, center: Point, radius: float) -> None:
         linewidth=1.1,
         zorder=3.2,
     )
-
-
-def _arrow(ax: Axes, start: Any, end: Any, style: str) -> None:
-    look = {"arrowstyle": style, "color": NAME, "linewidth": 0.7, "mutation_scale": 6, "shrinkA": 0, "shrinkB": 0}
-    ax.annotate("", _pair(end), _pair(start), arrowprops=look, zorder=5)
 
 
 def _name(ax: Axes, at: Any, text: str, color: str = NAME) -> None:

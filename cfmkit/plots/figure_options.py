@@ -183,7 +183,8 @@ def _read(path: str) -> dict[str, Any]:
             warnings.simplefilter("error")
             read: Any = matplotlib.rc_params_from_file(path, fail_on_error=False, use_default_template=False)
     except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"--figure-style: {visible(path)} cannot be read: {_reason(error)}") from None
+        reason = str(getattr(error, "strerror", None) or error).lower()
+        raise UsageError(f"--figure-style: {visible(path)} cannot be read: {reason}") from None
     except Exception as error:
         raise UsageError(f"--figure-style: {visible(path)}: {' '.join(str(error).split())}") from None
     finally:
@@ -195,7 +196,3 @@ def _read(path: str) -> dict[str, Any]:
         ]  # then come addresses of the library's own
         raise UsageError(f"--figure-style: {visible(path)}: {visible(first)}")
     return dict(read)
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error).lower()

@@ -232,10 +232,6 @@ def _rows(axes: Axes, names: Sequence[str]) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def _unstated(axes: Axes, row: float) -> None:
-    axes.annotate("not stated", (0.0, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
-
-
 def _draw_bars(
     axes: Axes, lines: Sequence[IndexLine], order: Sequence[int], look: tuple[str, str, float, float]
 ) -> None:
@@ -244,7 +240,8 @@ def _draw_bars(
     for row, k in enumerate(order):
         line = lines[k]
         if line.value is None:
-            _unstated(axes, row + shift)
+            place = (0.0, row + shift)
+            axes.annotate("not stated", place, (3, 0), textcoords="offset points", va="center", size=SMALL)
             continue
         axes.barh(row + shift, line.value, height, color=colour, label=words)
         words = ""

@@ -102,12 +102,16 @@ class Diagram:
 def draw_diagram(diagram: Diagram, ax: Axes) -> Axes:
     """Draw a diagram on axes; return the axes."""
     x = to_border(np.asarray(diagram.over, dtype=float), diagram.x.dimension)
+    names = []
     for item in diagram.series:
         y = to_border(np.asarray(item.values, dtype=float), diagram.y.dimension)
         ax.plot(x, y, color=item.color, linewidth=1.4, linestyle="--" if item.dashed else "-", zorder=3)
+        if item.name:
+            names.append(Label(item.name, item.color, np.column_stack([x, y]), item.prefer))
     _scale(diagram, ax)
-    names = [_name(item, diagram, ax) for item in diagram.series if item.name]
-    names += [_limit(item, diagram, ax) for item in diagram.limits]
+    for limit in diagram.limits:
+        height = float(to_border(limit.value, diagram.y.dimension))
+        names.append(level(ax, height, limit.text, TROUBLE if limit.trouble else GREY))
     names += [shade(ax, item, diagram.x.dimension) for item in diagram.regions]
     ax.set_xlabel(diagram.x.label)
     ax.set_ylabel(diagram.y.label)
@@ -164,15 +168,6 @@ def padded(ends: tuple[float, float], below: float, above: float) -> tuple[float
         width = abs(ends[0]) or 1.0
         below = above = 0.5
     return ends[0] - below * width, ends[1] + above * width
-
-
-def _name(item: Series, diagram: Diagram, ax: Axes) -> Label:
-    x, y = to_border(diagram.over, diagram.x.dimension), to_border(item.values, diagram.y.dimension)
-    return Label(item.name, item.color, np.column_stack([x, y]), item.prefer)
-
-
-def _limit(item: Limit, diagram: Diagram, ax: Axes) -> Label:
-    return level(ax, float(to_border(item.value, diagram.y.dimension)), item.text, TROUBLE if item.trouble else GREY)
 
 
 def level(ax: Axes, height: float, text: str, color: str = GREY) -> Label:

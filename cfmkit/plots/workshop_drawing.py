@@ -101,7 +101,8 @@ def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ())
     if found:
         ax.plot(x0, y0, marker="+", markersize=9, color=VERMILLION, zorder=6, gid="datum")
     _dimensions(ax, dimensions, (x0, y0, x1, y1), scale)
-    _words(figure, drawing, found, (title, _ratio(scale)), tolerances)
+    ratio = f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
+    _words(figure, drawing, found, (title, ratio), tolerances)
     return figure
 
 
@@ -137,10 +138,6 @@ def _scale(largest: float) -> float:
     """Return the largest scale of paper that fits [mm of print for 1 mm]."""
     found = [one for one in (*SCALES, *(1.0 / one for one in SCALES)) if one <= largest]
     return max(found, default=largest)
-
-
-def _ratio(scale: float) -> str:
-    return f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
 
 
 def _points(edge: Edge) -> FloatArray:
