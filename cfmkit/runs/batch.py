@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
-    from cfmkit.studies.metric_changes_since_earlier_batch import Known
     from cfmkit.studies.serial_and_cluster_executors import Executor, Lost
     from cfmkit.tables import Table
 
@@ -455,7 +454,8 @@ def batch(
         entries = carry_out(work, todo, Crew(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal)))
         compared = None
         if before is not None:
-            compared = _compared(before, os.fspath(compare or ""), entries, place, tolerance)
+            changed = changes_of(before, entries, place, tolerance)
+            compared = BatchComparison(os.fspath(compare or ""), tolerance, changed, gone(before, entries))
         code = exit_code(entries, watched.stopped)
         if compared is not None and compared.beyond and not watched.stopped:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
@@ -469,10 +469,6 @@ def batch(
 
         reported(in_markdown(entries, compared))
     return BatchResult(entries, code, place, written, compared)
-
-
-def _compared(before: Known, folder: str, entries: Sequence[Entry], place: str, tolerance: float) -> BatchComparison:
-    return BatchComparison(folder, tolerance, changes_of(before, entries, place, tolerance), gone(before, entries))
 
 
 def _named(specs: Any) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from string import ascii_uppercase
 from typing import TYPE_CHECKING
@@ -77,16 +78,12 @@ def _example(path: Path, root: Path) -> Example:
     lines = path.read_text(encoding="utf-8").splitlines()
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("family:"))
     is_figure = any(line.startswith("panels:") for line in lines)
-    comment = " ".join(line.removeprefix("#").strip() for line in lines[: _comment(lines)])
+    head = takewhile(lambda line: line.startswith("#"), lines)
+    comment = " ".join(line.removeprefix("#").strip() for line in head)
     family = "figure" if is_figure else next(named, "")
     name = path.relative_to(root).with_suffix("").as_posix()
     searches = any(line.strip() == "optimise:" for line in lines)
     return Example(name, family, _first_sentence(comment), path, searches)
-
-
-def _comment(lines: list[str]) -> int:
-    """Return how many lines at the top are comment."""
-    return next((at for at, line in enumerate(lines) if not line.startswith("#")), len(lines))
 
 
 def _first_sentence(text: str) -> str:

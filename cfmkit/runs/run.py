@@ -170,7 +170,8 @@ def carry_out(
         for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
-        manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))
+        ending = {"status": found.status.key, "exit_code": int(found.exit_code)}
+        manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | ending)
         kept = dict(folder.kept)
     seconds = time.perf_counter() - start
     return FinishedRun(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
@@ -192,7 +193,10 @@ def spec_of(wanted: RunRequest) -> Spec:
 def read(wanted: RunRequest) -> tuple[Document, Spec]:
     """Return the document that is meant, with what is changed in it, and the checked specification."""
     document = _document(wanted)
-    return document, _bound(document, wanted)
+    try:
+        return document, bind(document)
+    except SpecError as error:
+        raise (renamed(error, "--set analysis.fidelity", "--fidelity") if wanted.fidelity else error) from None
 
 
 @contextmanager
@@ -220,13 +224,6 @@ def _document(wanted: RunRequest) -> Document:
     if not wanted.fidelity.strip():
         raise UsageError("--fidelity is empty; `cfmkit show` and the family's name lists what there is")
     return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
-
-
-def _bound(document: Document, wanted: RunRequest) -> Spec:
-    try:
-        return bind(document)
-    except SpecError as error:
-        raise (renamed(error, "--set analysis.fidelity", "--fidelity") if wanted.fidelity else error) from None
 
 
 def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
@@ -286,10 +283,6 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
     content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
     cited = {"bibtex": text} if (text := family(spec.family).bibtex) else {}
     return {"command": command, "arguments": list(arguments), "spec": content, **cited}
-
-
-def _ending(found: Report) -> dict[str, Any]:
-    return {"status": found.status.key, "exit_code": int(found.exit_code)}
 
 
 def analysed(spec: Spec, run: Run) -> Report:

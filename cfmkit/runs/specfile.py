@@ -155,7 +155,8 @@ def bind(document: Document) -> Spec:
         reported = {problem.path for problem in error.problems}
         raw = _entries(document.tree)
         more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, reported)]
-        raise SpecError(_in_order([*error.problems, *more])) from None
+        faults = sorted([*error.problems, *more], key=lambda one: (one.line == 0, one.line, one.column))
+        raise SpecError(faults) from None
     found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
     found += [*_sensitivity_faults(document, spec), *_design_faults(document, spec)]
     if found:
@@ -253,10 +254,6 @@ def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
 
 def _below(path: str, reported: set[str]) -> bool:
     return any(path == other or path.startswith(f"{other}.") for other in reported if other)
-
-
-def _in_order(problems: Sequence[Problem]) -> list[Problem]:
-    return sorted(problems, key=lambda one: (one.line == 0, one.line, one.column))
 
 
 def renamed(error: SpecError, old: str, new: str) -> SpecError:
