@@ -273,9 +273,6 @@ class SolidProblem:
             factors = self.linearised(unknowns, travel).factored()
             path[:-1] = -factors.solve(beside[:-1])
             stiffness = float(path @ beside)
-        effort = self._effort(unknowns, travel, forces)
-        return Balance(travel, unknowns, effort, stiffness, factors.negative, path[:-1], factors)
-
-    def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:
         reactions = self.supports.reactions(unknowns, travel, forces)
-        return float(sum(group.driven @ one for group, one in zip(self.supports.groups, reactions, strict=True)))
+        effort = float(sum(group.driven @ one for group, one in zip(self.supports.groups, reactions, strict=True)))
+        return Balance(travel, unknowns, effort, stiffness, factors.negative, path[:-1], factors)
