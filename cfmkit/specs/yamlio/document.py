@@ -170,7 +170,9 @@ def read_document(data: bytes | str, source: str, folder: FilePath | None = None
     if not reading.broken and not isinstance(reading.tree, dict):
         reading.broken = True
         reading.faults.append(_no_block(reading))
-    problems = tuple(_located(fault, source) for fault in reading.faults)
+    problems = tuple(
+        Problem(source, fault.line, fault.column, dotted(fault.path), fault.message) for fault in reading.faults
+    )
     spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.spoils)
     return Document(reading.tree, source, folder, problems, reading, spoilt)
 
@@ -180,10 +182,6 @@ def _no_block(reading: Reading) -> Fault:
     reported = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
     line, column = reading.values.get((), (1, 1))
     return Fault(line, column, (), f"{reported}; a specification starts with 'cfmkit: 1' and 'family: ...'")
-
-
-def _located(fault: Fault, source: str) -> Problem:
-    return Problem(source, fault.line, fault.column, dotted(fault.path), fault.message)
 
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:

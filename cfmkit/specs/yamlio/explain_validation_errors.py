@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import described
 from cfmkit.specs.units.number_reading import shown
-from cfmkit.specs.yamlio.allowed_at_path import Slot, Trace, expected, trace
+from cfmkit.specs.yamlio.allowed_at_path import Trace, expected, trace
 from cfmkit.specs.yamlio.path_notation import Path, dotted
 
 if TYPE_CHECKING:
@@ -145,15 +145,11 @@ def _unknown_kind(line: _Error) -> Complaint:
     """Explain a block whose telling key is missing or says something unknown."""
     key = str(line.context.get("discriminator", "")).strip("'")
     allowed = re.findall("'([^']*)'", str(line.context.get("expected_tags", ""))) or [
-        str(choice) for slot in line.trace.slots for choice in _choices(slot, key)
+        str(choice) for slot in line.trace.slots for inner in slot.child(key) for choice in inner.choices
     ]
     if line.kind == "union_tag_not_found":
         return Complaint(line.trace.path, f"the key {key!r} is missing: one of {', '.join(map(repr, allowed))}")
     return Complaint((*line.trace.path, key), not_among(line.context.get("tag"), allowed))
-
-
-def _choices(slot: Slot, key: str) -> tuple[Any, ...]:
-    return tuple(choice for inner in slot.child(key) for choice in inner.choices)
 
 
 def not_among(value: Any, allowed: Sequence[Any]) -> str:
