@@ -59,11 +59,8 @@ def private_folder(name: str, make: bool = True) -> Path | None:
 
 def place(name: str) -> Path:
     """Return where such a folder is, whether it exists or not."""
-    return Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    return Path(tempfile.gettempdir()) / f"cfmkit-{name}-{user}"
 
 
 def _is_ours(folder: Path) -> bool:

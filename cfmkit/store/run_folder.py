@@ -161,7 +161,8 @@ class RunFolder:
         self._require_open()
         self._owner = 0
         self.check(*self._staged)
-        manifest = Manifest.of_run(info, self._staged, self._started, self._duration())
+        duration = timedelta(seconds=time.monotonic() - self._clock)
+        manifest = Manifest.of_run(info, self._staged, self._started, duration)
         with reporting(self.path):
             removed, kept = self._outdated()
             new = {name: record.sha256 for name, record in self._staged.items()}
@@ -238,9 +239,6 @@ class RunFolder:
             if mode_of(self.path / spare) is None and spare not in self._staged:
                 return spare
             count += 1
-
-    def _duration(self) -> timedelta:
-        return timedelta(seconds=time.monotonic() - self._clock)
 
     def _require_open(self) -> None:
         if self._owner != os.getpid():
