@@ -237,12 +237,9 @@ def compare(nominal: Result, choices: Choices, run: Run) -> FidelityComparison:
         For the other models.
     """
     own = fidelity_of(nominal)
-    others = (Variant(name, _analyze(spec, run)) for name, spec in choices.specs.items() if name != own)
+    analyze = family(nominal.spec.family).analyze
+    others = (Variant(name, windows_judged(analyze(spec, run))) for name, spec in choices.specs.items() if name != own)
     return FidelityComparison((Variant(own, nominal), *others), list(choices.specs)[-1], choices.obstacles)
-
-
-def _analyze(spec: Spec, run: Run) -> Result:
-    return windows_judged(family(spec.family).analyze(spec, run))
 
 
 def fidelity_of(result: Result) -> str:

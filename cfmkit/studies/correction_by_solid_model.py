@@ -87,7 +87,14 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     made = as_solid.replace(corrected)
     aim = format_short(wanted, kind)
     note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {reported}"
-    return _reported(design, made, note, _numbers(wanted, own, mean, factor, kind), solid)
+    numbers = {
+        "verified_target": (wanted, kind, "mean force that the solid is to have"),
+        "verified_before": (own, kind, "mean force of the design by its own model"),
+        "verified_solid_before": (mean, kind, "mean force of the part as a solid, before its correction"),
+        "verified_width_factor": (factor, "ratio", "by which all widths were multiplied"),
+    }
+    about = searched(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
+    return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))
 
 
 def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begun: str, run: Run) -> Design:
@@ -169,22 +176,3 @@ def _outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Des
             )
             return Design(None, Status.INFEASIBLE, reported)
     return None
-
-
-def _numbers(
-    wanted: float, own: float, mean: float, factor: float, kind: str
-) -> dict[str, tuple[float | None, str, str]]:
-    return {
-        "verified_target": (wanted, kind, "mean force that the solid is to have"),
-        "verified_before": (own, kind, "mean force of the design by its own model"),
-        "verified_solid_before": (mean, kind, "mean force of the part as a solid, before its correction"),
-        "verified_width_factor": (factor, "ratio", "by which all widths were multiplied"),
-    }
-
-
-def _reported(
-    design: Design, made: Spec, note: str, numbers: dict[str, tuple[float | None, str, str]], solid: Result
-) -> Design:
-    window = solid.travel or (0.0, 0.0)
-    about = searched(numbers, "solid", window, made.motion or "length")
-    return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))

@@ -335,7 +335,8 @@ def run(
         if not lost or watch.stopping():
             return records
         # A block that was lost costs only those of its points that are lost alone, too.
-        queue = _new(records, (job for block in lost for job in _singles(work, block)), watch)
+        alone = (work.job(at, at + 1) for block in lost for at in range(block.start, block.stop))
+        queue = _new(records, alone, watch)
 
 
 def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Monitor) -> list[Job]:
@@ -383,11 +384,6 @@ def _neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:
 def _merged(jobs: list[Job]) -> Job:
     first, last = jobs[0], jobs[-1]
     return first if first is last else Job(first.start, last.stop, first.key, tuple(jobs))
-
-
-def _singles(work: Work, block: Job) -> Iterator[Job]:
-    for start in range(block.start, block.stop):
-        yield work.job(start, start + 1)
 
 
 def _together(keys: list[str], rows: list[ResultRows]) -> bytes:

@@ -216,7 +216,9 @@ class Study:
         surveys: Surveys = {}
         values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
         met = tuple(outcome.ok for outcome in check(result.spec.part_requirements, result, extra, surveys))
-        message = _gaps(result) if result.status is Status.COMPLETE else result.message
+        message = result.message
+        if result.status is Status.COMPLETE:  # windows that its curve does not cover: cells without a value
+            message = "; ".join(gap.short for gap in gaps(result))
         curve = _curve(result) if self.curves else b""
         return Row(result.status, values, met, message, curve, warnings=warnings)
 
@@ -233,11 +235,6 @@ class Study:
             window = None if over is None else window_of(result, over)
             found |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
         return tuple(found[one.name, one.over] for one in self.metrics)
-
-
-def _gaps(result: Result) -> str:
-    """Return why a point that was solved has cells without a value: the windows that its curve does not cover."""
-    return "; ".join(gap.short for gap in gaps(result))
 
 
 def _finite(value: float | None) -> float | None:

@@ -163,7 +163,7 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         found[indices] = rows.values
     lacking = np.flatnonzero(np.isnan(found[:, 1:]).any(axis=1) & ~failed)
     about = (len(lacking), _why_lacking(made, values[lacking[0]], run) if len(lacking) else "")
-    level = _value(nominal, metrics[0])
+    level = Study(nominal.spec, (), (metrics[0],)).quantities(nominal)[0].value
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = level / found[:, 0] if level is not None else np.full(len(found), np.nan)
     trimmed = once_scaled(spec, nominal, metrics, found, met, factor)
@@ -231,11 +231,6 @@ def _without(
         return None
     met = once_scaled(spec, nominal, metrics, judged.values, judged.met, factor, stresses=True)
     return replace(judged, met=met)
-
-
-def _value(nominal: Result, metric: Metric) -> float | None:
-    study = Study(nominal.spec, (), (metric,))
-    return study.quantities(nominal)[0].value
 
 
 def common(made: DesignTolerances, nominal: Result, run: Run) -> tuple[int, ...]:

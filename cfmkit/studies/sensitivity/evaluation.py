@@ -147,9 +147,9 @@ class Evaluator:
 
 def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
     """Return points, (n, d), as a plan of the engine."""
-    columns = zip(parameters, points.T, strict=True)
-    return Plan(tuple(_variable(one, np.ascontiguousarray(column)) for one, column in columns), len(points), joint=True)
-
-
-def _variable(one: Parameter, values: FloatArray) -> Variable:
-    return Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)
+    columns = map(np.ascontiguousarray, points.T)
+    varied = (
+        Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)
+        for one, values in zip(parameters, columns, strict=True)
+    )
+    return Plan(tuple(varied), len(points), joint=True)

@@ -149,15 +149,11 @@ def variance_drops(outputs: FloatArray, seed: int) -> Analysis:
     if len(outputs) < 2 or varies_not(outputs[:, 0]):
         gap = np.full(groups, np.nan)
         return (Index(VARIANCE_DROP, gap, gap, gap),)
-    generator = np.random.default_rng([seed, 2])
-    again = np.array([_drops(outputs[_picked(generator, len(outputs))]) for _ in range(RESAMPLES)])
+    count, generator = len(outputs), np.random.default_rng([seed, 2])
+    again = np.array([_drops(outputs[generator.integers(count, size=count)]) for _ in range(RESAMPLES)])
     tail = 50.0 * (1.0 - LEVEL)
     low, high = np.nanpercentile(again, (tail, 100.0 - tail), axis=0)
     return (Index(VARIANCE_DROP, _drops(outputs), low, high),)
-
-
-def _picked(generator: np.random.Generator, count: int) -> NDArray[np.int64]:
-    return generator.integers(count, size=count)
 
 
 def _drops(outputs: FloatArray) -> FloatArray:

@@ -73,17 +73,22 @@ def _local(setup: Setup, evaluator: Evaluator) -> Findings:
     points = local.sample(setup.values, half)
     count = len(half)
     exact = _exact(setup)
-    outputs = np.full((count, 2, local.LEVELS, _width(setup)), np.nan)
+    width = len(setup.study.metrics) + len(setup.study.spec.part_requirements)
+    outputs = np.full((count, 2, local.LEVELS, width), np.nan)
     if not _all_known(setup, exact):
         sides = [side for side in ("up", "down") for _ in range(local.LEVELS)]
         roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
         outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
+        nominal = float(setup.nominal.values[m])
         for k, one in enumerate(setup.parameters):
             known = exact.get(metric.name, {}).get(one.path) if metric.over is None else None
-            slope = _slope(outputs[k, ..., m], float(setup.nominal.values[m]), float(half[k]), known)
-            found += _gradient_lines(metric, one, slope, float(setup.nominal.values[m]))
+            if known is not None:
+                slope = local.Slope(known, 0.0)
+            else:
+                slope = local.slope(outputs[k, 0, :, m], outputs[k, 1, :, m], nominal, float(half[k]))
+            found += _gradient_lines(metric, one, slope, nominal)
     return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
 
 
@@ -99,10 +104,6 @@ def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
 def _all_known(setup: Setup, exact: Mapping[str, Mapping[str, float]]) -> bool:
     wanted = ((one, path) for one in setup.study.metrics for path in setup.paths)
     return all(one.over is None and path in exact.get(one.name, {}) for one, path in wanted)
-
-
-def _slope(outputs: FloatArray, at_nominal: float, half: float, known: float | None) -> local.Slope:
-    return local.Slope(known, 0.0) if known is not None else local.slope(outputs[0], outputs[1], at_nominal, half)
 
 
 def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nominal: float) -> Iterator[IndexLine]:
@@ -287,10 +288,6 @@ def _stated(
     setup: Setup, outputs: FloatArray, analyze: Callable[[FloatArray], Analysis], names: tuple[str, ...], count: int
 ) -> Analysis:
     return stated(analyze, outputs, setup.policy, nothing(names, count))
-
-
-def _width(setup: Setup) -> int:
-    return len(setup.study.metrics) + len(setup.study.spec.part_requirements)
 
 
 METHODS: dict[str, Callable[[Setup, Evaluator], Findings]] = {
