@@ -99,7 +99,9 @@ class Table(ShortRepr):
 
     def __repr__(self) -> str:
         """Return the table in a line: rows and headers."""
-        return f"<Table of {len(self)} rows: {_shortened(', '.join(self.headers))}>"
+        heads = ", ".join(self.headers)
+        shown = heads if len(heads) <= 500 else f"{heads[:500]}..."
+        return f"<Table of {len(self)} rows: {shown}>"
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -120,10 +122,6 @@ class Table(ShortRepr):
     def as_dict(self) -> dict[str, list[Cell]]:
         """Return header -> values as plain Python lists, None where a value is missing."""
         return {column.header: column.cells() for column in self.columns}
-
-
-def _shortened(text: str, most: int = 500) -> str:
-    return text if len(text) <= most else f"{text[:most]}..."
 
 
 def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
