@@ -10,7 +10,7 @@ from cfmkit.stock.material_and_part_spec import sheet_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.beam.mechanism.spec import Mechanism
+    from cfmkit.families.beam.mechanism_spec import Mechanism
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
 
