@@ -4,9 +4,11 @@ The engine integrates Reissner's theory along the beams; here a beam is a chain 
 in a frame which moves with them (Timoshenko, section constant in the element). Equilibrium is a stationary point of
 the total energy, its gradient written out, its Hessian by complex steps. The error falls with the square of the
 element length: two meshes and Richardson's extrapolation remove it. The path checked gives a first guess, no more.
+Wide strips have the energy of `cfmkit.elastica.kernels.wide_strip` [A], at the mean curvature of an element.
 
-Reference
----------
+References
+----------
+[A] D. G. Ashwell, J. Roy. Aeron. Soc. 54 (1950) 708: the anticlastic curvature of rectangular beams and plates.
 [C] M. A. Crisfield, Non-linear Finite Element Analysis of Solids and Structures, vol. 1 (1991), ch. 7.
 """
 
@@ -161,7 +163,9 @@ class _Elements:
             bending, axial, shear = (float(np.real(v[1])) for v in section.rigidities(arcs, inside))
             h = np.real(section.thickness_at(arcs, inside))
             chord = (float(run @ np.cos(angle)), float(run @ np.sin(angle)))
-            rows.append((*chord, bending, axial, shear, h[0], h[2], np.real(section.width)))
+            rest = float(np.real(fit.angle(b, middle) - fit.angle(a, middle)))
+            curl, share = (float(np.real(one)) for one in section.curling(section.thickness_at(arcs, inside)[1]))
+            rows.append((*chord, bending, axial, shear, h[0], h[2], np.real(section.width), rest, curl, share))
         table = np.array(rows)
         self.chord, self.bending, self.thickness, self.width = table[:, :2], table[:, 2], table[:, 5:7], table[:, 7]
         self.length = np.hypot(*self.chord.T)
@@ -169,6 +173,7 @@ class _Elements:
         firm = 1e4 * 12 * self.bending / self.length**2
         self.axial = np.where(table[:, 3] > 0, 1.0 / np.maximum(table[:, 3], 1e-300), firm)
         self.slip = 12 * self.bending * table[:, 4] / self.length**2
+        self.rest, self.curl, self.share = table[:, 8], table[:, 9] / self.length**2, table[:, 10]
 
     def local(self, u: Any) -> tuple[Any, Any, Any, tuple[Any, Any], Any]:
         """Return normal force, end moments, direction and length of the elements for local freedoms u (e, 6)."""
@@ -188,6 +193,9 @@ class _Elements:
         k = self.bending / self.length / (1 + self.slip)
         first = k * ((4 + self.slip) * a + (2 - self.slip) * b)
         last = k * ((2 - self.slip) * a + (4 + self.slip) * b)
+        if self.share.any():
+            more = self.bending / self.length * _by_hindered_curling(b - a, self.rest, self.curl, self.share)
+            first, last = first - more, last + more
         return self.axial * (now - self.length) / self.length, first, last, (c, s), now
 
     def forces(self, u: Any) -> Any:
@@ -289,3 +297,26 @@ class _Elements:
         area = self.width[:, None] * self.thickness
         found = 6 * moments / (area * self.thickness) + np.abs(normal)[:, None] / area
         return float(found.max())
+
+
+def _by_hindered_curling(turn: Any, rest: FloatArray, curl: FloatArray, share: FloatArray) -> Any:
+    """Return the moments that elements need beyond those of narrow ones, over EI/L, (e,).
+
+    The derivative of turn^2/2 share (1 - g) by the turn (e,), g at z = curl (turn + rest)^2; `share`: nu^2/(1 - nu^2).
+    """
+    z = curl * (turn + rest) ** 2
+    g, slope = _curling(z)
+    return share * turn * ((1 - g) - turn * slope * curl * (turn + rest))
+
+
+def _curling(z: Any) -> tuple[Any, Any]:
+    """Return g = 2/th (cosh th - cos th)/(sinh th + sin th) and its derivative by z = th^4, (e,) each."""
+    near = np.abs(z) < 0.05  # the first terms of both series are exact to rounding there, the closed form is not
+    top, below = 1 + z / 360 + z * z / 1814400, 1 + z / 120 + z * z / 362880
+    close = top / below
+    rising = (1 / 360 + z / 907200 - close * (1 / 120 + z / 181440)) / below
+    th = np.sqrt(np.sqrt(np.where(near, 1.0, z)))
+    even, odd = np.cosh(th) - np.cos(th), np.sinh(th) + np.sin(th)
+    far = 2 / th * even / odd
+    falling = (2 / th * (1 - even * (np.cosh(th) + np.cos(th)) / odd**2) - far / th) / (4 * th**3)
+    return np.where(near, close, far), np.where(near, rising, falling)

@@ -246,7 +246,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     return StripTask(
         line,
         travel_direction(linkage),
-        type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
+        replace(made_of, allowable_stress=limit),
         wanted.size / spec.mechanism.sets,
         float(start),
         float(stroke),

@@ -4,7 +4,8 @@ The force is computed at Chebyshev points of the root of the travel, where it is
 interpolated between them, so that the band is kept everywhere and not at a few points. The stress is looked at along
 the whole strip, its peaks included, near the end of the travel: it is largest there. Derivatives by the thicknesses
 are exact (implicit differentiation); those of the force by the stroke too. The force is proportional to the width, the
-stress does not depend on it. Places of stations are differentiated by central differences.
+stress does not depend on it, unless wide strips are stiffer: then by the width, as by the places of stations, central
+differences are taken.
 
 Where the stress of a strip is looked at: at the highest place of every linear piece, near the end of the travel. A
 largest stress between samples is missed by them, and an optimiser finds the strip for which they miss most. So the
@@ -147,7 +148,7 @@ RMS_POINTS = 10
 
 TOLERANCE = 1e-6
 
-_NUDGE = 1e-5  # of a share, for its central difference
+_NUDGE = 1e-5  # of a share, or of the width as a share of itself, for central differences
 
 
 @dataclass(frozen=True)
@@ -308,20 +309,23 @@ class StripProgram(DesignProgram):
         force = [gradient(path, build, inner).effort]
         last = gradient(path, build, inner, points=path.at_requested[-LAST:]).sections(STRIP)
         stress = [state.watched.stress(last.bending_stress, last.axial_stress)]
-        for k in range(form.count, form.count + form.placed):
-            by = self._by_difference(z, k, state)
+        steps = [(k, _NUDGE) for k in range(form.count, form.count + form.placed)]
+        if form.width is None and self.task.material.wide:
+            steps.append((form.size - 1, _NUDGE * float(x[-1])))
+        for k, step in steps:
+            by = self._by_difference(z, k, step, state)
             force.append(by[0][:, None])
             stress.append(by[1][:, None])
-        if form.width is None:
+        if form.width is None and not self.task.material.wide:
             force.append((state.force / x[-1])[:, None])
             stress.append(np.zeros((len(state.stress), 1)))
         return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
 
-    def _by_difference(self, z: FloatArray, k: int, state: State) -> tuple[FloatArray, FloatArray]:
+    def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by one variable by a central difference of neighbouring equilibria."""
         drive = Displacement(SLIDER, self.task.direction, self.travel(z))
         sides = []
-        for step in (-_NUDGE, _NUDGE):
+        for step in (-nudge, nudge):
             moved = z[: self.form.size].copy()
             moved[k] += step
             path = neighbouring(state.path, self.network(moved), drive)
@@ -330,7 +334,7 @@ class StripProgram(DesignProgram):
             side = State(path, path.effort, watched(path, self.spots))
             sides.append((side.force, side.stress))
         (low, weak), (high, strong) = sides
-        return (high - low) / (2 * _NUDGE), (strong - weak) / (2 * _NUDGE)
+        return (high - low) / (2 * nudge), (strong - weak) / (2 * nudge)
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
