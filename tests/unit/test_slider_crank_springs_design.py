@@ -85,6 +85,38 @@ def test_least_squares_holds_a_slope_too(caps, slope):
     assert goal.rms(found) ** 2 * len(goal.wanted) <= best * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("prefer", ["even-rates", "soft-springs"])
+@pytest.mark.parametrize("slope", [0.0, 3.0, -3.0])
+def test_springs_that_are_preferred_hold_the_slope_too(slope, prefer):
+    """The most even ones had slopes of -0.36, 2.79 and -3.52."""
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import preferred, ranges
+    from cfmkit.families.slider_crank.springs.rate_fit_task import task_of
+
+    design = {
+        "torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg"), "stiffness": f"{2 * slope} N*mm/rad",
+        "hold_stiffness": True, "slack": "1 %", "prefer": prefer,
+    }  # fmt: skip
+    spec = config("li2019", design=design)
+    goal = task_of(spec).goal(spec.design.angle)
+    found = cfmkit.design(spec).spec.mechanism.springs.rates
+    assert goal.held[0] @ found == pytest.approx(slope, abs=1e-6)
+    span = ranges(goal, goal.deviation(found) * (1 + 1e-9))
+    other = preferred(goal, goal.deviation(found), prefer)
+    assert (np.stack([found, other]) >= span[:, 0] - 1e-9 * span[:, 1]).all()
+    assert (np.stack([found, other]) <= span[:, 1] * (1 + 1e-6)).all()
+
+
+def test_rates_that_are_preferred_are_not_below_the_smallest_allowed():
+    from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, preferred
+
+    lower = np.array([0.3, 0.0, 0.0, 0.2])
+    goal = RateGoal(np.eye(4), np.full(4, 0.5), np.full(4, np.inf), lower=lower, least=(np.full(4, 1e-3), 1.9e-3))
+    for rule in ("even-rates", "soft-springs"):
+        found = preferred(goal, 0.5, rule)
+        assert (found >= lower).all()
+        assert found.sum() >= 1.9 * (1.0 - 1e-9)
+
+
 def test_the_law_for_small_angles_holds_from_either_side_and_after_a_turn():
     values = [
         cfmkit.analyze(config("li2019", mechanism__unloaded_angle=f"{start} deg", mechanism__offset=offset, **motion))

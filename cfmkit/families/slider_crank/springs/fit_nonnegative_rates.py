@@ -208,13 +208,13 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
     ]
     equal: dict[str, Any] = {}
     if goal.held is not None:
-        size = float(np.abs(goal.held[0] / scales).max()) or 1.0
-        equal = {"A_eq": np.append(goal.held[0] / scales, 0.0)[None] / size, "b_eq": [goal.held[1] / size]}
+        row, held = _normalised(goal.held[0] / scales, goal.held[1])
+        equal = {"A_eq": np.append(row, 0.0)[None], "b_eq": [held]}
     limits = np.concatenate([goal.wanted, -goal.wanted])
     if goal.least is not None:
-        size = float(np.abs(goal.least[0] / scales).max()) or 1.0
-        rows = np.vstack([rows, np.append(-goal.least[0] / scales, 0.0)[None] / size])
-        limits = np.append(limits, -goal.least[1] / size)
+        row, least = _normalised(goal.least[0] / scales, goal.least[1])
+        rows = np.vstack([rows, np.append(-row, 0.0)[None]])
+        limits = np.append(limits, -least)
     found = linprog(
         cost,
         A_ub=rows,
@@ -223,8 +223,14 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
         method="highs",
         **equal,
     )
-    least = np.array([*(low for low, _ in bounds), 0.0])
-    return None if found.status != 0 or found.x is None else np.maximum(found.x, least)
+    lowest = np.array([*(low for low, _ in bounds), 0.0])
+    return None if found.status != 0 or found.x is None else np.maximum(found.x, lowest)
+
+
+def _normalised(row: FloatArray, value: float) -> tuple[FloatArray, float]:
+    """Return a row (m,) and its value with the largest entry of the row 1: a programme meets rows to 1e-7."""
+    size = float(np.abs(row).max()) or 1.0
+    return row / size, value / size
 
 
 def least_squares(goal: RateGoal) -> FloatArray | None:
@@ -333,10 +339,18 @@ def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
         rows += [above, below]
         right += [0.0, 0.0]
     if goal.least is not None:
-        rows.append(np.concatenate([-goal.least[0] * unit, [0.0, 0.0]]))
-        right.append(-goal.least[1])
+        row, least = _normalised(goal.least[0] * unit, goal.least[1])
+        rows.append(np.concatenate([-row, [0.0, 0.0]]))
+        right.append(-least)
+    equal: dict[str, Any] = {}
+    if goal.held is not None:
+        row, held = _normalised(goal.held[0] * unit, goal.held[1])
+        equal = {"A_eq": np.concatenate([row, [0.0, 0.0]])[None], "b_eq": [held]}
     cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
-    own = ((low / unit, None if top is None else top / unit) for low, top in goal.bounds)
+    own = [(low / unit, None if top is None else top / unit) for low, top in goal.bounds]
     bounds = [*own, (0.0, None), (0.0, None)]
-    found = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
-    return None if found.status != 0 or found.x is None else np.maximum(found.x[:count], 0.0) * unit
+    found = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs", **equal)
+    if found.status != 0 or found.x is None:
+        return None
+    rates: FloatArray = np.maximum(found.x[:count], [low for low, _ in own]) * unit
+    return rates
