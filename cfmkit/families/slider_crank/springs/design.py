@@ -211,11 +211,10 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float], best: float) -> fl
         goal = None
     if goal is None:
         return math.inf
-    least = wanted.objective == "least-squares"
-    rates = least_squares(goal) if least else minimax(goal)
+    rates = _best_rates(goal, wanted)
     if rates is None:
         return math.inf
-    deviation = goal.rms(rates) if least else goal.deviation(rates)
+    deviation = goal.rms(rates) if wanted.objective == "least-squares" else goal.deviation(rates)
     if wanted.catalogue and deviation < best:
         return least_deviation(task, goal, wanted.window)
     return deviation
@@ -254,13 +253,13 @@ def solve(task: SpringTask, tolerance: float | None = None) -> Solved:
             raise Infeasible(hopeless(task, picked.deviation))
         rms, places = goal.rms(picked.rates), len(goal.wanted)
         return Solved(task, window, picked.rates, picked.deviation, rms, proven, places, bought=picked.options)
-    rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
+    rates = _best_rates(goal, wanted)
     if rates is None:
         raise Infeasible(cannot_hold(task))
     if not rates.any():
         raise Infeasible(cannot_hold(task) if wanted.hold_stiffness else nowhere(task))
     if wanted.slack:
-        rates = chosen_rates(goal, rates, wanted)
+        rates = chosen_rates(goal, rates, wanted, tolerance or wanted.tolerance)
     deviation = goal.deviation(rates)
     if deviation > HOPELESS and wanted.tolerance is None:
         raise Infeasible(hopeless(task, deviation))
@@ -335,30 +334,55 @@ def _reference(solved: Solved) -> float:
 NEGLIGIBLE = 5e-4
 """More deviation, as a fraction of the target, that nobody would notice: such designs are reported as equals."""
 
+WITHIN = 1e-3
+"""By this share rates that are preferred stay within the tolerance: between the places of the search they are off by
+more, by some 1e-5 of the tolerance."""
+
 PLACES = 60
 """Places of the window for the programmes that say how far the rates may move."""
 
 
-def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign) -> FloatArray:
-    """Return the rates preferred among those whose deviation is worse than the best by no more than the slack."""
+def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign, tolerance: float | None) -> FloatArray:
+    """Return the rates preferred among those whose deviation is worse than the best by no more than the slack.
+
+    Where a tolerance is stated, the slack ends there: a design that keeps it is not given up for a preference.
+    """
     if wanted.prefer == "small-rotation":  # a matter of lengths only
         return best
-    found = preferred(goal, goal.deviation(best) + wanted.slack, wanted.prefer)
-    return best if found is None else found
+    least, most = goal.deviation(best), math.inf if tolerance is None else tolerance
+    found = preferred(goal, min(least + wanted.slack, max(least, most * (1.0 - WITHIN))), wanted.prefer)
+    return best if found is None or goal.deviation(found) > max(least, most) else found
 
 
 def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> tuple[float, ...]:
-    """Return the lengths preferred among those on the search's first axis that are worse by no more than the slack."""
+    """Return the lengths preferred among those on the search's first axis that are worse by no more than the slack.
+
+    Where a tolerance is stated, they keep it.
+    """
     wanted = spec.design
     if wanted is None or wanted.window is None or wanted.prefer != "small-rotation":
         return search.place
     good = [place for place, value in search.profile if value <= search.value + wanted.slack]
+    window, tolerance = wanted.window, wanted.tolerance
 
-    def rotation(place: tuple[float, ...]) -> float:
-        task = task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
-        return task.rotation(wanted.window or (0.0, 0.0))
+    def task(place: tuple[float, ...]) -> SpringTask:
+        return task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
 
-    return min([search.place, *good], key=rotation)
+    if tolerance is not None:
+        good = [place for place in good if _deviation(task(place), window) <= tolerance * (1.0 - WITHIN)]
+    return min([search.place, *good], key=lambda place: task(place).rotation(window))
+
+
+def _deviation(task: SpringTask, window: tuple[float, float]) -> float:
+    """Return the largest deviation of the best springs over a window, by the objective of the design."""
+    goal = task.goal(window)
+    rates = None if goal is None else _best_rates(goal, task.wanted)
+    return math.inf if goal is None or rates is None else goal.deviation(rates)
+
+
+def _best_rates(goal: RateGoal, wanted: CrankDesign) -> FloatArray | None:
+    """Return the best rates by the objective of a design; None if there are none."""
+    return least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
 
 
 def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
