@@ -10,6 +10,7 @@ Reference
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -254,6 +255,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
         beam.goal,
         beam.longest or 0.5 * reach,
         None if wanted.curve is None else wanted.curve.scaled(1.0 / wanted.size),
+        spec.mechanism.sets,
     )
 
 
@@ -327,12 +329,13 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges:
         text += f"{mm(low)} to {mm(high)}"
         return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
-        reached = task.force * np.clip(width, *wanted.width) / width
+        wide = float(np.clip(width, *wanted.width))
+        reached = newton(_four_digits(task.asked(task.force) * wide / width, up=width < wide))
         text = (
-            f"{newton(task.force)} need a width of {mm(width)}; within 'design.beam.width', {mm(wanted.width[0])} to "
-            f"{mm(wanted.width[1])}, the nearest is {newton(float(reached))}"
+            f"{newton(task.asked(task.force))} need a width of {mm(width)}; within 'design.beam.width', "
+            f"{mm(wanted.width[0])} to {mm(wanted.width[1])}, the nearest is {reached}"
         )
-        nearest = {"design.force": newton(float(reached)), "design.beam.width": mm(width)}
+        nearest = {"design.force": reached, "design.beam.width": mm(width)}
         return no_design(finding("target_unreachable", text), nearest)
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
@@ -352,7 +355,7 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
         limit = (
             "the stress" if allowed is not None and thickness * allowed / stress < high else "'design.beam.thickness'"
         )
-        nearest = (float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force * spec.mechanism.sets
+        nearest = task.asked((float(np.clip(thickness, low, thickest)) / thickness) ** 3 * task.force)
         text = (
             f"a strip {mm(width)} wide would have to be {mm(thickness)} thick; {limit} allows {mm(low)} to "
             f"{mm(thickest)}, which is about {newton(nearest)}"
@@ -364,6 +367,12 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
     if allowed is not None:
         text += f", stress {mpa(stress)} at {mm(task.stroke)}"
     return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+
+
+def _four_digits(value: float, up: bool) -> float:
+    """Return a positive number with four significant digits, rounded up or down: what is proposed is within a range."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return (math.ceil if up else math.floor)(value / unit) * unit
 
 
 def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:

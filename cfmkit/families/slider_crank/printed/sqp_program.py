@@ -60,7 +60,7 @@ class StripTask:
     material : Elasticity
         With the stress allowed, if there is a limit.
     force : float
-        Wanted [N].
+        Wanted of one set [N].
     start, stroke : float
         Ends of the travel over which it is wanted [m]; the stroke is the first guess where it is maximised.
     ripple : float
@@ -71,6 +71,8 @@ class StripTask:
         Stroke never exceeded [m].
     shape : TargetCurve or None
         Force over travel that is wanted, as a share of `force`; None: it is constant.
+    sets : int
+        Equal strips that share what the design asks for.
     """
 
     corners: FloatArray
@@ -83,6 +85,11 @@ class StripTask:
     goal: Goal = "stroke"
     longest: float = 0.08
     shape: TargetCurve | None = None
+    sets: int = 1
+
+    def asked(self, force: float) -> float:
+        """Return what a design is to ask for where one set has a force [N]."""
+        return force * self.sets
 
     def share(self, travel: Any) -> Any:
         """Return the force that is wanted at travels [m], as a share of `force`."""

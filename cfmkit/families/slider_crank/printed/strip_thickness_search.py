@@ -396,7 +396,7 @@ def infeasible(found: FoundStrip) -> Design:
         missed.append(f"is up to {percent(off)} off the force")
         flat = task.shape is None and high - low <= 2.0 * level * program.ripple(descent.z)
         name = "design.force" if flat else "design.tolerance"
-        nearest[name] = newton(level) if flat else format_short(off, "ratio")
+        nearest[name] = newton(task.asked(level)) if flat else format_short(off, "ratio")
     worst = float(state.stress.max())
     if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
         missed.append(f"has a stress of {mpa(worst)}")
