@@ -55,3 +55,14 @@ def test_the_force_proposed_after_a_search_is_that_of_all_strips() -> None:
     one, two = (infeasible(found(replace(TASK, force=10.0, sets=n), [0.977, 0.977, 2.0])) for n in (1, 2))
     forces = [float(each.nearest_feasible["design.force"].removesuffix(" N")) for each in (one, two)]
     assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
+
+
+# --- what the written strip is held to ----------------------------------------------------------------------------
+
+
+def test_the_stress_of_a_uniform_strip_is_the_largest_of_its_travel() -> None:
+    """Pressed this far it is largest before the end: 43.3 MPa where 42.5 were allowed."""
+    free = "beam: {shape: uniform, goal: ripple, width: [1 mm, 500 mm], thickness: [0.1 mm, 4 mm]}"
+    design = cfmkit.design(spec("strip", f"design={{force: 1.5 N, travel: [1 mm, 125 mm], {free}}}", "requirements=[]"))
+    assert design.status is Status.COMPLETE
+    assert cfmkit.evaluate(design.spec, ("stress_max",))["stress_max"].value == pytest.approx(42.49e6, rel=1e-3)

@@ -18,10 +18,10 @@ from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.sqp_program import StripTask
+    from cfmkit.families.slider_crank.printed.sqp_program import State, StripTask
 
 
 VIOLATION = 5e-3
@@ -76,7 +76,10 @@ SHORTEST = 2e-3
 WIDEST, NARROWING = 0.1, 5
 """Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
 
-_ROUNDS = 12
+GUESS = 1e-3
+"""Thickness of one that is searched, at first [m]."""
+
+_ROUNDS, _CLOSE = 12, 1e-10
 
 
 @dataclass(frozen=True)
@@ -119,69 +122,93 @@ class FoundStrip:
         return self.descent.z[: self.form.size]
 
 
-def uniform_thickness(task: StripTask, width: float, guess: float = 1e-3) -> float:
+def uniform_thickness(task: StripTask, width: float, guess: float = GUESS) -> float:
     """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
 
     The force follows the third power of the thickness but for stretching and shear: a few corrections do.
     """
-    program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
-    thickness = guess
-    for _ in range(_ROUNDS):
+    program = _of_one_thickness(task, width)
+
+    def step(thickness: float) -> float | None:
         state = program.state(np.array([thickness / SMALL, 1.0]))
         if state is None:
-            return guess
-        level = 0.5 * (state.force.max() + state.force.min())
+            return None
         wanted = np.asarray(task.share(program.travel(np.array([thickness / SMALL, 1.0]))))
-        factor = float((0.5 * task.force * (wanted.max() + wanted.min()) / level) ** (1.0 / 3.0))
+        return float((0.5 * task.force * (wanted.max() + wanted.min()) / _level(state)) ** (1.0 / 3.0))
+
+    found = _settled(step, guess)
+    return guess if found is None else found
+
+
+def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
+    """Return thickness and width [m] of the strip that has the allowable stress within the travel, and the force.
+
+    The stress does not depend on the width and the force is proportional to it, nearly so in wide strips: first the
+    thickness from the stress, then the width from the force. None where there is no stress limit or no equilibrium.
+    """
+    limit, width = task.material.allowable_stress, 5e-3
+    if limit is None:
+        return None
+
+    def step(thickness: float) -> float | None:
+        nonlocal width
+        state = _of_one_thickness(task, width).state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        factor = limit / _peak(state)
+        width *= task.force / _level(state)
+        width /= factor**3
+        return factor
+
+    thickness = _settled(step, GUESS)
+    return None if thickness is None else (thickness, width)
+
+
+def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | None:
+    """Return thickness [m] and largest stress [Pa] of the strip of a width [m] that has the force.
+
+    The force goes nearly with the cube of the thickness. None where there is no equilibrium.
+    """
+    worst = 0.0
+
+    def step(thickness: float) -> float | None:
+        nonlocal worst
+        state = _of_one_thickness(task, width).state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = _peak(state)
+        return float((task.force / _level(state)) ** (1.0 / 3.0))
+
+    thickness = _settled(step, GUESS)
+    return None if thickness is None else (thickness, worst)
+
+
+def _settled(step: Callable[[float], float | None], guess: float) -> float | None:
+    """Return the thickness [m] that steps from a guess lead to, each by a factor; None where there is no factor."""
+    thickness = guess
+    for _ in range(_ROUNDS):
+        factor = step(thickness)
+        if factor is None:
+            return None
         thickness *= factor
-        if abs(factor - 1.0) < 1e-10:
+        if abs(factor - 1.0) < _CLOSE:
             break
     return thickness
 
 
-def uniform_for_stroke(task: StripTask, guess: float = 1e-3) -> tuple[float, float] | None:
-    """Return thickness and width [m] of the strip that has the allowable stress at the stroke, and the force.
-
-    The stress does not depend on the width and the force is proportional to it: first the thickness from
-    the stress, then the width from the force. None where there is no stress limit or no equilibrium.
-    """
-    limit = task.material.allowable_stress
-    if limit is None:
-        return None
-    thickness, width = guess, 5e-3
-    for _ in range(_ROUNDS):
-        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
-        state = program.state(np.array([thickness / SMALL, 1.0]))
-        if state is None:
-            return None
-        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
-        level = 0.5 * (state.force.max() + state.force.min())
-        width *= task.force / level
-        factor = limit / worst
-        thickness *= factor
-        width /= factor**3
-        if abs(factor - 1.0) < 1e-10:
-            break
-    return thickness, width
+def _of_one_thickness(task: StripTask, width: float) -> StripProgram:
+    """Return the program of strips of one thickness and of a width [m], over the travel of a task."""
+    return StripProgram(replace(task, goal="ripple"), Form(1, width=width))
 
 
-def uniform_for_width(task: StripTask, width: float, guess: float = 1e-3) -> tuple[float, float] | None:
-    """Return thickness [m] and largest stress at the stroke [Pa] of the strip of a width [m] that has the force.
+def _level(state: State) -> float:
+    """Return the mean of the extremes of a force [N]."""
+    return float(0.5 * (state.force.max() + state.force.min()))
 
-    The force goes nearly with the cube of the thickness. None where there is no equilibrium.
-    """
-    thickness = guess
-    for _ in range(_ROUNDS):
-        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
-        state = program.state(np.array([thickness / SMALL, 1.0]))
-        if state is None:
-            return None
-        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
-        factor = (2.0 * task.force / (state.force.max() + state.force.min())) ** (1.0 / 3.0)
-        if abs(factor - 1.0) < 1e-10:
-            break
-        thickness *= factor
-    return thickness, worst
+
+def _peak(state: State) -> float:
+    """Return the largest stress at the points of the travel [Pa]: at its end, unless the strip is pressed very far."""
+    return float(state.path.peak_stress().value[state.path.at_requested].max())
 
 
 @dataclass(frozen=True)
