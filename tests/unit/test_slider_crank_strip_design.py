@@ -11,10 +11,11 @@ import pytest
 from flexure_support import ABS, MM, WIDTH, corners
 
 import cfmkit
+from cfmkit.families.slider_crank.printed import design as printed
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, Ranges, infeasible
 from cfmkit.numerics.sqp import Optimum, SearchEnding
-from cfmkit.results import Status
+from cfmkit.results import Design, Status
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 TASK = StripTask(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01)
@@ -60,9 +61,56 @@ def test_the_force_proposed_after_a_search_is_that_of_all_strips() -> None:
 # --- what the written strip is held to ----------------------------------------------------------------------------
 
 
+def test_a_strip_that_breaks_its_stress_in_its_analysis_is_no_design() -> None:
+    """It bends to its kink in the search, and away from it in the analysis, with 42.59 MPa instead of 42.48."""
+    refused = cfmkit.design(spec("strip", "analysis.side=before"))
+    assert refused.status is Status.INFEASIBLE
+    assert "from 1 mm to 34 mm the strip found has a stress of 42.59 MPa in its analysis" in refused.message
+    assert "remove 'analysis.side'" in refused.message
+    assert cfmkit.design(spec("strip", "analysis.side=beyond")).status is Status.COMPLETE
+
+
+def test_a_strip_of_several_thicknesses_is_held_to_its_band_by_its_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It had been a complete design within 1.59 % where 1 % were allowed, after the last reserve of the search."""
+    monkeypatch.setattr(printed, "RESERVES", printed.RESERVES[1:])
+    about = "design.beam.nodes=2", "analysis.side=before", "analysis.points=31"
+    refused = cfmkit.design(spec("taper_design", *about))
+    assert refused.status is Status.INFEASIBLE
+    assert "is up to 1.59 % off the force and has a stress of 42.66 MPa in its analysis" in refused.message
+
+
+def test_a_strip_without_force_all_the_way_is_no_design(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a limit of stress, and with the smallest ripple as its goal, there is nothing else to break."""
+    monkeypatch.setattr(printed, "measured", lambda *_: [None, None, None])
+    free = "design.beam={shape: uniform, goal: ripple, width: 5 mm, stressed: false}"
+    refused = cfmkit.design(spec("strip", free))
+    assert refused.status is Status.INFEASIBLE
+    assert "has no force all the way (solved over everything that was requested)" in refused.message
+
+
+def test_a_strip_that_keeps_its_limits_is_not_lost_to_a_second_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first search is repeated for a stroke that is said to be too short, and the second one breaks off."""
+    answers, search = [Status.CRASHED], printed.search
+    monkeypatch.setattr(printed, "ENOUGH", 2.0)
+    monkeypatch.setattr(
+        printed, "search", lambda *given: search(*given) if answers else Design(None, Status.CRASHED, "")
+    )
+    monkeypatch.setattr(printed, "_made", lambda *given: answers.clear() or Design(given[2].spec, Status.COMPLETE, ""))
+    assert cfmkit.design(spec("taper_design", "design.beam.nodes=2")).status is Status.COMPLETE
+
+
 def test_the_stress_of_a_uniform_strip_is_the_largest_of_its_travel() -> None:
     """Pressed this far it is largest before the end: 43.3 MPa where 42.5 were allowed."""
     free = "beam: {shape: uniform, goal: ripple, width: [1 mm, 500 mm], thickness: [0.1 mm, 4 mm]}"
     design = cfmkit.design(spec("strip", f"design={{force: 1.5 N, travel: [1 mm, 125 mm], {free}}}", "requirements=[]"))
     assert design.status is Status.COMPLETE
     assert cfmkit.evaluate(design.spec, ("stress_max",))["stress_max"].value == pytest.approx(42.49e6, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", ["before", "beyond"])
+def test_flexures_are_designed_for_the_side_to_which_they_are_to_bend(side: str) -> None:
+    """Springs were taken on that side, flexures on the other: their stress was 1.1 % too large."""
+    about = f"analysis.side={side}", "analysis.points=11"
+    result = cfmkit.analyze(cfmkit.design(spec("lumped", *about)).spec)
+    assert result.curve.extra["max_stress"].values.max() == pytest.approx(42.5e6, rel=1e-4)
+    assert "overstressed" not in {item.name for item in result.warnings}

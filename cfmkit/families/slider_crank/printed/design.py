@@ -58,6 +58,9 @@ RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
 ENOUGH = 0.99
 """Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
 
+POINTS = 61
+"""So many at most has the analysis of a uniform strip by which it is judged: between them the curve is as exact."""
+
 TOLD = 4
 """So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
 
@@ -111,33 +114,35 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     task = task_of(spec, linkage, unloaded)
     form, ranges = form_of(spec, wanted, task, linkage, unloaded)
     if wanted.shape == "uniform" and task.goal != "stroke":
-        return _closed(spec, wanted, task, ranges)
-    judged, reported, pins, allowed = (
-        None,
-        None,
-        pins_of(spec.mechanism, linkage, unloaded),
-        task.material.allowable_stress,
-    )
+        return _closed(spec, wanted, task, ranges, run)
+    pins, allowed, limits = pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress, _limits(spec)
     identity, clock = identity_of(spec, run.seed), Clock.of(run.time_budget)
+    kept: Design | None = None
     for reserve in RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
-        kept = replace(task, ripple=task.ripple - reserve, material=made_of)
-        outcome = search(kept, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
-        if isinstance(outcome, Design):
-            return outcome
-        found = outcome
-        if not found.descent.feasible:
-            return infeasible(found)
-        judged = judge(rounded(found.values, ranges.form, DIGITS), found, _limits(spec), pins)
-        if judged is not None and allowed is not None:
+        searched_for = replace(task, ripple=task.ripple - reserve, material=made_of)
+        found = search(searched_for, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
+        if isinstance(found, Design):
+            return kept or found
+        judged = None
+        if found.descent.feasible:
+            judged = judge(rounded(found.values, ranges.form, DIGITS), found, limits, pins)
+        if judged is None:
+            return kept or infeasible(found)
+        if allowed is not None:
             allowed /= max(1.0, judged.overstress)
-        reported = None if judged is None else _reported(_written(spec, judged, wanted), judged, run)
-        good = judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z)
-        good = good and (reported is None or reported.keeps(*_limits(spec)))
-        if good and allowed == made_of.allowable_stress:
+        reported = _reported(_written(spec, judged, wanted), judged.window, run)
+        if not reported.keeps(*limits):
+            refused = _not_kept(reported, judged.window, limits)
+            continue
+        kept = _made(found, judged, reported)
+        if judged.window[1] > ENOUGH * found.program.stroke(found.descent.z) and allowed == made_of.allowable_stress:
             break
-    if judged is None or reported is None:
-        return infeasible(found)
+    return kept or refused
+
+
+def _made(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Design:
+    """Return a strip that keeps its limits as a design."""
     return Design(
         reported.spec,
         Status.COMPLETE,
@@ -162,6 +167,8 @@ class Reported:
         Largest one in the window [Pa].
     opinion : (float, float) or None
         Differences of corotational elements in force and stress, where the analysis computes them.
+    ending : str
+        How the analysis ended.
     """
 
     spec: SliderCrankSpec
@@ -169,20 +176,40 @@ class Reported:
     rms: float | None
     stress: float | None
     opinion: tuple[float, float] | None
+    ending: str = ""
 
     def keeps(self, ripple: float | None, stress: float | None) -> bool:
-        """Return whether the strip is within its band and below its stress at the points of its analysis, too."""
+        """Return whether the analysis has all of the window, and the strip is within its band and stress there."""
         pairs = (self.deviation, ripple), (self.stress, stress)
-        return all(limit is None or (value is not None and value <= limit) for value, limit in pairs)
+        return self.rms is not None and all(
+            limit is None or (value is not None and value <= limit) for value, limit in pairs
+        )
 
 
-def _reported(spec: SliderCrankSpec, judged: FinishedStrip, run: Run) -> Reported:
+def _reported(spec: SliderCrankSpec, window: tuple[float, float], run: Run) -> Reported:
     result = analyze(spec, run)
     kind = "target" if spec.target_curve is None else "curve"
-    names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max", "recheck_force", "recheck_stress")
-    deviation, rms, stress, *opinion = measured(result, judged.window, *names)
-    said = None if None in opinion else (float(opinion[0] or 0.0), float(opinion[1] or 0.0))
-    return Reported(spec, deviation, rms, stress, said)
+    again = ("recheck_force", "recheck_stress") if spec.analysis.recheck else ()
+    names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max", *again)
+    deviation, rms, stress, *opinion = measured(result, window, *names)
+    said = (float(opinion[0] or 0.0), float(opinion[1] or 0.0)) if opinion and None not in opinion else None
+    return Reported(spec, deviation, rms, stress, said, result.message)
+
+
+def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[float | None, float | None]) -> Design:
+    """Return which limit a strip breaks in its analysis that it kept in the search."""
+    (ripple, stress), missed = limits, []
+    if reported.rms is None:
+        missed.append(f"has no force all the way ({reported.ending})")
+    if ripple is not None and reported.deviation is not None and reported.deviation > ripple:
+        missed.append(f"is up to {percent(reported.deviation)} off the force")
+    if stress is not None and reported.stress is not None and reported.stress > stress:
+        missed.append(f"has a stress of {mpa(reported.stress)}")
+    cure = "change 'design.travel' or the ranges in 'design.beam'"
+    if reported.spec.analysis.side is not None:
+        cure = "a strip is designed for the side to which it is kinked: remove 'analysis.side'"
+    text = f"from {mm(window[0])} to {mm(window[1])} the strip found {' and '.join(missed)} in its analysis; {cure}"
+    return no_design(finding("target_unreachable", text))
 
 
 def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
@@ -299,14 +326,14 @@ def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
     return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
 
 
-def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges) -> Design:
+def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges: Ranges, run: Run) -> Design:
     """Return the uniform strip for a stroke: thickness from the stress, width from the force.
 
     Where the width is stated, the thickness follows from the force.
     """
     fixed = sheet_of(spec.mechanism.part) or (None if isinstance(wanted.width, tuple) else wanted.width)
     if fixed is not None:
-        return _of_width(spec, task, ranges, float(fixed))
+        return _of_width(spec, task, ranges, float(fixed), run)
     found = uniform_for_stroke(task)
     if found is None:
         return no_design(
@@ -338,11 +365,11 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: StripTask, ranges:
         nearest = {"design.force": reached, "design.beam.width": mm(width)}
         return no_design(finding("target_unreachable", text), nearest)
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
-    text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
-    return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+    text = f"thickness {mm(thickness)} from the stress up to {mm(task.stroke)}, width {mm(width)} from the force"
+    return _analysed(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
 
 
-def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float) -> Design:
+def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: float, run: Run) -> Design:
     """Return the uniform strip of a stated width, its thickness from the force."""
     found = uniform_for_width(task, width)
     if found is None:
@@ -365,8 +392,17 @@ def _of_width(spec: SliderCrankSpec, task: StripTask, ranges: Ranges, width: flo
     part = _part(spec, {"width": width, "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"width {mm(width)} as stated, thickness {mm(thickness)} from the force"
     if allowed is not None:
-        text += f", stress {mpa(stress)} at {mm(task.stroke)}"
-    return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+        text += f", stress {mpa(stress)} up to {mm(task.stroke)}"
+    return _analysed(_with_part(spec, part, (task.start, task.stroke)), task, text, run)
+
+
+def _analysed(spec: SliderCrankSpec, task: StripTask, text: str, run: Run) -> Design:
+    """Return a uniform strip as a design, if its analysis keeps the stress, too."""
+    window, limits = (task.start, task.stroke), _limits(spec)
+    quick = {"recheck": False, "points": min(spec.analysis.points, POINTS)}
+    plain = spec.model_copy(update={"analysis": spec.analysis.model_copy(update=quick)})
+    reported = _reported(plain, window, replace(run, wanted=frozenset()))
+    return Design(spec, Status.COMPLETE, text) if reported.keeps(*limits) else _not_kept(reported, window, limits)
 
 
 def _four_digits(value: float, up: bool) -> float:

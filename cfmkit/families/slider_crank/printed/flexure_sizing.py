@@ -82,12 +82,13 @@ def sized(rate: float, length: float, youngs_modulus: float, stress: float, rota
     return Flexure(length, thickness, width_from_stiffness(rate, length, youngs_modulus, thickness))
 
 
-def rotations(linkage: Linkage, unloaded: float, travel: FloatArray) -> FloatArray:
-    """Return how far the three joints have turned where the slider has travelled, (3, n) [rad]."""
-    from cfmkit.families.slider_crank.unit_springs import along_slider
+def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int = 0) -> FloatArray:
+    """Return how far the three joints have turned where the slider has travelled, (3, n) [rad].
 
-    side = -1 if linkage.knee(unloaded) < 0 else 1
-    return along_slider(linkage, unloaded, side, np.asarray(travel)).turn[:3]
+    `side`: 1 or -1, as `linkage_from_spec.side_of` says it; 0: that of the kink.
+    """
+    bent = side or (-1 if linkage.knee(unloaded) < 0 else 1)
+    return along_slider(linkage, unloaded, bent, np.asarray(travel)).turn[:3]
 
 
 _ROUNDS = 8
@@ -170,7 +171,7 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     lengths = [length] * 3 if wanted.flexures.length or not own else [one.length for one in own]
     stroke = float(wanted.travel[1])
     side = side_of(spec, linkage, unloaded)
-    turn = np.abs(rotations(linkage, unloaded, np.array([stroke]))[:, 0])
+    turn = np.abs(rotations(linkage, unloaded, np.array([stroke]), side)[:, 0])
     sheet, stays = sheet_of(spec.mechanism.part), wanted.flexures.length is not None
     first = (
         one_width(rates, lengths, turn, made_of)
@@ -185,7 +186,8 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
     springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
-    found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact, kept)
+    bent = 0 if spec.analysis.side is None else side
+    found = corrected(first, made_of, (linkage, unloaded, bent), travel, springs_force, wanted.flexures.exact, kept)
     if found is None:
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
@@ -253,7 +255,7 @@ def of_width(
 def corrected(
     flexures: Sequence[Flexure],
     made_of: Elasticity,
-    built_in: tuple[Linkage, float],
+    built_in: tuple[Linkage, float, int],
     travel: FloatArray,
     force: FloatArray,
     exact: bool,
@@ -267,8 +269,8 @@ def corrected(
         Of the closed forms.
     made_of : Elasticity
         With the stress allowed.
-    built_in : (Linkage, float)
-        Linkage and crank angle unloaded.
+    built_in : (Linkage, float, int)
+        Linkage, crank angle unloaded, and the side to which the chain bends; 0: that of its kink.
     travel, force : (n,) arrays
         Where the force is compared, and that of the springs [m, N].
     exact : bool
@@ -277,9 +279,9 @@ def corrected(
         How, where the width stays.
     """
     parts, factors = tuple(flexures), (1.0, 1.0)
-    limit = made_of.allowable_stress or np.inf
+    limit, (linkage, unloaded, side) = made_of.allowable_stress or np.inf, built_in
     for number in range(_ROUNDS if fixed is None else 4 * _ROUNDS):
-        pressed = chain_of_flexures(parts, made_of, *built_in).press(travel)
+        pressed = chain_of_flexures(parts, made_of, linkage, unloaded).press(travel, side)
         if pressed.ending is not PressingEnd.COMPLETE:
             return None
         by_force = float(pressed.force.mean() / force.mean())
