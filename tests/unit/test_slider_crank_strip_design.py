@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flexure_support import ABS, MM, WIDTH, corners
+from flexure_support import ABS, LINKAGE, MM, UNLOADED, WIDTH, corners
 
 import cfmkit
+from cfmkit.elastica import PathStatus
 from cfmkit.families.slider_crank.printed import design as printed
+from cfmkit.families.slider_crank.printed import sqp_program
+from cfmkit.families.slider_crank.printed.audit import judge
+from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
 from cfmkit.families.slider_crank.printed.strip_thickness_search import FoundStrip, Ranges, infeasible
 from cfmkit.numerics.sqp import Optimum, SearchEnding
@@ -58,6 +62,61 @@ def test_the_force_proposed_after_a_search_is_that_of_all_strips() -> None:
     assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
 
 
+# --- derivatives --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lost", [{-1}, {1}, {-1, 1}])
+def test_a_derivative_is_taken_to_the_side_that_has_equilibria_and_is_never_zero(
+    lost: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a neighbour was not found the search was told that force and stress do not depend on the place."""
+    form, place = Form(3, (1,), width=WIDTH), 0.45
+    task = StripTask(corners()[[0, -1]], np.pi, ABS, 1.5, MM, 10 * MM, 0.01)
+    program, z = StripProgram(task, form), np.array([0.95, 0.9, 1.0, place, 1.0])
+    exact, near = program.slopes(z), sqp_program.neighbouring
+    assert exact is not None
+
+    def other(path: Any, network: Any, drive: Any) -> Any:
+        side = np.sign(network.beams["strip"].section.thickness.stations[1] - place)
+        found = near(path, network, drive)
+        return replace(found, status=PathStatus.LOST) if int(side) in lost else found
+
+    monkeypatch.setattr(sqp_program, "neighbouring", other)
+    again = program.slopes(z)
+    if len(lost) == 2:
+        assert again is None
+        return
+    assert np.abs(exact[1][:, 3]).max() > 0.1
+    np.testing.assert_allclose(again[1][:, 3], exact[1][:, 3], atol=1e-4 * np.abs(exact[1][:, 3]).max())
+
+
+def test_stations_at_the_end_of_a_segment_of_the_equations_have_their_derivative() -> None:
+    """In the middle a strip is cut into fewer segments than beside it, which ended designs with an internal message."""
+    form = Form(3, (1,), width=WIDTH)
+    task = StripTask(corners()[[0, -1]], np.pi, ABS, 1.5, MM, 10 * MM, 0.01)
+    at, beside = (StripProgram(task, form).slopes(np.array([0.95, 0.9, 1.0, 0.5 + off, 1.0])) for off in (0.0, 1e-4))
+    np.testing.assert_allclose(at[1][:, 3], beside[1][:, 3], atol=5e-3 * np.abs(beside[1][:, 3]).max())
+
+
+def test_ranges_of_stations_that_overlap_do_not_exchange_them() -> None:
+    """Such a search ended with an internal message."""
+    form = Form(4, (2,), width=WIDTH)
+    program = StripProgram(StripTask(corners()[[0, -1]], np.pi, ABS, 1.5, MM, 10 * MM, 0.01), form)
+    thickness = [0.95, 0.9, 0.97, 1.0]
+    assert program.values(np.array([*thickness, 0.3, 0.31, 1.0])) is not None
+    assert program.values(np.array([*thickness, 0.31, 0.3, 1.0])) is None
+    assert program.values(np.array([*thickness, 0.3, 0.3, 1.0])) is None
+
+
+def test_a_search_that_would_begin_with_exchanged_stations_is_refused() -> None:
+    line = "centreline: [[0 mm, 0 mm], [49 mm, 31 mm], [100 mm, 60 mm]]"
+    strip = f"{{width: 5 mm, thickness: [1 mm, 1 mm, 1 mm, 1 mm], {line}, shares: [[0.3, 0.7], []]}}"
+    beam = "design.beam={shape: shares, shares: [[0.3, 0.7], [0.2, 0.6]], width: 5 mm}"
+    refused = cfmkit.design(spec("taper_design", f"mechanism.beam={strip}", beam))
+    assert refused.status is Status.INVALID
+    assert "middles of the ranges in 'design.beam.shares' must increase" in refused.message
+
+
 # --- what the written strip is held to ----------------------------------------------------------------------------
 
 
@@ -88,6 +147,17 @@ def test_a_strip_without_force_all_the_way_is_no_design(monkeypatch: pytest.Monk
     assert "has no force all the way (solved over everything that was requested)" in refused.message
 
 
+def test_a_strip_that_breaks_its_band_where_it_begins_is_searched_with_more_in_reserve(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It had ended the design with a message of the beam engine, about the points of a drive."""
+    (pins, own), limits = (joints(LINKAGE, UNLOADED), found(TASK, [0.977, 0.977, 2.0])), (1e-4, None)
+    assert judge(np.array([0.977, 0.977]), own, limits, pins) is None
+    judged, original = [], printed.judge
+    monkeypatch.setattr(printed, "judge", lambda *given: original(*given) if judged else judged.append(1))
+    assert cfmkit.design(spec("taper_design", "design.beam.nodes=2", "analysis.points=31")).status is Status.COMPLETE
+
+
 def test_a_strip_that_keeps_its_limits_is_not_lost_to_a_second_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first search is repeated for a stroke that is said to be too short, and the second one breaks off."""
     answers, search = [Status.CRASHED], printed.search
@@ -96,7 +166,7 @@ def test_a_strip_that_keeps_its_limits_is_not_lost_to_a_second_search(monkeypatc
         printed, "search", lambda *given: search(*given) if answers else Design(None, Status.CRASHED, "")
     )
     monkeypatch.setattr(printed, "_made", lambda *given: answers.clear() or Design(given[2].spec, Status.COMPLETE, ""))
-    assert cfmkit.design(spec("taper_design", "design.beam.nodes=2")).status is Status.COMPLETE
+    assert cfmkit.design(spec("taper_design", "design.beam.nodes=2", "analysis.points=31")).status is Status.COMPLETE
 
 
 def test_the_stress_of_a_uniform_strip_is_the_largest_of_its_travel() -> None:

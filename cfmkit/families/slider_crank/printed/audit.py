@@ -68,7 +68,7 @@ def judge(
     limits: tuple[float | None, float | None],
     pins: FloatArray,
 ) -> FinishedStrip | None:
-    """Return what became of a strip; None if it has no equilibrium over its travel.
+    """Return what became of a strip; None if it has no equilibrium over its travel, or breaks its band at once.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def judge(
     stroke = float(np.floor(stroke * 1e6) / 1e6) if task.goal == "stroke" else end
     inside = (travel >= task.start) & (travel <= stroke)
     opinion = solution.recheck
-    if not inside.any() or opinion is None:
+    if not inside.any() or stroke <= task.start or opinion is None:
         return None
     return FinishedStrip(
         strip,

@@ -124,11 +124,12 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
         found = search(searched_for, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
         if isinstance(found, Design):
             return kept or found
-        judged = None
-        if found.descent.feasible:
-            judged = judge(rounded(found.values, ranges.form, DIGITS), found, limits, pins)
-        if judged is None:
+        if not found.descent.feasible:
             return kept or infeasible(found)
+        judged = judge(rounded(found.values, ranges.form, DIGITS), found, limits, pins)
+        if judged is None:
+            refused = _not_pressed(found)
+            continue
         if allowed is not None:
             allowed /= max(1.0, judged.overstress)
         reported = _reported(_written(spec, judged, wanted), judged.window, run)
@@ -210,6 +211,13 @@ def _not_kept(reported: Reported, window: tuple[float, float], limits: tuple[flo
         cure = "a strip is designed for the side to which it is kinked: remove 'analysis.side'"
     text = f"from {mm(window[0])} to {mm(window[1])} the strip found {' and '.join(missed)} in its analysis; {cure}"
     return no_design(finding("target_unreachable", text))
+
+
+def _not_pressed(found: FoundStrip) -> Design:
+    """Return that a strip keeps its limits at the places of its search only."""
+    over = f"from {mm(found.task.start)} to {mm(found.program.stroke(found.descent.z))}"
+    text = f"{over} the strip found keeps its band, or has its force, at the places of the search only"
+    return no_design(finding("target_unreachable", f"{text}; change 'design.travel' or the ranges in 'design.beam'"))
 
 
 def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
@@ -312,6 +320,8 @@ def form_of(
             f"design.beam.shares has {len(wanted.shares or ())} ranges, and there are {form.placed} shares"
         )
     table = [(low * 1e3, high * 1e3) for low, high in rows] + list(wanted.shares or ())
+    if not form.ordered(np.mean(table, axis=1), task.corners):
+        raise InputError("the middles of the ranges in 'design.beam.shares' must increase: the search begins there")
     if isinstance(width, tuple):
         table.append((width[0] * 1e3, width[1] * 1e3))
     return form, Ranges(np.array(table), task.longest)

@@ -135,6 +135,10 @@ class Form:
         own = np.real(x[self.count : self.count + self.placed])
         return spread(corners, [own[a:b].tolist() for a, b in itertools.pairwise(ends)])
 
+    def ordered(self, x: FloatArray, corners: FloatArray) -> bool:
+        """Return whether stations that vary come one after the other."""
+        return not self.per_piece or bool((np.diff(self.places(x, corners)) > APART).all())
+
     def width_of(self, x: FloatArray) -> float:
         """Return the width [m]."""
         return float(np.real(x[-1])) * SMALL if self.width is None else self.width
@@ -154,6 +158,9 @@ RMS_POINTS = 10
 """Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
 
 TOLERANCE = 1e-6
+
+APART = 1e-5
+"""Least distance of stations, as a share of the length: ranges that overlap must not exchange them."""
 
 _NUDGE = 1e-5  # of a share, or of the width as a share of itself, for central differences
 
@@ -235,6 +242,8 @@ class StripProgram(DesignProgram):
         """Return the pressed strip; None where it has no stable equilibrium at all points."""
         if self._last is not None and np.array_equal(self._last[0], z):
             return self._last[1]
+        if not self.form.ordered(z, self.task.corners):
+            return None
         path = self._path(self.network(z[: self.form.size]), self.travel(z))
         if path is None:
             return None
@@ -251,16 +260,19 @@ class StripProgram(DesignProgram):
                 near = neighbouring(self.known, network, drive)
                 if near.status is PathStatus.COMPLETE:
                     return near
-        path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
-        good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
-        return path if good else None
+        return _traced(network, drive)
 
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""
         state = self.state(z)
         if state is None:
             return None
-        force, stress = self._derivatives(z, state) if sloped else (None, None)
+        slopes: tuple[FloatArray | None, FloatArray | None] | None = (None, None)
+        if sloped:
+            slopes = self._derivatives(z, state)
+        if slopes is None:
+            return None
+        force, stress = slopes
         ratio = state.force / self.task.force - self.task.share(self.travel(z))
         by = None if force is None else force / self.task.force
         objective, slope = self._objective(z, ratio, by)
@@ -297,16 +309,17 @@ class StripProgram(DesignProgram):
             return []
         return [LimitRows("stress", 10.0 * (1.0 - state.stress / limit), None if by is None else -10.0 * by / limit)]
 
-    def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of force (p, n) and stress (r, n) by all variables."""
-        force, stress = self._by_form(z, state)
-        if not self.extra:
-            return force, stress
+    def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives of force (p, n) and stress (r, n) by all variables; None where one has none."""
+        found = self._by_form(z, state)
+        if found is None or not self.extra:
+            return found
+        force, stress = found
         last = self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
         return np.column_stack([force, last[0]]), np.column_stack([stress, last[1]])
 
-    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables."""
+    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables; None where one has none."""
         form, path, x = self.form, state.path, z[: self.form.size]
 
         def build(values: Any) -> Network:
@@ -321,6 +334,8 @@ class StripProgram(DesignProgram):
             steps.append((form.size - 1, _NUDGE * float(x[-1])))
         for k, step in steps:
             by = self._by_difference(z, k, step, state)
+            if by is None:
+                return None
             force.append(by[0][:, None])
             stress.append(by[1][:, None])
         if form.width is None and not self.task.material.wide:
@@ -328,20 +343,38 @@ class StripProgram(DesignProgram):
             stress.append(np.zeros((len(state.stress), 1)))
         return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
 
-    def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives by one variable by a central difference of neighbouring equilibria."""
+    def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives by one variable by a difference of neighbouring equilibria; None where there is none.
+
+        It is central, but where only one neighbour has equilibria. Beside a strip with a station at the end of one of
+        its segments others are cut into more segments, and are compared with each other.
+        """
         drive = Displacement(SLIDER, self.task.direction, self.travel(z))
-        sides = []
-        for step in (-nudge, nudge):
-            moved = z[: self.form.size].copy()
-            moved[k] += step
-            path = neighbouring(state.path, self.network(moved), drive)
-            if path.status is not PathStatus.COMPLETE:
-                return 0.0 * state.force, 0.0 * state.stress
-            side = State(path, path.effort, watched(path, self.spots))
-            sides.append((side.force, side.stress))
-        (low, weak), (high, strong) = sides
-        return (high - low) / (2 * nudge), (strong - weak) / (2 * nudge)
+
+        def moved(step: float) -> Network:
+            x = z[: self.form.size].copy()
+            x[k] += step
+            return self.network(x)
+
+        paths = [(0.0, state.path)]
+        try:
+            paths += [(step, neighbouring(state.path, moved(step), drive)) for step in (-nudge, nudge)]
+        except InputError:
+            beside = _traced(moved(nudge), drive)
+            paths = []
+            if beside is not None:
+                paths = [(nudge, beside), (2.0 * nudge, neighbouring(beside, moved(2.0 * nudge), drive))]
+        found = [pair for pair in paths if pair[1].status is PathStatus.COMPLETE]
+        if len(found) < 2:
+            return None
+        (first, low), (last, high) = found[-2:]
+        (force, stress), (more, higher) = (self._felt(path) for path in (low, high))
+        return (more - force) / (last - first), (higher - stress) / (last - first)
+
+    def _felt(self, path: Path) -> tuple[FloatArray, FloatArray]:
+        """Return force and stress of a path."""
+        state = State(path, path.effort[path.at_requested], watched(path, self.spots))
+        return state.force, state.stress
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
@@ -354,6 +387,13 @@ class StripProgram(DesignProgram):
             *(by_travel @ part[at] for part in (sections.bending_stress, sections.axial_stress))
         )
         return 0.01 * drive_slope(state.path) * moves, 0.01 * stress
+
+
+def _traced(network: Network, drive: Displacement) -> Path | None:
+    """Return the equilibria that are reached from rest; None where one is not, or is not stable."""
+    path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
+    good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
+    return path if good else None
 
 
 LAST, BETWEEN = 4, 13
