@@ -406,7 +406,7 @@ def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def _pad(assembly: Assembly, strip: BeamStrip, last: bool, driven: bool) -> FloatArray:
+def _pad(assembly: Assembly, strip: BeamStrip, last: bool, moves: bool) -> FloatArray:
     """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
     part = assembly.spec.mechanism.part
     index = -1 if last else 0
@@ -417,7 +417,7 @@ def _pad(assembly: Assembly, strip: BeamStrip, last: bool, driven: bool) -> Floa
     if part is not None and part.pad is not None:
         depth, half = part.pad[0], 0.5 * part.pad[1]
     if part is not None and part.frame is not None:
-        depth = (part.frame.shuttle if driven else part.frame.wall) or depth
+        depth = (part.frame.shuttle if moves else part.frame.wall) or depth
     return np.array(
         [at + half * side, at - half * side, at - half * side + depth * out, at + half * side + depth * out]
     )

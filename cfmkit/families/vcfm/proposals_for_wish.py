@@ -175,7 +175,7 @@ def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
         if longer is None:
             return
         try:
-            spec = spec.replace({"design.leaf_length": longer.split()[-2] + " " + longer.split()[-1]})
+            spec = spec.replace({"design.leaf_length": longer})
             first = closed_form(spec, spec.design)  # type: ignore[arg-type]
         except Infeasible:
             return

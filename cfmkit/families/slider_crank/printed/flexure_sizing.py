@@ -1,7 +1,7 @@
 """Flexures for given springs and a stroke: thickness from stress, width from rate, then both corrected by the beams.
 
-A flexure of length L in pure bending turns by psi = M L / EI, so its rate is K = E b h^3 / (12 L) and its
-stress is sigma = E h psi / (2 L) [B, eq. 12]. Solved for the section: h from the stress, then b from the rate.
+A flexure of length L in pure bending turns by psi = M L / EI, so its rate is K = EI / L = E b h^3 / (12 L) [B, eq. 12]
+and its stress sigma = E h psi / (2 L). Solved for the section: h from the stress, then b from the rate.
 One of finite length pushes harder, and its stress is higher where the moment is larger than on average: the beams say
 by how much, and force and stress follow from width and thickness in proportion, so that a few corrections are enough.
 

@@ -313,8 +313,8 @@ def preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
     worst : float
         Largest deviation allowed.
     rule : {"soft-springs", "even-rates"}
-        Smallest sum of the springs' largest efforts; or the smallest sum of the differences of
-        the torsion rates from the largest of them.
+        Smallest sum of the springs' largest efforts; or the smallest difference of the largest and
+        the smallest torsion rate of those that may be used.
     """
     count = goal.matrix.shape[1]
     if rule == "soft-springs":
@@ -324,7 +324,7 @@ def preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
 
 
 def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
-    """Return the rates whose torsion springs differ least: one more unknown above all, one below all."""
+    """Return the rates whose torsion springs differ least: one more unknown above all of them, one below."""
     from scipy.optimize import linprog
 
     scales, torsion = goal.scales(), min(3, goal.matrix.shape[1])
