@@ -12,8 +12,9 @@ from flexure_support import ABS, LINKAGE, MM, UNLOADED, WIDTH, corners
 
 import cfmkit
 from cfmkit.elastica import PathStatus
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.printed import design as printed
-from cfmkit.families.slider_crank.printed import sqp_program
+from cfmkit.families.slider_crank.printed import sqp_program, strip_thickness_search
 from cfmkit.families.slider_crank.printed.audit import judge
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import joints
 from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, StripTask
@@ -60,6 +61,26 @@ def test_the_force_proposed_after_a_search_is_that_of_all_strips() -> None:
     one, two = (infeasible(found(replace(TASK, force=10.0, sets=n), [0.977, 0.977, 2.0])) for n in (1, 2))
     forces = [float(each.nearest_feasible["design.force"].removesuffix(" N")) for each in (one, two)]
     assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
+
+
+def test_a_search_for_the_smallest_ripple_that_stops_on_its_way_has_a_strip(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It had been infeasible, being off the force by more than the number that was minimised."""
+
+    def stopped(program: StripProgram, start: Any, *_: Any, **__: Any) -> Optimum:
+        z = np.append(start[:-1], 0.1)
+        objective, rows = program.values(z)  # type: ignore[misc]
+        return Optimum(z, objective, rows, SearchEnding.STUCK, 1, 5e-3)
+
+    monkeypatch.setattr(strip_thickness_search, "descend", stopped)
+    task, ranges = replace(TASK, goal="ripple"), Ranges(np.tile([0.5, 2.0], (2, 1)), 40 * MM)
+    strip = strip_thickness_search.search(task, Form(2, width=WIDTH), ranges, 1, Run())
+    assert isinstance(strip, FoundStrip)
+    assert strip.descent.feasible
+    state = strip.program.state(strip.descent.z)
+    assert state is not None
+    off = 100.0 * float(np.abs(strip.program.between @ (state.force / 1.5 - 1.0)).max())
+    assert strip.descent.objective == pytest.approx(off, rel=1e-9)
+    assert off > 0.2
 
 
 # --- derivatives --------------------------------------------------------------------------------------------------

@@ -73,6 +73,9 @@ SCATTER = 0.15
 SHORTEST = 2e-3
 """Length of the band that is sought at least [m]."""
 
+MOST_RIPPLE = 100.0
+"""Largest deviation from the force that a search for the smallest one considers [%]."""
+
 WIDEST, NARROWING = 0.1, 5
 """Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
 
@@ -277,11 +280,26 @@ def search(
     outcome = done(Stage(OneStart(work.descended, clock), tuple(range(starts)), identity), means, clock, tell)
     if not outcome.records:
         return _nothing(outcome.lost)
-    found = [work.read(outcome.records[number]) for number in sorted(outcome.records)]
+    found = [_with_its_ripple(work.read(outcome.records[number])) for number in sorted(outcome.records)]
     best = min(found, key=lambda one: _rank(one.descent))
     if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
         best = min(filter(None, (best, _tightened(work))), key=lambda one: _rank(one.descent))
     return replace(best, lost=outcome.lost)
+
+
+def _with_its_ripple(found: FoundStrip) -> FoundStrip:
+    """Return a strip with the ripple that it has, where a search for the smallest one ended with a smaller number.
+
+    Such a search may stop on its way; no ripple is too large for it, and the strip is one.
+    """
+    descent, program = found.descent, found.program
+    if found.task.goal != "ripple" or descent.feasible or (seen := program.seen(descent.z, False)) is None:
+        return found
+    z = descent.z.copy()
+    z[-1] -= min(float(rows.values.min()) for rows in seen.rows if rows.name == "band")
+    if z[-1] > MOST_RIPPLE or (answer := program.values(z)) is None:
+        return found
+    return replace(found, descent=replace(descent, z=z, objective=answer[0], constraints=answer[1]))
 
 
 def _nothing(lost: tuple[str, ...]) -> Design:
@@ -383,7 +401,7 @@ def _bounds(task: StripTask, ranges: Ranges, form: Form, count: int) -> FloatArr
     rows = np.concatenate([thickness, own[form.count :]])
     if task.goal == "rms":
         return rows
-    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
+    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, MOST_RIPPLE]
     return np.concatenate([rows, [goal]])
 
 
