@@ -172,7 +172,7 @@ class _Package(ModuleType):
 
     @export.setter
     def export(self, package: ModuleType) -> None:
-        """Leave it at that: the import system sets packages as attributes, and this one is found without."""
+        """Ignore the package: the import system sets it as an attribute, but it is found without that."""
 
 
 sys.modules[__name__].__class__ = _Package

@@ -60,7 +60,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
 
 
 def loads(text: str | bytes, source: str = "text") -> Spec:
-    """Return the specification that YAML text says.
+    """Return the specification that a YAML text describes.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def evaluate(
 
 
 def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
-    """Return what became of each requirement of the specification; one that is not analysed yet is.
+    """Return the outcome of each requirement; a specification is analysed first.
 
     Examples
     --------
@@ -333,7 +333,7 @@ def suggest(
     seed : int
         Of everything random.
     jobs : int
-        Processes; 1: this one alone, from which a job that takes long cannot be taken when the time budget ends.
+        Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
     time_budget : float, optional
         In seconds; None: no limit.
     **keys

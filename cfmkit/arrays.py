@@ -1,6 +1,6 @@
 """Arrays as the whole package writes them: of numbers, in SI units, read-only once they are handed out.
 
-Whole results are a million letters: what holds arrays, and containers of such things, have a `repr` of a line or a few.
+The full text of a result would have a million characters: what holds arrays, and its containers, has a short `repr`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     FloatArray = NDArray[np.float64]
 
 LONGEST = 1500
-"""Letters of a `repr`."""
+"""Characters of a `repr`."""
 
 LONGEST_ITEM = 100
-"""Letters of one thing in it."""
+"""Characters of one item in it."""
 
 PLAIN = (str, int, float, type(None))
 """What has a text of its own that is short."""

@@ -50,12 +50,12 @@ class Stopped(BaseException):
 
     def starts_over(self) -> None:
         """Add that nothing was finished that could be kept: short searches and first points are computed again."""
-        self.reported += "; nothing is finished that could be kept: the same command starts over"
+        self.reported += "; nothing that could be reused is finished yet: the same command starts from the beginning"
 
 
 def go_on(fresh: bool) -> str:
     """Return how a run that keeps what it has finished goes on."""
-    return f"run the same command again{' without --fresh' if fresh else ''} to go on"
+    return f"run the same command again{' without --fresh' if fresh else ''} to continue"
 
 
 def fail(error: BaseException, terminal: Terminal) -> ExitCode:

@@ -108,7 +108,7 @@ class Common:
 
 @dataclass(frozen=True, kw_only=True)
 class Changing(Common):
-    """What a verb takes that reads specifications."""
+    """Options of verbs that read specifications."""
 
     set: Annotated[
         list[str] | None,
@@ -130,7 +130,7 @@ class Changing(Common):
 
 @dataclass(frozen=True, kw_only=True)
 class FigureChoice(Common):
-    """What a verb takes that draws."""
+    """Options of verbs that draw."""
 
     no_plots: NoPlots = False
     figures: Annotated[
@@ -165,13 +165,13 @@ class FigureChoice(Common):
         said = {"--figures": self.figures, "--figure-width": self.figure_width, "--figure-style": self.figure_style}
         given = [name for name, value in said.items() if value is not None] + ["--no-titles"] * self.no_titles
         if self.no_plots and given and not getattr(self, "report", False):
-            raise UsageError(f"--no-plots draws no figures: it does not go with {given[0]}")
+            raise UsageError(f"--no-plots draws no figures and cannot be combined with {given[0]}")
         return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OneSpec(Changing):
-    """What a verb takes that reads one specification and writes a folder."""
+    """Options of verbs that read one specification and write a folder."""
 
     spec: Annotated[
         str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", shell_completion.specs)
@@ -181,7 +181,7 @@ class OneSpec(Changing):
 
 @dataclass(frozen=True, kw_only=True)
 class Computing(OneSpec, FigureChoice):
-    """What a verb takes that computes."""
+    """Options of verbs that compute."""
 
     fidelity: Fidelity = None
     seed: Seed = 0
@@ -190,7 +190,7 @@ class Computing(OneSpec, FigureChoice):
 
 @dataclass(frozen=True, kw_only=True)
 class Studying(Computing):
-    """What a verb takes that evaluates many points."""
+    """Options of verbs that evaluate many points."""
 
     jobs: Jobs = None
     cluster: Annotated[
@@ -210,7 +210,7 @@ class Studying(Computing):
 
 @dataclass(frozen=True, kw_only=True)
 class Measuring(Common):
-    """What a verb takes that reads a measurement."""
+    """Options of verbs that read a measurement."""
 
     units: Annotated[
         str | None,
@@ -281,4 +281,4 @@ def refuse_without_data(options: Measuring) -> None:
 
     for name in ("units", "tare", "zero", "flip"):
         if getattr(options, name) is not None:
-            raise UsageError(f"--{name} is for a measurement: name it with --data")
+            raise UsageError(f"--{name} applies to a measurement: name its file with --data")

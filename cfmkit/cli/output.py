@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 NARROWEST, WIDEST = 40, 108
 """Columns of a page. In 40 the page of a cam still shows every number beside its name; wider than 108 a paragraph is
-hard to read, and hardly a line but commands to copy gets so long."""
+hard to read, and few lines except commands to copy are that long."""
 
 LEAST_GAP = 2
 """Columns between the two ends of a line: fewer would read as one text."""

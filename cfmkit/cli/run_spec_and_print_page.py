@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 NO_MOTION = (
     "--animate: no film was written, because this run has no poses to draw: it has no curve, its family draws none, "
-    "or the cam is lifted in time or measured as cut"
+    "or the cam is analysed dynamically or as measured"
 )
 """What is said where a film was requested and there is none."""
 
@@ -82,7 +82,7 @@ def folder_of(options: OneSpec, verb: str) -> str:
             raise UsageError("--out is empty; give a folder")
         return options.out
     if options.spec == STDIN:
-        raise UsageError("a spec from standard input has no name; say with --out where to write")
+        raise UsageError("a spec from standard input has no name; give the output folder with --out")
     return str(Path("cfm-out") / f"{Path(options.spec).stem}-{verb}")
 
 
@@ -130,7 +130,7 @@ def _page(outcome: FinishedRun, written: Written, everything: bool) -> Iterator[
     yield from _warnings(outcome)
     yield written.block(everything)
     for name, spare in outcome.kept.items():
-        yield Paragraph("kept", f"{name} had been edited; that version is now {spare}", BAD)
+        yield Paragraph("kept", f"{name} was edited since the last run; the edited version is kept as {spare}", BAD)
 
 
 def _ending(found: Report) -> Iterator[Block]:
@@ -272,7 +272,7 @@ def _overrated(report: Report, name: str) -> str:
     reported = {one.name for one in report.result.warnings}
     if factor is None or "overstressed" in reported or not 1 / (1 + share) <= factor < 1:
         return ""
-    return f" (this model overrates the stress by up to {100 * share:.2g} %)"
+    return f" (this model overestimates the stress by up to {100 * share:.2g} %)"
 
 
 def _stroke(report: Report) -> str:

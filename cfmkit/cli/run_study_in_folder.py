@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Desk:
-    """Where a study works: its folder, its journal, and who is told how far it is."""
+    """Where a study works: its folder, its journal, and its progress monitor."""
 
     folder: RunFolder
     journal: Journal
@@ -173,7 +173,7 @@ def executor_for(work: Work, options: Studying) -> Executor:
 
         if timeout is not None:
             raise UsageError(
-                "--timeout-per-point needs processes of this machine: a cluster cannot end one point alone"
+                "--timeout-per-point works only with processes on this machine: a cluster cannot stop a single point"
             )
         return Cluster(options.cluster, jobs)
     count = -(-len(work.plan) // work.together)

@@ -17,7 +17,7 @@ SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")
 """Those that typer has scripts for."""
 
 LARGEST_HEAD = 20_000
-"""Letters of a file in which its family is looked for; a completion that reads more would be felt."""
+"""Characters of a file in which its family is looked for; a completion that reads more would be felt."""
 
 BASH = r"""
 _cfmkit_completion() {
@@ -65,12 +65,12 @@ SCRIPTS = {"bash": BASH, "zsh": ZSH}
 
 
 def shells(incomplete: str) -> list[str]:
-    """Return the names of shells that begin so."""
+    """Return the names of shells that begin with the text typed so far."""
     return [name for name in SHELLS if name.startswith(incomplete)]
 
 
 def show(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
-    """Print the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
+    """Print the script of a shell and exit; default (an empty value): of the current shell."""
     if value is None or ctx.resilient_parsing:
         return
     shell = _shell(value)
@@ -81,13 +81,13 @@ def show(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> N
 
 
 def install(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -> None:
-    """Install the script of a shell and leave; where none is named (an empty value), of that in which this runs."""
+    """Install the script of a shell and exit; default (an empty value): of the current shell."""
     if value is None or ctx.resilient_parsing:
         return
     try:
         shell, place = typer.completion.install(_shell(value), prog_name="cfmkit")  # type: ignore[attr-defined]
     except FileNotFoundError as error:  # the profile of a PowerShell is where it says
-        raise typer.BadParameter(f"there is no program {value or 'pwsh'!r} to be asked where its profile is") from error
+        raise typer.BadParameter(f"the program {value or 'pwsh'!r} was not found: its profile is not known") from error
     if shell in SCRIPTS:
         place.write_text(f"{SCRIPTS[shell]}\n", encoding="utf-8")
     typer.echo(f"{shell} completion installed in {place}; it takes effect in a new terminal")
@@ -95,21 +95,21 @@ def install(ctx: typer.Context, param: typer.CallbackParam, value: str | None) -
 
 
 def _shell(named: str) -> str:
-    """Return the shell that is named, or that in which this runs."""
+    """Return the shell that is named, or the current one."""
     import shellingham
 
     if not named:
         try:
             named = shellingham.detect_shell()[0]
         except shellingham.ShellDetectionFailure:
-            raise typer.BadParameter(f"this runs in no known shell; name one: {', '.join(SHELLS)}") from None
+            raise typer.BadParameter(f"the current shell is not a known one; name one: {', '.join(SHELLS)}") from None
     if named not in SHELLS:
         raise typer.BadParameter(f"there is no completion for {named!r}; there is one for {', '.join(SHELLS)}")
     return named
 
 
 def families(incomplete: str) -> list[str]:
-    """Return the names of families that begin so."""
+    """Return the names of families that begin with the text typed so far."""
     from cfmkit.families import names
 
     return [name for name in names() if name.startswith(incomplete)]

@@ -54,7 +54,7 @@ def explain(name: str | None) -> Answer:
 
 
 def skipped(name: str | None) -> tuple[str, ...]:
-    """Return the families of other packages that a page cannot tell of; none where it tells of no family or one."""
+    """Return the families of other packages that are missing from a page on all families; none for other pages."""
     whole = name not in {*families.names(), "units", "metrics", "materials"}
     return families.skipped() if whole else ()
 
@@ -166,7 +166,10 @@ def materials_page() -> Answer:
         Field("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
         Field("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
-    text = "At room temperature, for short loads; the ranges are what to expect in practice. In SI under --json."
+    text = (
+        "At room temperature, under short-term loads; the ranges are what to expect in practice. With --json in SI "
+        "units."
+    )
     sources = (
         field("name", "material", wraps=True),
         field("poisson_ratio", "nu"),

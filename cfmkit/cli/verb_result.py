@@ -42,7 +42,7 @@ class Answer:
 
 
 def reported_for(skipped: Sequence[str], answer: Answer) -> Answer:
-    """Return an answer that also tells of the families that were skipped: one line each, and in the document."""
+    """Return an answer that also reports the families that were skipped: one line each, and in the document."""
     if not skipped:
         return answer
     others = answer.data.get("warnings", ())

@@ -38,7 +38,7 @@ SIGMA_STEP = 0.5
 """Step of a difference by an error, in standard deviations: so small that its own curvature does not count."""
 
 ASIDE = 0.25
-"""A mean error beyond so many standard deviations is one to one side, as of a waviness, which is never below zero."""
+"""An error whose mean exceeds so many standard deviations is one-sided, like a waviness, which is never below zero."""
 
 LINEAR_PARTS = 192
 """Parts of a linear program."""
@@ -68,7 +68,7 @@ class SeenPart(Protocol):
 
 @dataclass(frozen=True)
 class PartSlopes:
-    """Exact derivatives of the numbers of a part; NaN by what they are not known by.
+    """Exact derivatives of the numbers of a part; NaN where one is not known.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def never() -> bool:
 
 
 def unheard(_share: float, _steps: int) -> None:
-    """Take how far a search is, and tell nobody."""
+    """Ignore the progress of a search."""
 
 
 @dataclass(frozen=True)

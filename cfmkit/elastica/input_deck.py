@@ -232,7 +232,10 @@ class _Lines:
         x, y = (to_border(float(one), "length") for one in (node.x, node.y))
         arm, (middle, end, pulling) = LEVER * size, (self.spare, self.spare + 1, self.spare + 2)
         self.spare += 3
-        yield f"** the torque is {arm:.10g} mm times the reaction of DRIVE square to the lever, which was along x"
+        yield (
+            f"** the torque is {arm:.10g} mm times the reaction of DRIVE perpendicular to the lever, which initially "
+            "lies along x"
+        )
         yield "*NODE, NSET=ALL"
         yield f"{middle}, {x + 0.5 * arm:.10g}, {y:.10g}, 0"
         yield f"{end}, {x + arm:.10g}, {y:.10g}, 0"

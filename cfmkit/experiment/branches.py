@@ -43,7 +43,7 @@ _FEWEST = 4
 
 @dataclass(frozen=True)
 class Stroke:
-    """One way between two reversals.
+    """One stroke, from one reversal to the next.
 
     Attributes
     ----------

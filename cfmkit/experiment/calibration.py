@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 POOR = 0.3
-"""Parameters known to less than this part of their size are reported as badly known."""
+"""Parameters whose interval exceeds this part of their size are reported as poorly determined."""
 
 BY_CHANCE = 1e-3
 """Residuals are not random where chance makes their means as large less often than that."""
@@ -53,7 +53,7 @@ TIED = 0.999
 """Parameters more correlated than this are reported as poorly distinguished."""
 
 FINDINGS = {
-    "weakly_identified": "the data determine a fitted value badly",
+    "weakly_identified": "the data determine a fitted value poorly",
     "at_bound": "a fitted value is at its bound: the data require a value beyond",
     "lack_of_fit": "the residuals are not random: the model does not describe the measurement",
     "not_converged": "the fit stopped before it converged",
@@ -152,7 +152,9 @@ def _compared(
     low = max(found.window.lo, max(float(part.min()) for part in parts) + shift.high)
     high = min(found.window.hi, min(float(part.max()) for part in parts) + shift.low)
     if not low < high:
-        raise UsageError(f"--bounds: within those of {shift.path} there is no travel that the model always covers")
+        raise UsageError(
+            f"--bounds: within the bounds of {shift.path} there is no travel that the model covers for every value"
+        )
     return compare(result, source, Window(low, high))
 
 
@@ -228,7 +230,8 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
         elif half[k] > POOR * item.size:
             found.append(
                 Finding(
-                    "weakly_identified", f"{item.path} is known to ± {100 * half[k] / item.size:.0f} % of its size only"
+                    "weakly_identified",
+                    f"{item.path} is known only to within ± {100 * half[k] / item.size:.0f} % of its size",
                 )
             )
         for other in range(k):
@@ -253,7 +256,7 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
     swing, noise = (format_short(value, kind, 3) for value in (found.swing, found.noise))
     fitted = {item.path for item in parameters}
     other = ", ".join(path for path in (DATA + name for name in ZEROS[kind]) if path not in fitted)
-    cure = f"zeros of the recording can be fitted, too: {other}" if other else "another value or model is at fault"
+    cure = f"zeros of the recording can be fitted, too: {other}" if other else "another value or the model is wrong"
     return [
         Finding(
             "lack_of_fit",

@@ -303,10 +303,10 @@ def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
     cycles = strokes.cycles
     if not cycles:
         only = strokes.strokes[0].branch
-        found.append(Finding("one_branch", f"there is the branch {only!r} only: no loop, and no hysteresis"))
+        found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
     left = len(strokes.strokes) - 2 * len(cycles)
     if cycles and covered(cycles[0]) < WHOLE:
-        reported = f"the shorter way covers {100 * covered(cycles[0]):.0f} % of the longer one only"
+        reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
         found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
     if cycles and left:
         found.append(
@@ -407,7 +407,7 @@ def common_window(curves: Sequence[Curve]) -> Window:
         one, what = (
             ("angle", "angle and torque") if curves[0].kind == "torque" else ("travel", "displacement and force")
         )
-        raise DataError(f"no {one} is measured on every branch; are the columns or units of {what} exchanged?")
+        raise DataError(f"no {one} is measured on every branch; are the columns or units of {what} swapped?")
     return Window(lo + 0.0, hi + 0.0)  # no -0
 
 
@@ -422,8 +422,8 @@ def require_loop(source: MeasuredCurves) -> None:
     if not source.strokes.cycles:
         only = source.strokes.strokes[0].branch
         raise DataError(
-            f"{source.recording.name}: holds the branch {only!r} only: without the way back there is no loop and no "
-            "hysteresis; if one way is all that was measured, say --one-branch"
+            f"{source.recording.name}: holds only the branch {only!r}: without the return stroke there is no loop and "
+            "no hysteresis; if only one stroke was measured, add --one-branch"
         )
 
 

@@ -259,7 +259,7 @@ def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     known = {"--tare": (zeros.effort, kind), "--zero": (zeros.motion, calibration.after.curve.motion_dimension)}
     options = " ".join(f'{name} "{_exact(value, unit, 6)}"' for name, (value, unit) in known.items() if value)
     if options:
-        lines.append(("data", f"{options} lays the recording on the fitted model (analyze --data, measure)"))
+        lines.append(("data", f"{options} gives the recording the zeros of the fitted model (analyze --data, measure)"))
     return tuple(lines)
 
 

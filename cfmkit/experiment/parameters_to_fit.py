@@ -119,7 +119,7 @@ def _zero(path: str, option: str, recording: Recording | None) -> str:
     name = path.removeprefix(DATA)
     if name not in known:
         there = ", ".join(DATA + item for item in known)
-        raise UsageError(f"{option}: there is no {path!r}; of a recording there are {there}")
+        raise UsageError(f"{option}: there is no {path!r}; a recording has {there}")
     return known[name]
 
 
@@ -129,7 +129,7 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Fit
     except CannotVary as problem:
         raise UsageError(f"--fit: {problem}") from None
     if found.kind not in ("quantity", "number"):
-        raise UsageError(f"--fit: {path!r} is not a number that can change by small steps")
+        raise UsageError(f"--fit: {path!r} is not a number that varies continuously")
     value = _value(spec, path)
     dimension = found.quantity.dimensions[0] if found.quantity else "ratio"
     low, high = _limits(type(spec), path)

@@ -100,12 +100,15 @@ def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name:
     if not any(column.unit for column in columns):
         example = ",".join(f"{column.name if not column.name.startswith('column ') else column.index + 1}=..."
                            for column in numeric[:3])  # fmt: skip
-        return f'{name}: the header names no units, and they are never guessed; say --units "{example}"'
+        return f'{name}: the header names no units, and they are never guessed; state them with --units "{example}"'
     there = {item.dimension for item in numeric}
     lacking = "force" if "length" in there else "displacement" if "force" in there else "displacement and force"
     lacking = "torque" if "angle" in there and "force" not in there else lacking
     labels = ", ".join(column.label for column in columns)
-    return f"{name}: there is no column for the {lacking} among {labels}; say which is in which unit with --units"
+    return (
+        f"{name}: no column for the {lacking} was found among {labels}; state which column it is, and its unit, with "
+        "--units"
+    )
 
 
 LARGEST = 500_000_000

@@ -1,15 +1,16 @@
 """Ends of strokes at which the force still passes from one branch to the other: found, and left out.
 
 Where a motion turns back the force does not jump. The sample at the reversal may hold the
-force of either branch, play moves the displacement while the force waits, and what is elastic
-in the drive lets the force run from one branch to the other over some way: linearly for a
-spring with dry friction [P], exponentially for the friction of [D]. None of that is
-the force of a branch, and a filter smears it over many samples.
+force of either branch, backlash lets the displacement change while the force does not, and
+what is elastic in the drive lets the force run from one branch to the other over some way:
+linearly for a spring with dry friction [P], exponentially for the friction of [D]. None of
+that is the force of a branch, and a filter smears it over many samples.
 
-Features that both branches have in common say nothing; what tells a passage is the gap
+Features that both branches have in common say nothing; what reveals a transition is the gap
 between the branches, load less unload: it is smooth along the travel, but closes towards
-the reversal. So the gap near the end of a stroke is taken for a straight line less a step, a
-ramp or an exponential, and the passage is believed where that explains what noise does not.
+the reversal. So the gap near the end of a stroke is taken for a straight line less a step,
+a ramp or an exponential, and the transition is accepted where that explains what noise does
+not.
 
 References
 ----------

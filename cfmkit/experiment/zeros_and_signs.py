@@ -56,7 +56,7 @@ def corrected(
     shown = [_shown(tare, recording.effort[:resting], "--tare", recording.kind)]
     shown.append(_shown(zero, recording.motion[:1], "--zero", "length" if recording.kind == "force" else "angle"))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
-    notes = [*_notes((effort, motion), shown, recording.kind), *(f"{word} with the other sign" for word in flip)]
+    notes = [*_notes((effort, motion), shown, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
     if not notes:
         return recording
     return replace(
@@ -85,7 +85,7 @@ def _shown(value: str | float | None, first: FloatArray, option: str, dimension:
     try:
         return read_quantity(value, dimension)
     except QuantityError as error:
-        raise UsageError(f"{option}: {error}; or say {START!r} for the mean before the machine moves") from None
+        raise UsageError(f"{option}: {error}; or write {START!r} for the mean before the machine moves") from None
 
 
 def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:
@@ -93,7 +93,7 @@ def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:
 
     dimensions = (kind, "length" if kind == "force" else "angle")
     return [
-        f"{format_short(value, dimension, 6)} taken off the {word}"
+        f"{format_short(value, dimension, 6)} subtracted from the {word}"
         for word, value, dimension in zip(words, shown, dimensions, strict=True)
         if value
     ]

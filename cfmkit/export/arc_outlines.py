@@ -217,6 +217,4 @@ def _check_holes(cuts: Sequence[tuple[str, Outline, Any]]) -> None:
             raise GeometryError(f"{name} is a hole at {place(outline.chain.nodes[0])}, outside every cut contour")
     for (one, _, a), (other, outline, b) in itertools.combinations(holes, 2):
         if a.intersects(b):
-            raise GeometryError(
-                f"{one} and {other} are holes of which one lies in the other, at {place(outline.chain.nodes[0])}"
-            )
+            raise GeometryError(f"the holes {one} and {other} touch or overlap, at {place(outline.chain.nodes[0])}")

@@ -90,7 +90,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
     rings = [(one, Polygon(np.column_stack([points.real, points.imag]))) for one, points in chains]
     solids = [ring for one, ring in rings if not one.hole]
     if not solids:
-        raise GeometryError("nothing is to be cut: there is no body")
+        raise GeometryError("there is nothing to cut, and so no body")
     found = []
     for solid in solids:
         holes = [ring.exterior for one, ring in rings if one.hole and solid.contains(ring)]

@@ -50,7 +50,7 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
     holes = [kernel.Face(wire) for one, wire in wires if one.hole]
     solids = [_solid(kernel, face, holes, sheet) for face in faces]
     if not solids or not all(solid.is_valid for solid in solids):
-        raise GeometryError("the CAD kernel makes no valid body of the outline")
+        raise GeometryError("the CAD kernel cannot make a valid body from the outline")
     whole = solids[0] if len(solids) == 1 else kernel.Compound(children=solids)
     whole.label = name
     return _written(kernel, whole)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Measure:
-    """One number asked of each design of a block: a metric over a window, or a value of the family.
+    """One number requested of each design of a block: a metric over a window, or a value of the family.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Block:
     values : mapping of str to (n,) array
         Dotted path -> SI value in each variant; words and whole numbers as they are.
     measures : tuple of Measure
-        What is asked.
+        What is requested.
     size : int
         n.
     """
@@ -202,8 +202,8 @@ def article(word: str) -> str:
 
 SHARED = {
     WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value",
-    PART_NOT_DRAWN: "the part of a design cannot be cut as it is: nothing is drawn",
-    THIN_WALL: "the part as drawn has walls that are thinner than its process makes",
+    PART_NOT_DRAWN: "the designed part cannot be cut as it is: no drawing is written",
+    THIN_WALL: "the part as drawn has walls that are thinner than its process can make",
     OLD_KEY: "a key has been renamed; this version still reads the old name",
     OVERWRITTEN: "the design replaces a stated value with its own",
 }

@@ -32,10 +32,14 @@ DEFINITIONS = {
     ),
     "mesh_force_error": (
         "ratio",
-        "discretisation error of the force, relative to the largest force: that difference, at least 1e-4, times a "
-        "factor that covers 95 % of the parts in docs/solid.md",
+        "discretisation error of the force, relative to the largest force: `mesh_force_difference`, at least 1e-4, "
+        "times a factor that covers 95 % of the parts in docs/solid.md",
     ),
-    "mesh_stress_error": ("ratio", "the same for the largest stress, with a difference of at least 2 %"),
+    "mesh_stress_error": (
+        "ratio",
+        "discretisation error of the largest stress, relative to it: `mesh_stress_difference`, at least 2 %, times "
+        "such a factor",
+    ),
     "curve_error": (
         "ratio",
         "difference between the interpolated curve and poses solved between its poses, where it is expected to be "
@@ -52,7 +56,7 @@ DEFINITIONS = {
 
 
 def unknown_to_beams() -> dict[str, Quantity]:
-    """Return them without values, for models that are no solid."""
+    """Return these scalar results without values, for models other than the solid."""
     return {
         name: Quantity(None, *about, "only the model of the part as a solid has it")
         for name, about in DEFINITIONS.items()

@@ -1,7 +1,7 @@
 """A wish for a constant force, and what a family answers to it: types only, SI throughout.
 
 A family's ``propose(wish, run)`` looks at scaling laws, which takes milliseconds, and names designs that are worth
-being made; who asks makes them, analyses each with its exact model and keeps those that do what is wished.
+trying; the caller designs them, analyses each with its exact model and keeps those that do what is wished.
 """
 
 from __future__ import annotations

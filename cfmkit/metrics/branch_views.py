@@ -104,7 +104,7 @@ class MeasuringFrame:
         if self.curve is None:
             raise Undefined("there is no target curve to compare with: give 'design.target' or 'analysis.target'")
         if not self.curve.covers(low, high):
-            raise Undefined(f"the target curve covers {span_text(*self.curve.extent, kind)} only")
+            raise Undefined(f"the target curve covers only {span_text(*self.curve.extent, kind)}")
         return self.curve
 
 
@@ -189,7 +189,7 @@ class Branch:
         """Return the part of the branch in some window, or why there is none."""
         if covers(self.extent, window):
             return self._asked(restrict(self.trace, window))
-        return f"branch {self.name!r} covers {self.span(*self.extent)} only"
+        return f"branch {self.name!r} covers only {self.span(*self.extent)}"
 
     def _asked(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends, where they lie between two samples, have effort and stress of the model."""
@@ -360,7 +360,7 @@ class Branch:
         lo, hi = self.extent
         slack = 1e-9 * (hi - lo)
         if not lo - slack <= place <= hi + slack:
-            raise Undefined(f"branch {self.name!r} covers {self.span(lo, hi)} only")
+            raise Undefined(f"branch {self.name!r} covers only {self.span(lo, hi)}")
         return self.function.at(place)
 
     def span(self, lo: float, hi: float) -> str:

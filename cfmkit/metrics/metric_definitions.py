@@ -411,7 +411,7 @@ def branch_fault(meant: Definition, branch: str, branches: Sequence[str]) -> str
             return f"{meant.name}[{branch}]: {problem}"
         return ""
     if not meant.per_branch:
-        return f"{meant.name!r} is not a matter of one branch; write it without [{branch}]"
+        return f"{meant.name!r} does not refer to a single branch; write it without [{branch}]"
     if branches and branch not in branches:
         return f"there is no branch {branch!r}; there are {', '.join(map(repr, branches))}"
     return ""

@@ -323,7 +323,7 @@ class UncoveredWindow:
     def short(self) -> str:
         """Why there is no value, for the row of a table."""
         wanted, there = span_text(self.window.lo, self.window.hi, self.kind), span_text(*self.common, self.kind)
-        return f"no value over {wanted} ({', '.join(self.paths)}): the curve covers {there} only"
+        return f"no value over {wanted} ({', '.join(self.paths)}): the curve covers only {there}"
 
 
 def gaps(result: Result) -> tuple[UncoveredWindow, ...]:
@@ -360,7 +360,10 @@ def _reported(gap: UncoveredWindow, result: Result) -> str:
     if result.status is Status.PARTIAL and travel is not None and min(travel) <= window.lo and window.hi <= max(travel):
         text += f", which ends before the requested travel does ({span_text(min(travel), max(travel), kind)})"
     if (left := left_of(window, result)) != window and left is not None:
-        return f"{text}: metrics are those over {span_text(left.lo, left.hi, kind)}, a requirement over it is missed"
+        return (
+            f"{text}: metrics are taken over {span_text(left.lo, left.hi, kind)}, and requirements over the window are "
+            "missed"
+        )
     return (
         f"{text}; metrics over it have no value. Choose a window inside the curve, or shares of the travel: [1 %, "
         "100 %]"

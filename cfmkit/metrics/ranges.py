@@ -60,7 +60,7 @@ def _known(values: FloatArray) -> float:
     """
     value = float(values[0])
     if not isfinite(value):
-        raise Undefined("there is no equilibrium at the place it is measured against")
+        raise Undefined("there is no equilibrium at the place that it is compared with")
     return value
 
 

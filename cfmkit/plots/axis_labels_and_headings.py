@@ -29,7 +29,7 @@ LEFT = 3.0
 """Distance of headings from the edge of the print [mm], about one letter."""
 
 LEAST_OF_NAME = 4
-"""Letters of a name that a heading keeps: with fewer it says nothing, and the subject stands alone."""
+"""Characters of a name that a heading keeps: with fewer it says nothing, and the subject stands alone."""
 
 KEY_GAP = 3.0
 """Between the entries of a colour key [mm]: twice the space between words."""

@@ -21,7 +21,7 @@ PERCENT = "percent"
 
 
 LONGEST = 64
-"""Letters of an axis label: so many of 8 pt stand on 92 mm of print, the axis of a map."""
+"""Characters of an axis label: so many of 8 pt fit on 92 mm of print, the axis of a map."""
 
 
 @dataclass(frozen=True)

@@ -265,7 +265,7 @@ def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executo
 
 
 def exit_code(entries: Sequence[Entry], interrupted: bool) -> ExitCode:
-    """Return what the process is to say: the first of 70, 7, 3, 4, 6, 5 that occurs."""
+    """Return the exit code of the process: the first of 70, 7, 3, 4, 6, 5 that occurs."""
     return ExitCode.INTERRUPTED if interrupted else worst([one.code for one in entries])
 
 

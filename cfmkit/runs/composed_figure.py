@@ -106,8 +106,9 @@ def _of_folder(place: Path, panel: Panel) -> Makers:
         return makers_of(place, api.load(str(place / "resolved.yaml")))
     if command not in ("analyze", "design", "calibrate") or panel.verb not in (None, "analyze", command):
         raise UsageError(
-            f"{visible(str(place))} holds a run of {visible(str(command))!r}; only those of analyze, design, "
-            "calibrate and sweep can be drawn from their folder, as what they are: name the specification instead"
+            f"{visible(str(place))} holds a run of {visible(str(command))!r}; only runs of analyze, design, calibrate "
+            "and sweep can be drawn from their folder, and only as the run that they are: name the specification "
+            "instead"
         )
     return _solved(api.load(str(place / "resolved.yaml")), "analyze")
 

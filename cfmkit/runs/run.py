@@ -201,7 +201,7 @@ def read(wanted: RunRequest) -> tuple[Document, Spec]:
 
 @contextmanager
 def placing(document: Document, options: Collection[str] = ()) -> Iterator[None]:
-    """Give what is refused inside the block its place in the file: a model knows the path alone.
+    """Add the place in the file to errors raised inside the block: a model knows only the path.
 
     `options` are paths that options of the command have set: what is wrong there has no place in the file.
     """
@@ -222,7 +222,7 @@ def _document(wanted: RunRequest) -> Document:
     if wanted.fidelity is None:
         return read_spec(wanted.spec, wanted.changes, of_many)
     if not wanted.fidelity.strip():
-        raise UsageError("--fidelity is empty; `cfmkit show` and the family's name lists what there is")
+        raise UsageError("--fidelity is empty; `cfmkit show FAMILY` lists the models")
     return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
 
 

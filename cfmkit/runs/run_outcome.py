@@ -53,7 +53,7 @@ class Supplement:
     curves : tuple of Curve
         What curve.csv holds, where that is not what the result has.
     shortfall : str
-        What was asked besides the result and is missing, in one sentence.
+        What was requested in addition to the result and is missing, in one sentence.
     """
 
     data: Mapping[str, Any] = field(default_factory=dict)
@@ -125,7 +125,7 @@ class Report:
 
     @property
     def exit_code(self) -> ExitCode:
-        """What the process is to say: how the solve ended counts before the requirements."""
+        """The exit code of the process: how the solve ended counts before the requirements."""
         missed = [ExitCode.REQUIREMENT_MISSED] if self.missed else []
         return worst([self.status.exit_code, *missed])
 

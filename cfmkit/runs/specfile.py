@@ -50,7 +50,7 @@ def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> 
 def changed(document: Document, changes: Iterable[str], of_many: bool = False) -> Document:
     """Return a document with options applied in their order.
 
-    Options for specifications of another family are for others of many; of one alone they would change nothing.
+    An option for another family is skipped where there are many specifications, and refused where there is only one.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
             yield document.problem(path, message)
     asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
     for index, one in asked if not said else ():
-        message = f"{one.metric!r} is a share of made parts: say with 'design.tolerances' how they are made"
+        message = f"{one.metric!r} is a share of manufactured parts: state their tolerances in 'design.tolerances'"
         yield document.problem(("requirements", index, "metric"), message)
 
 

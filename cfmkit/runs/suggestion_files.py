@@ -38,7 +38,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "yield": ("ratio", "1"),
     "finer_deviation": ("ratio", "1"),
 }
-"""What is told of each proposal: its dimension and the unit of the files."""
+"""What is reported of each proposal: its dimension and the unit of the files."""
 
 
 @dataclass(frozen=True)
@@ -134,12 +134,16 @@ def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
 
 def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
     if found.late and found.proposals:
-        yield {"name": "search_cut_short", "message": "the time budget ended the search: --time-budget gives it more"}
+        yield {
+            "name": "search_cut_short",
+            "message": "the time budget ended the search: increase it with --time-budget",
+        }
     judged = all(one.numbers.get("life") is not None for one in found.proposals)
     if block.cycles is not None and not judged:
         yield {
             "name": "cycles_not_judged",
-            "message": "the life of proposals without a number was not checked: state the material's 'fatigue' data",
+            "message": "proposals for which no number is given were not checked for their life: state the material's "
+            "'fatigue' data",
         }
 
 

@@ -153,6 +153,6 @@ class MeshError:
         if self.force > FORCE_ALLOWED or self.stress > STRESS_ALLOWED:
             yield (
                 "mesh_coarse",
-                f"by the difference of two meshes the force is known to {100 * self.force:.2g} % and the largest "
-                f"stress to {100 * self.stress:.2g} %: give a smaller analysis.solid.mesh",
+                f"by the difference of two meshes, the force is accurate to {100 * self.force:.2g} % and the largest "
+                f"stress to {100 * self.stress:.2g} %: use a smaller analysis.solid.mesh",
             )

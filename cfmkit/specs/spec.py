@@ -152,10 +152,13 @@ class Correlated(Model):
     """Parameters that deviate together, such as all springs of one batch."""
 
     parameters: tuple[str, ...] = Field(
-        min_length=1, description="paths as under 'parameters'; `.*` is every item of a list"
+        min_length=1, description="paths as under 'parameters'; `.*` stands for every item of a list"
     )
     correlation: Ratio = Field(
-        1.0, ge=-1, le=1, description="between any two of them; 1: all deviate by the same share"
+        1.0,
+        ge=-1,
+        le=1,
+        description="correlation coefficient between any two of the parameters; 1: all deviate by the same share",
     )
 
 

@@ -334,7 +334,7 @@ class PartFrame(Model):
 
 
 class AroundFrame(PartFrame):
-    """The same of a part with a closed frame around it."""
+    """The frame of a part that is closed around it."""
 
     inside: tuple[tuple[Length, Length], tuple[Length, Length]] | None = Field(
         None, description="two corners of its opening, [[x, y], [x, y]]; default: as small as the clearance allows"
@@ -372,7 +372,7 @@ class CutPart(Model):
 
 
 class PaddedPart(CutPart):
-    """The same of a part that ends in pads."""
+    """How a part that ends in pads is cut."""
 
     pad: tuple[AboveZero, AboveZero] | None = Field(
         None, description="depth and breadth of the pads at held and driven ends"

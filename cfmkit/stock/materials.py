@@ -3,11 +3,11 @@
 The nominal value is where a design starts; the scatter is what it must survive.
 For metals the low end is the minimum of the standard. For printed plastics the
 range is wide on purpose: orientation, layer adhesion, printer, humidity and the
-maker of the filament all move it, and none of them is known to this library.
+maker of the filament all affect it, and none of them is known to this library.
 
-All values are at room temperature and for short loads. Plastics creep: a part
-that is held deflected loses force with time, which no modulus here shows.
-For plastics the yield strength is the stress at yield of a tensile test.
+All values are at room temperature and for short-term loads. Plastics creep: a part that is
+held deflected loses force with time, which no modulus here shows. For plastics the yield
+strength is the stress at yield of a tensile test.
 
 Texts that several sources name by a short word
 -----------------------------------------------
@@ -149,8 +149,8 @@ _METALS = (
         "C17200 (CuBe2), precipitation hardened, tempers TF00 to TH04. E: material-properties.org, beryllium copper "
         "(131 GPa, yield 1110 MPa); Alloy Wire CB 101 (123 GPa). Density: Little Falls Alloys, alloy 25 (8350 "
         "kg/m^3) and Fisk Alloy, C17200 (0.298 lb/in^3). Poisson ratio: between engineeringtoolbox (0.285) and "
-        "Multimedia Engineering Mechanics (CDA 172, 0.33). Ends of the yield: of no text that is named here; take "
-        "those of your strip.",
+        "Multimedia Engineering Mechanics (CDA 172, 0.33). Ends of the yield: no source named; take those of your "
+        "strip.",
         Scatter((120e9, 134e9), (890e6, 1380e6), poisson_ratio=(0.285, 0.33), density=(8250.0, 8360.0)),
         ("c17200", "cube2", "beryllium-bronze"),
     ),
@@ -161,8 +161,8 @@ _PLASTICS = (
         "pla", 3.0e9, 0.36, 45e6, 1240.0,
         "Printed (filament). Nominal: Stratasys PLA, ASTM D638, on edge (3.04 GPa, yield 45 MPa; flat 2.54 GPa, 26 "
         "MPa). Low end: PolyTerra PLA data sheet V5.3, ISO 527, between the layers (1.6 GPa, 12 MPa). High end and "
-        "density: additive.tools/materials/pla (to 4 GPa and 65 MPa, 1220 to 1260 kg/m^3). Poisson ratio: of no text "
-        "that is named here.",
+        "density: additive.tools/materials/pla (to 4 GPa and 65 MPa, 1220 to 1260 kg/m^3). Poisson ratio: no source "
+        "named.",
         Scatter((1.6e9, 4.0e9), (12e6, 65e6), density=(1220.0, 1260.0)), ("polylactide", "pla-plus"),
     ),
     Material(
@@ -177,14 +177,14 @@ _PLASTICS = (
         "petg", 2.0e9, 0.38, 45e6, 1270.0,
         "Printed (filament): additive.tools/materials/petg (2 to 3 GPa and 44 to 56 MPa in the plane, 25 to 38 MPa "
         "between the layers, 1250 to 1290 kg/m^3). The modulus is the low end of that: printed PETG is often softer. "
-        "Poisson ratio: of no text that is named here.",
+        "Poisson ratio: no source named.",
         Scatter((1.5e9, 2.9e9), (25e6, 56e6), density=(1250.0, 1290.0)), ("pet-g",),
     ),
     Material(
         "pa12-sls", 1.65e9, 0.39, 48e6, 930.0,
         "Laser sintered, EOS PA 2200 class. Strength and density: additive.tools/materials/pa12 (44 to 52 MPa, 880 "
         "to 960 kg/m^3). Modulus: between 3D Systems' PA12 (1.39 GPa, 43 MPa; PMC10406103, Table 2) and 1.9 GPa; it "
-        "moves with powder refresh, orientation and humidity. Poisson ratio: of no text that is named here.",
+        "varies with powder refresh, orientation and humidity. Poisson ratio: no source named.",
         Scatter((1.35e9, 1.9e9), (40e6, 52e6), density=(880.0, 960.0)), ("pa12", "nylon-12", "nylon-sls", "pa-2200"),
     ),
     Material(
@@ -199,7 +199,7 @@ _PLASTICS = (
         "pom", 2.8e9, 0.37, 65e6, 1410.0,
         "Polyoxymethylene, moulded or machined, ISO 527: copolymer as in the data sheets of Hostaform C 9021 (2.85 "
         "GPa, 64 MPa) and C 27021 (2.9 GPa, 65 MPa), 1410 kg/m^3; homopolymer 3.0 to 3.2 GPa, 72 MPa (Delrin). Not "
-        "the toughened grades. Poisson ratio: of no text that is named here.",
+        "the toughened grades. Poisson ratio: no source named.",
         Scatter((2.5e9, 3.2e9), (60e6, 76e6)), ("delrin", "acetal", "polyoxymethylene", "hostaform"),
     ),
     Material(
@@ -213,7 +213,7 @@ _PLASTICS = (
         "pp", 1.4e9, 0.42, 32e6, 910.0,
         "Polypropylene homopolymer, ASTM D638: Modern Plastics Encyclopedia 99 (1.14 to 1.55 GPa, yield 31 to 37 "
         "MPa); nominal modulus and density: MakeItFrom, unfilled PP homopolymer (1.4 GPa, 910 kg/m^3). Low end of "
-        "the density: e-uparts. Poisson ratio: of no text that is named here.",
+        "the density: e-uparts. Poisson ratio: no source named.",
         Scatter((1.1e9, 1.6e9), (30e6, 37e6), density=(900.0, 910.0)), ("polypropylene",),
     ),
     Material(
@@ -227,17 +227,17 @@ _PLASTICS = (
     Material(
         "pc", 2.4e9, 0.37, 65e6, 1200.0,
         "Polycarbonate, moulded: Makrolon 2405 data sheet, ISO 527. Low ends of modulus and strength: e-uparts (210 "
-        "and 5.6 kgf/mm^2); strength up to 10 ksi: medesign.seas.upenn.edu, polycarbonate; high end of the modulus: "
-        "of no text that is named here. Poisson ratio: between Multimedia Engineering Mechanics (0.35) and Dowling "
-        "(0.38). Spread of the density: additive.tools/materials/pc (printed, 1180 to 1220 kg/m^3).",
+        "and 5.6 kgf/mm^2); strength up to 10 ksi: medesign.seas.upenn.edu, polycarbonate; high end of the modulus: no "
+        "source named. Poisson ratio: between Multimedia Engineering Mechanics (0.35) and Dowling (0.38). Spread of "
+        "the density: additive.tools/materials/pc (printed, 1180 to 1220 kg/m^3).",
         Scatter((2.1e9, 2.5e9), (55e6, 70e6), poisson_ratio=(0.35, 0.38), density=(1180.0, 1220.0)),
         ("polycarbonate", "makrolon", "lexan"),
     ),
     Material(
         "tpu-95a", 26e6, 0.48, 8.6e6, 1220.0,
-        "Printed (filament), Shore 95A: nominal modulus, strength and its ends and Poisson ratio of no text that is "
-        "named here; density: additive.tools/materials/tpu (1200 to 1250 kg/m^3); scatter of the modulus as measured "
-        "on four printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
+        "Printed (filament), Shore 95A: nominal modulus, strength and its ends, and Poisson ratio: no source named; "
+        "density: additive.tools/materials/tpu (1200 to 1250 kg/m^3); scatter of the modulus as measured on four "
+        "printed TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
         Scatter((24e6, 250e6), (5e6, 12e6), density=(1200.0, 1250.0)), ("tpu", "polyurethane"),
     ),
 )  # fmt: skip
@@ -251,7 +251,7 @@ _PAPERS = (
     ),
     Material(
         "pla-ding-2022", 1.477e9, 0.30, None, 1250.0,
-        "Ding, Li, Li 2022, sec. 6: printed PLA-ST; no strength is given there. Scatter of E: printed PLA, low side."
+        "Ding, Li, Li 2022, sec. 6: printed PLA-ST; no strength is given there. Scatter of E: printed PLA, low side. "
         "Spread of the density: additive.tools/materials/pla.",
         Scatter((1.2e9, 2.0e9), density=(1220.0, 1260.0)),
     ),

@@ -53,7 +53,7 @@ _ALL = (
     ProcessAccuracy("fdm", 0.0, 0.05e-3, 0.1e-3, 0.4e-3, 0.2e-3,
             "walls are whole strands of a 0.4 mm nozzle, whose width changes with flow and cooling"),
     ProcessAccuracy("sls", 0.0, 0.05e-3, 0.1e-3, 0.7e-3, 0.3e-3,
-            "powder sinters on to each side, and parts shrink with their place in the chamber"),
+            "powder sinters on to each side, and the shrinkage of parts depends on their place in the chamber"),
     ProcessAccuracy("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
             "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
 )  # fmt: skip

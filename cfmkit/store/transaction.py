@@ -86,7 +86,7 @@ def execute(root: Path, plan: CommitPlan) -> None:
         with suppress(OSError, OutputError):
             _turn_back(root, plan)
         if isinstance(error, OSError) and _pending(root):
-            half = f"{shown(root)} is between two runs now, and the next run into it puts it right"
+            half = f"{shown(root)} is half-way between two runs; the next run into it repairs it"
             raise OutputError(f"cannot write {shown(root)}: {reason(error)}; {half}") from error
         raise
 

@@ -196,7 +196,7 @@ def is_figure(path: str) -> bool:
 
 
 LONGEST_HEAD = 4000
-"""Letters of a file in which the key `panels` is looked for; no comment at the top of a file is as long."""
+"""Characters of a file in which the key `panels` is looked for; no comment at the top of a file is as long."""
 
 
 def folders(files: Sequence[str]) -> tuple[str, ...]:

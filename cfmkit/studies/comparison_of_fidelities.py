@@ -211,7 +211,7 @@ def choices_of(spec: Spec) -> Choices:
     record = family(spec.family)
     names = tuple(record.models)
     if len(names) < 2:
-        raise UsageError(f"{OPTION}: {record.phrase} has one model only, there is nothing to compare")
+        raise UsageError(f"{OPTION}: {record.phrase} has only one model: there is nothing to compare")
     specs, obstacles = {}, {}
     for name in names:
         try:

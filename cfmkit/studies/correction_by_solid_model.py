@@ -60,13 +60,13 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
         as_solid = design.spec.replace({FIDELITY: "solid"})
     except SpecError as error:
         reported = "; ".join(problem.message for problem in error.problems)
-        return Design(None, Status.INVALID, f"design.verify: this design cannot be a solid: {reported}")
+        return Design(None, Status.INVALID, f"design.verify: this design cannot be analysed as a solid: {reported}")
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
     own, mean, where = _means(beams, solid)
     wanted = next((level for path in record.levels if (level := _level(given, path))), None) or own
     if solid.status is not Status.COMPLETE or not wanted or not mean or not own or wanted / mean <= 0:
-        reported = f"the part as a solid has no force to be corrected: {solid.message}"
+        reported = f"the part as a solid has no force that could be corrected: {solid.message}"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
     factor = wanted / mean
     kind = solid.curve.kind
@@ -88,10 +88,10 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     aim = format_short(wanted, kind)
     note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {reported}"
     numbers = {
-        "verified_target": (wanted, kind, "mean force that the solid is to have"),
+        "verified_target": (wanted, kind, "requested mean force of the part as a solid"),
         "verified_before": (own, kind, "mean force of the design by its own model"),
         "verified_solid_before": (mean, kind, "mean force of the part as a solid, before its correction"),
-        "verified_width_factor": (factor, "ratio", "by which all widths were multiplied"),
+        "verified_width_factor": (factor, "ratio", "factor by which all widths were multiplied"),
     }
     about = searched(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
     return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))

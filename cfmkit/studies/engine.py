@@ -115,7 +115,7 @@ class Work:
         return gathered(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
 
     def recall(self, reported: Any) -> ResultRows:
-        """Return the rows that a record of the journal is."""
+        """Return the rows that are stored in a record of the journal."""
         return recalled(reported, len(self.study.metrics), len(self.study.spec.part_requirements))
 
 

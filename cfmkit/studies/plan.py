@@ -161,14 +161,14 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
     counts = {item.leaf.path: item.count or 0 for item in axes}
     if len(set(counts.values())) > 1:
         reported = ", ".join(f"{path} has {count}" for path, count in counts.items())
-        raise UsageError(f"values side by side must be equally many: {reported}")
+        raise UsageError(f"values varied in step must be equally many: {reported}")
     size = next(iter(counts.values()))
     refuse_too_many(size, most)
     plan = Plan(tuple(map(stepped, axes)), size, joint=True)
     seen: dict[tuple[Any, ...], int] = {}
     for index in range(size):
         if (first := seen.setdefault(plan.point(index), index)) != index:
-            raise UsageError(f"values side by side: set number {index + 1} repeats number {first + 1}")
+            raise UsageError(f"values varied in step: set number {index + 1} repeats number {first + 1}")
     return plan
 
 

@@ -41,7 +41,7 @@ DEATHS = 2
 PATIENCE = 0.1
 """Seconds between two looks at the clock and at whether to stop."""
 
-OVER = "the time of all jobs was up"
+OVER = "the time allowed for all jobs was used up"
 
 QUICK, AHEAD = 0.02, 4
 """Jobs that take less than so many seconds are handed out so many at a time: the pipe is never empty."""

@@ -188,7 +188,9 @@ def rows_along_errors(
                     continue
         moved = {offset: numbers - middle for offset, numbers in sorted(known.items()) if numbers is not None}
         if not moved:
-            raise SolutionError(f"parts with another {one.path} cannot be followed: state a smaller tolerance on it")
+            raise SolutionError(
+                f"parts with an error of {one.path} cannot be followed: state a smaller tolerance for it"
+            )
         offsets, at = np.array(list(moved)), int(np.searchsorted(list(moved), 0.0))
         changes = np.array(list(moved.values())) @ rows.matrix.T
         found.append(LimitsAlong(np.insert(offsets, at, 0.0), np.insert(changes, at, 0.0, axis=0)))
@@ -457,7 +459,7 @@ def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Ro
     if short := _ends_early(sight, np.array([float(sight.spec.at(path)) for path in sight.free])):
         reported += (
             f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
-            "the travel, such as [1 %, 100 %], which are those of each part"
+            "the travel, such as [1 %, 100 %], which then follow the travel of each part"
         )
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
     return Design(

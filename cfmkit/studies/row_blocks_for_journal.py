@@ -117,7 +117,7 @@ def record(rows: ResultRows) -> Any:
 
 
 def recalled(reported: Any, metrics: int, requirements: int) -> ResultRows:
-    """Return the rows that a record is."""
+    """Return the rows that are stored in a record."""
     if "n" not in reported:
         return gathered([recalled_row(reported)], metrics, requirements)
     values = unsqueezed(reported["v"], reported["n"], metrics)
@@ -132,7 +132,7 @@ def recalled(reported: Any, metrics: int, requirements: int) -> ResultRows:
 
 
 def recalled_row(reported: Any) -> Row:
-    """Return the single row that a record is."""
+    """Return the single row that is stored in a record."""
     curve = _bytes(reported["u"]) if "u" in reported else b""
     noted = tuple(_unpacked(reported["v"], np.float64).tolist()) if "v" in reported else ()
     met = tuple(map("1".__eq__, reported.get("q", "")))

@@ -185,7 +185,7 @@ def _outcome(future: Any) -> Any:
     if future.status == "finished":
         return future.result()
     error = future.exception() if future.status == "error" else None
-    reported = " ".join(f"{type(error).__name__}: {error}".split()) if error else "the cluster gave it up"
+    reported = " ".join(f"{type(error).__name__}: {error}".split()) if error else "the cluster abandoned it"
     if type(error).__name__ == "KilledWorker":
         reported = f"the workers that worked on this point died {RETRIES + 1} times"
         return Lost(Status.CRASHED, reported)

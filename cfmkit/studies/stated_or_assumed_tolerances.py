@@ -141,7 +141,10 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
     if design.robust is not None and getattr(design, "yield") is None:
         yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
     if getattr(design, "yield") is not None and not is_made(spec, design):
-        yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
+        yield (
+            ("design", "yield"),
+            "a yield is a share of manufactured parts: state their tolerances in 'design.tolerances'",
+        )
     if design.tolerances and not spec.part_requirements:
         reported = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
         yield ("design", "tolerances"), reported

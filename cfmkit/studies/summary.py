@@ -34,7 +34,7 @@ MOST_SHOWN = 4
 
 
 TIE = 1e-9
-"""Points whose values differ by less than this are as good, relative to the value."""
+"""Points whose values differ by less than this, relative to the value, count as equally good."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class Summary:
         return sum(count for status, count in self.counts.items() if status.usable)
 
     def exit_code(self, bugs: int = 0) -> ExitCode:
-        """Return what the process is to say.
+        """Return the exit code of the process.
 
         0 if every point is complete; 6 if some are not; with none that was solved 70 if all
         of them hit a bug, 3 if all are invalid, 6 if one ran out of time and may have a solution,
@@ -256,7 +256,7 @@ class Summary:
         if not self.gapped:
             return []
         reported = f"{self.gapped} of {self.total} points have no value over a window that their curve does not cover"
-        cure = "windows in shares of the travel follow it: [1 %, 100 %]"
+        cure = "state windows as shares of the travel, which follow the curve: [1 %, 100 %]"
         return [{"name": WINDOW_OUTSIDE, "message": f"{reported} ({self.first_gap}); {cure}"}]
 
     def _requirements(self) -> list[dict[str, Any]]:

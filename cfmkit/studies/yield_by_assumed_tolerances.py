@@ -246,6 +246,6 @@ def _complete(found: FloatArray | None) -> FloatArray:
     if found is None or not np.isfinite(found).all():
         raise YieldUnknown(
             "a part near the design has no curve, or it ends within a window of the requirements (windows in shares of "
-            "the travel, such as [1 %, 100 %], are those of each part)"
+            "the travel, such as [1 %, 100 %], follow the travel of each part)"
         )
     return found

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.point_evaluation import Metric
 
 ALIKE = 0.1
-"""An error is common where it changes the force by the same share everywhere but for this share of that share."""
+"""An error is common if its relative change of force varies along the motion by at most this share of itself."""
 
 FAINT = 0.05
 """Where the force is below this share of its largest value, a share of it says nothing."""

@@ -45,8 +45,8 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
     right, left = _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
     if right[:, 0].mean() < left[:, 0].mean():
         raise DataError(
-            f"{name}: the points of the right flank have smaller x than those of the left one; is the sign of x, or "
-            "are the sides, exchanged?"
+            f"{name}: the points of the right flank have smaller x than those of the left one; is the sign of x "
+            "reversed, or are the sides swapped?"
         )
     return right, left
 

@@ -158,7 +158,7 @@ def _tolerance(options: BatchOptions) -> float | None:
     if options.compare_tolerance is None:
         return None
     if options.compare is None:
-        raise UsageError("--compare-tolerance is for a comparison: name an earlier batch with --compare")
+        raise UsageError("--compare-tolerance applies to a comparison: name an earlier batch with --compare")
     try:
         return read_quantity(options.compare_tolerance, "ratio")
     except QuantityError as error:

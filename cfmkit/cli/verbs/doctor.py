@@ -142,7 +142,7 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
         if not one["writable"]:
             yield f"{one['path']} cannot be written to: {one['name']}"
     if not found["fonts"]["path"]:
-        yield f"the font {found['fonts']['name']} is not there: figures get another one, and other bytes"
+        yield f"the font {found['fonts']['name']} is not installed: figures use another one and are not byte-identical"
     for one in found["families"]:
         if one["reason"]:
             yield one["reason"]
@@ -155,9 +155,9 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
     access = Field("", lambda one: "writable" if one["writable"] else "cannot be written to")
     yield from listed("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
-    compiled = found["solver"]["folder"] or "not yet: some 15 seconds at the first use, or `cfmkit warm`"
+    compiled = found["solver"]["folder"] or "not yet: takes about 15 s at the first use, or run `cfmkit warm`"
     yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
-    fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is not whole"}
+    fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is incomplete"}
     yield from listed("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
     size = Field("size", lambda one: f"{one['files']} files, {one['megabytes']} MB")
     yield from listed("caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True)))

@@ -239,7 +239,7 @@ def _folder(options: SuggestOptions) -> str:
             raise UsageError("--out is empty; give a folder")
         return options.out
     if options.wish == "-":
-        raise UsageError("a wish from standard input has no name; say with --out where to write")
+        raise UsageError("a wish from standard input has no name; give the output folder with --out")
     stem = "options" if options.wish is None else Path(options.wish).stem
     return str(Path("cfm-out") / f"{stem}-suggest")
 
@@ -268,7 +268,7 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield CellGrid(heads, rows, gap=2, indented=True)
     if data["near_misses"]:
         yield BLANK
-        yield line("misses one wish", LABEL)
+        yield line("near misses: one requirement not met", LABEL)
         near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
         yield CellGrid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
     for number, one in enumerate(data["proposals"], 1):
@@ -277,7 +277,7 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     silent = [one for one in data["families"] if not one["proposals"]]
     if silent:
         yield BLANK
-        yield line("nothing of these families", LABEL)
+        yield line("no proposals from these families", LABEL)
         yield CellGrid((GridColumn("", False), GridColumn()), [_silent(one) for one in silent], gap=2, indented=True)
     for one in data["warnings"]:
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
@@ -286,8 +286,8 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     if bare := [one["folder"] for one in data["proposals"] if not _complete(one["folder"], written.files)]:
         yield Paragraph(
             "note",
-            f"the time was up before more than design.yaml was written of {', '.join(bare)}: `cfmkit analyze` of it "
-            "gives the curve and figures, `cfmkit export --format dxf,svg,png` the files to cut and a drawing",
+            f"the time ran out: of {', '.join(bare)} only design.yaml was written; `cfmkit analyze` of that file gives "
+            "the curve and figures, `cfmkit export --format dxf,svg,png` the files to cut and a drawing",
         )
     if data["proposals"]:  # files to cut or print of the best
         best = Path(written.folder) / data["proposals"][0]["folder"] / "design.yaml"
@@ -308,7 +308,7 @@ def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
 def _silent(one: Mapping[str, Any]) -> list[str]:
     """Return why a family has no proposal, and the nearest wish that it could meet."""
     nearest = ", ".join(f"{key} {value}" for key, value in one["nearest"].items())
-    return [one["family"], (one["reason"] or "nothing that fits") + (f"; nearest: {nearest}" if nearest else "")]
+    return [one["family"], (one["reason"] or "no mechanism fits") + (f"; nearest: {nearest}" if nearest else "")]
 
 
 def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[str]:

@@ -171,7 +171,7 @@ def _sample(text: str) -> tuple[str, int]:
 
 
 def exit_code(records: Records, summary: Summary) -> ExitCode:
-    """Return what the process is to say; points that were not computed count first."""
+    """Return the exit code of the process; points that were not computed count first."""
     if records.finished < len(records):
         return ExitCode.INTERRUPTED
     return summary.exit_code(records.bugs)

@@ -32,9 +32,9 @@ _SAME = 1e-6  # largest difference of poses of two solutions that are one
 def predicted_end(
     problem: PathProblem, trail: Trail, other: Spot, before: int, sense: float, onto: str
 ) -> tuple[BranchEnd | None, bool]:
-    """Return where the path that was left becomes stable again: there the branch may rejoin it. Or None.
+    """Return where the path that was left becomes stable again and the branch may rejoin it, or None.
 
-    And, without an end, whether it is known that there is none before the last requested point. `other` is on that
+    With None, also whether it is known that there is no such place before the last requested point. `other` is on that
     path, `before` the number of its unstable directions before it was left, `sense` that in which the drive goes on,
     `onto` its name.
     """

@@ -188,7 +188,7 @@ def _along(problem: PathProblem, trail: Trail, what: str, begin: Spot) -> Start 
     if ending.status is PathStatus.JUMPS and not through_folds:
         stop, share = problem.control.branch == "stop", way.drive
         lost = f"stability is lost {'before' if stop else 'under'} {100 * share:.3g} % of the {what}"
-        message = f"{lost}: {'the path ends there' if stop else 'it jumps there, no stable equilibrium is near'}"
+        message = f"{lost}: {'the path ends there' if stop else 'it jumps there, as no stable equilibrium is near'}"
         return Start(trail.stopped(PathStatus.JUMPS, message), None, share, DONE)
     if ending.status is not PathStatus.COMPLETE:
         ended = way.branch != PRIMARY and not through_folds

@@ -45,7 +45,10 @@ def stop(problem: PathProblem, trail: Trail, code: int) -> Stop:
 def too_long_to_look_into(trail: Trail, unit: float) -> Stop:
     """Stop where stability is lost, or no step leads on, and the beams have too many segments to see what it is."""
     where = f"at {trail.drive * unit:.6g}" if len(trail.points) else "at rest"
-    message = f"a beam is pulled so hard {where} that what happens there cannot be looked into: it is too thin for it"
+    message = (
+        f"the tension in a beam is so high {where} that the kind of instability cannot be determined: the beam is too "
+        "slender"
+    )
     return Stop(trail.stopped(PathStatus.LOST, message))
 
 

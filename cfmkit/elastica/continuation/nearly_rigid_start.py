@@ -1,7 +1,7 @@
 """Starts that are nearly rigid: beams that do not stretch, and are hardly bent, at rest under a drive by a motion.
 
-Let a column be bent by a of its length. A shortening d then bends it further by d / (5 a) at first, and like the root
-of d later on: the drive turns the corner within a^2, steps of 1e-9 of its range do not see it, and without an
+Let a column be bent by a share a of its length. A shortening d then bends it further by d / (5 a) at first, and like
+the root of d later on: the drive turns the corner within a^2, steps of 1e-9 of its range miss it, and without an
 imperfection nothing moves. The force at the drive grows evenly meanwhile. So the path is entered by its arc length, in
 which forces count, along the null vector of the tangent with the drive among the unknowns, and left to the drive where
 it is gently curved.

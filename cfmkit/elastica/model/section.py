@@ -46,7 +46,7 @@ class Taper:
         if s.ndim != 1 or s.shape != self.values.shape or len(s) < 2:
             raise InputError("a taper needs as many values as stations, at least two of each")
         if s[0] != 0 or s[-1] != 1 or (np.diff(s.real) < 0).any():
-            raise InputError("the stations of a taper must go from 0 to 1 and never back")
+            raise InputError("the stations of a taper must run from 0 to 1 without decreasing")
         if not (self.values.real > 0).all():
             raise InputError("every thickness of a taper must be positive")
 

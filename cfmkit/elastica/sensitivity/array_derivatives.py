@@ -316,7 +316,9 @@ class ComplexSteps:
         for name in _WHOLE:
             now, was = getattr(stepped, name), getattr(model, name)
             if now.shape != was.shape or np.any(now != was):
-                raise InputError(f"design variable {k} changes how the network is made up: no derivative by it")
+                raise InputError(
+                    f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
+                )
         return stepped
 
 

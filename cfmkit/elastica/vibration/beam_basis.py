@@ -1,7 +1,7 @@
 """Small motions of one beam about a pose, as a Ritz basis: rotation, stretch and shear are polynomials on panels.
 
-The places follow exactly from them, r' = t(rotation, stretch, shear), so that a beam that does not stretch does not:
-no stiffness stands for it, and none locks. The unknowns of a beam are, in order,
+The places follow exactly from them, r' = t(rotation, stretch, shear), so that an inextensible beam is exactly
+inextensible: no penalty stiffness stands for that, and nothing locks. The unknowns of a beam are, in order,
 
     along, across, swing and pose of its first attachment; the same of its last one; then the inner coefficients:
     rotations between panels, bubbles of the rotation; stretches and shears, where the section has them.

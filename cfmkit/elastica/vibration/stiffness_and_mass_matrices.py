@@ -76,17 +76,18 @@ class Linearisation:
         self.path, self.masses, self.hold, self.layout = path, masses, hold, path.layout
         names = list(self.layout.network.beams)
         if missing := [name for name in names if name not in masses.density]:
-            raise InputError(f"no density is given of the beams {', '.join(missing)}")
+            raise InputError(f"no density is given for the beams {', '.join(missing)}")
         for name in masses.nodes:
             if name not in self.layout.network.nodes:
-                raise InputError(f"a mass is given of {name!r}, which is not a node")
+                raise InputError(f"a mass is given for {name!r}, which is not a node")
         self.panels = [panels(path, name, modes) for name in names]
         inner = [one.unknowns - ENDS for one in self.panels]
         self.firsts = (self.layout.dof_count + np.cumsum([0, *inner])).tolist()
         self.size = int(self.firsts[-1])
         if self.size > _MOST:
             raise InputError(
-                f"natural frequencies need {self.size} unknowns, more than {_MOST}: beams wind or are taut"
+                f"natural frequencies need {self.size} unknowns, more than {_MOST}: the beams have too many windings "
+                "or too much tension"
             )
 
     @cached_property

@@ -122,7 +122,7 @@ def shapes(result: Result) -> Figure:
     box = _box([*plates, *springs, *(line for lines in drawn.values() for line in lines)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
-    heading = Heading.of(result, "shapes to scale, as cut and on the way")
+    heading = Heading.of(result, "shapes to scale, as cut and during the travel")
     figure = new_figure(160.0, height * scale + 16.0 + KEY_MM + heading.height_mm)
     write_heading(figure, heading)
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)

@@ -145,15 +145,17 @@ def _in_the_way(solution: Solution) -> str:
     moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
     acting = [f"mechanism.{what}" for what in ("loads", "springs") if getattr(mechanism, what)]
     keys = [*moved, *acting] or ["mechanism.drive", *(f"mechanism.nodes.{name}.support" for name in mechanism.nodes)]
-    said = f"look at {', '.join(keys)}"
+    said = f"check {', '.join(keys)}"
     if spec.fidelity != "inextensible":
         return said
     along = list(_along_the_drive(spec))
     if along:
-        held = f"{', '.join(along)}, straight along the drive, cannot change its length and holds until it buckles"
-        bent = "or bent by analysis.imperfection, by 1e-8 of its length at least"
-        return f"{said}; {held}: computed with mechanism.axial, {bent}"
-    return f"{said}; beams do not stretch: mechanism.axial allows it"
+        held = (
+            f"inextensible beams that lie straight along the drive ({', '.join(along)}) do not move until they buckle"
+        )
+        bent = "or bend them by analysis.imperfection, by at least 1e-8 of their length"
+        return f"{said}; {held}: set 'mechanism.axial: true', {bent}"
+    return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
 
 
 def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
@@ -361,7 +363,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
     still, moving = solution.gaps
     part = solution.spec.mechanism.part
     if moving is not None and moving.size <= 0:
-        when = "before any load" if still is not None and still.size <= 0 else "on the way"
+        when = "before any load" if still is not None and still.size <= 0 else "during the travel"
         yield finding("beams_touch", f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled")
     if part is None:
         return

@@ -110,7 +110,7 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
         return
     shape = beam.shape
     if shape.kind == "cosine" and shape.half and abs(shape.rise) >= reach:
-        yield ("shape", "cosine", "rise"), "half an arch rises by less than its ends are apart"
+        yield ("shape", "cosine", "rise"), "the rise of half an arch must be less than the distance of its ends"
     if shape.kind == "arc" and _returns((0.0, shape.sweep)):
         yield ("shape", "arc", "sweep"), "an arc of whole turns returns to its start: it cannot be fitted"
     if shape.kind == "polynomial" and _returns(shape.coefficients):
@@ -173,7 +173,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}"
         return
     if drive.kind == "loads" and not any(map(_acts, drive.loads)):
-        yield ("drive", "loads", "loads"), "every load is zero: nothing drives"
+        yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism the mechanism"
     if along and across:
         yield at, f"{drive.node!r} cannot move: its support is {node.support!r}"
     elif across and not parallel(drive.direction, node.direction or 0.0):

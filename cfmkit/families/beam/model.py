@@ -120,7 +120,7 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
         if radius < 0.5 * thick:
             raise InputError(
                 f"mechanism.beams.{name}.shape winds the beam to a radius of {format_short(radius, 'length')}, less "
-                f"than half of its thickness of {format_short(thick, 'length')}: fewer turns, or a thinner beam"
+                f"than half of its thickness of {format_short(thick, 'length')}; use fewer turns or a thinner beam"
             )
 
 
@@ -142,7 +142,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
         raise InputError(
             f"analysis.travel of {format_short(spec.extent, 'length')} would stretch beams to more than twice their "
             f"length: from {drive.node!r} to a node that is held they are {format_short(way, 'length')} long; "
-            f"{format_short(_TORN * way, 'length')} at most"
+            f"a travel of at most {format_short(_TORN * way, 'length')} is possible"
         )
 
 

@@ -133,7 +133,7 @@ class PolynomialShape(Model):
         turns = sum(map(abs, values[1:])) / math.tau
         if turns > MOST_WINDINGS:
             raise ValueError(
-                f"the sizes of c1, c2, ... add up to {turns:.4g} turns: at most {MOST_WINDINGS} are computed with"
+                f"the sizes of c1, c2, ... add up to {turns:.4g} turns: at most {MOST_WINDINGS} are supported"
             )
         return values
 
@@ -201,7 +201,7 @@ def checked_thickness(value: Thickness) -> Thickness:
     if isinstance(value, tuple):
         places = [place for place, _ in value]
         if places[0] != 0 or places[-1] != 1 or places != sorted(places):
-            raise ValueError("the fractions of a thickness must run from 0 to 1 and never back")
+            raise ValueError("the fractions of a thickness must run from 0 to 1 without decreasing")
         if any(places.count(place) > (1 if place in (0, 1) else 2) for place in places):
             raise ValueError("a fraction stated twice is a step; three times, or a step at an end, is not possible")
     return value
@@ -315,7 +315,7 @@ class LoadsDrive(Model):
     """
 
     kind: Literal["loads"]
-    node: str = Field(description="node whose displacement along the direction the curve runs over")
+    node: str = Field(description="node whose displacement along `direction` is the abscissa of the curve")
     direction: Angle = Field(description="from the x axis")
     loads: Annotated[tuple[LoadSpec, ...], Field(min_length=1, max_length=1000)] = Field(
         description="as in `mechanism.loads`, on each copy: the loads at a factor of one"

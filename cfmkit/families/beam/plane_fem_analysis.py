@@ -193,11 +193,11 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     try:
         assembly, meshes = _solved(spec, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
     if why := meshes.no_curve(2):
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
-        message = f"no curve: {why}; look at mechanism.drive, {keys}, analysis.solid.mesh"
+        message = f"no curve: {why}; check mechanism.drive, {keys}, analysis.solid.mesh"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
     solution = _under_load(spec, assembly, meshes) if driven_by_load(spec) else _moved(assembly, meshes)
     message = _ended(solution)

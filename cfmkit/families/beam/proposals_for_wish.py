@@ -106,7 +106,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
     For a yield the thickest come first.
     """
     if wish.kind == "torque":
-        return FamilyOffer(reason="the kept shapes are pushed: they give a force, no torque")
+        return FamilyOffer(reason="the stored shapes are driven by a displacement: they give a force, no torque")
     if wish.adjustable is not None:
         return FamilyOffer(reason="the force of a network of beams cannot be adjusted")
     found: list[Candidate] = []
@@ -140,7 +140,10 @@ def _rescaled(wish: Wish, kept: Kept, size: float, block: dict[str, Any]) -> Can
     low, high = float(kept.motion[0]), float(kept.motion[-1])
     if length > 0.98 * (high - low):
         longest = 0.6 * (high - low) * size
-        return SAYS_LESS * length / (high - low), f"beams of this room travel about {mm(longest)} at a constant force"
+        return (
+            SAYS_LESS * length / (high - low),
+            f"beams that fit this room have a constant force over about {mm(longest)}",
+        )
     starts = np.linspace(low, high - length, 200)
     ripple = ripples(kept.motion, kept.force, starts, length)
     ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)

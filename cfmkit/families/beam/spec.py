@@ -84,7 +84,8 @@ class Rescale(Model):
     )
     free: Literal["width", "thickness", "size"] = Field(
         "width",
-        description="value that is adapted to reach the force; from a sheet the thickness in place of the width",
+        description="value that is adjusted to reach the force; for a part from a sheet the thickness instead of the "
+        "width",
     )
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
     material: MaterialField | None = Field(None, description="another material")
@@ -219,7 +220,7 @@ class BeamAnalysis(Analysis):
     )
     surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(
-        0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
+        0.0, description="amplitude of the first buckling mode by which the unloaded beams are bent; 0: perfect"
     )
 
 
@@ -292,7 +293,9 @@ class BeamSpec(Spec):
         found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
         place = ("design", "verify") if verified else ("analysis", "fidelity")
         # no word in quotes: long lists between two would be shortened like a long quotation
-        message = f"the model solid has limits: {'; '.join(found)}; leave that out, or take the beams: reissner"
+        message = (
+            f"the model solid has limits: {'; '.join(found)}; leave these keys out, or use the beam model: reissner"
+        )
         refuse("BeamSpec", {place: message} if found else {})
         return self
 
@@ -361,7 +364,10 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
             elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
                 yield (group, number), f"nothing holds {name!r}: it has no support and is not driven"
     if outputs.cross_stiffness and mechanism.drive.kind in ("rotation", "moment"):
-        yield ("cross_stiffness",), f"a drive of kind {mechanism.drive.kind!r} has no axis to be across of"
+        yield (
+            ("cross_stiffness",),
+            f"a drive of kind {mechanism.drive.kind!r} has no direction, and so no stiffness across it",
+        )
     for name in outputs.nodes:
         for beam in mechanism.beams:
             if name == f"{beam}_force":
@@ -395,10 +401,10 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
         (
             "mechanism.loads",
             mechanism.loads and spec.design is not None and spec.design.verify == "solid",
-            "its force, with them, does not grow as its width does",
+            "with constant loads the force is not proportional to the width",
         ),
         ("analysis.loads_first", mechanism.loads and not analysis.loads_first, "constant loads act from the start"),
-        ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and a spring is not of it"),
+        ("mechanism.springs", mechanism.springs, "only the part that is cut is meshed, and springs are not part of it"),
         (", ".join(moved), moved, "the part is solved as drawn, and supports stay where they are"),
         (", ".join(pins), pins, "the outline is one piece at every node"),
         (
@@ -415,7 +421,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     )
     for key, given, reason in things:
         if given:
-            yield f"{key} is not known to it: {reason}"
+            yield f"{key} is not supported: {reason}"
 
 
 def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:

@@ -93,8 +93,8 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
         if piece.sagitta > tolerance:
             size = format_short(float(np.hypot(*np.diff(piece.points, axis=0).T).sum()), "length")
             raise GeometryError(
-                f"{name!r}, {size} long, is too large to be drawn that exactly: {MOST_STEPS} points do not follow its "
-                "edges within the tolerance; draw it with a coarser --tolerance"
+                f"{name!r}, {size} long, is too large to be drawn to the tolerance: {MOST_STEPS} points do not follow "
+                "its edges that closely; draw it with a coarser --tolerance"
             )
         found.append(piece)
         at = piece.points[-1]

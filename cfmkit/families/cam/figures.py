@@ -268,7 +268,7 @@ def clearance(result: Result) -> Figure:
     text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
     limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
     diagram = Diagram(solution.travel + solution.origin, TRAVEL, Scale("distance", "length"), series, limits)
-    return diagram_figure(Heading.of(result, "distances of the moving parts"), [diagram])
+    return diagram_figure(Heading.of(result, "clearances of the moving parts"), [diagram])
 
 
 @styled

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 FINDINGS = {
     "brace_too_short": "the roller's distance from the axis reaches the length of the brace",
     "path_vertical": "the profile is cut for so much friction that the path turns vertical within the stroke",
-    "design_singular": "the profile is cut for so much friction on the way down that the path has no upward start",
+    "design_singular": "the profile is cut for so much friction on the way down that the path does not rise at its "
+    "start",
     "undercut": "the roller is larger than the path's radius of curvature: the cam starts with a corner",
     "undercut_total": "the roller is so large that no part of the flank remains",
     "contact_not_single_valued": "while the roller pivots on the corner, the contact does not follow the slider",
@@ -227,15 +228,15 @@ def _dead_point(solution: Solution) -> Iterator[Finding]:
     if sinks_first(track.dead_point, track.start, track.brace_length):
         yield finding(
             "dead_point",
-            "at the start the slider must go down before the rollers move out, by "
-            f"{mm(track.start - track.dead_point)}: the brace is too short for this profile",
+            f"at the start the slider must first go down by {mm(track.start - track.dead_point)} before the rollers "
+            "move out: the brace is too short for this profile",
         )
     elif np.isnan(solution.up.slider[0]) or np.isnan(solution.down.slider[0]):
         cause = "weight" if loads.roller_weight else "spring pretension or friction"
         yield finding(
             "dead_point",
             f"at the start the slider has no leverage on the rollers: the force from {cause} is unbounded there; "
-            "state a window that begins later, or avoid it with a gravity-compensated profile",
+            "state a window that begins later, or use a gravity-compensated profile",
         )
 
 

@@ -326,8 +326,8 @@ def _check_bend(profile: CamProfile) -> None:
         raise CannotBuild(
             finding(
                 "undercut_total",
-                f"the path that lets the weights help is bent to a radius of {mm(float(radius[tightest]))} at "
-                f"x = {mm(float(x[tightest]))}, inside a roller of {mm(profile.roller_radius)}; use a smaller roller "
+                f"the path that lets the weights help has a radius of curvature of {mm(float(radius[tightest]))} at x "
+                f"= {mm(float(x[tightest]))}, less than the roller's {mm(profile.roller_radius)}; use a smaller roller "
                 "('mechanism.roller_radius') or leave the weight uncompensated ('design.gravity: false')",
             )
         )

@@ -206,7 +206,7 @@ def _out_of_reach(wish: Wish, found: dict[str, Any]) -> FamilyOffer:
         return FamilyOffer(reason="no cam of this travel has a path that its roller can follow within such a room")
     flat = found["flat"] & found["lossless"]
     if not flat.any():
-        return FamilyOffer(reason="friction of the rollers leaves more ripple or loss than wished")
+        return FamilyOffer(reason="with the friction of the rollers, ripple or loss is larger than wished")
     scale = np.maximum(found["width"] / wish.room[0], found["height"] / wish.room[1])[flat].min() / RESERVE
     need = " x ".join(mm(side * float(scale)) for side in wish.room[:2])
-    return FamilyOffer(reason=f"the rollers, braces and the slider's way need about {need} of room")
+    return FamilyOffer(reason=f"the rollers, the braces and the slider's travel need about {need} of room")

@@ -31,17 +31,20 @@ if TYPE_CHECKING:
 
 BUILT_DEFINITIONS = {
     "profile_rmse": ("length", "root mean square distance of the measured points from the design, along its normal"),
-    "profile_sd": ("length", "standard deviation (n - 1) of those distances"),
-    "profile_mean": ("length", "mean of those distances; positive: too much material"),
+    "profile_sd": ("length", "standard deviation (n - 1) of the distances of the measured points from the design"),
+    "profile_mean": (
+        "length",
+        "mean distance of the measured points from the design, along its normal; positive: too much material",
+    ),
     "profile_rmse_x": ("length", "root mean square error in x at the same y [SS, fig. 3]"),
     "profile_sd_x": ("length", "standard deviation (n - 1) of the error in x"),
     "profile_outliers": ("count", "measured points that the registration ignored"),
     "registration_angle": ("angle", "rotation that registers the measured points to the design"),
-    "registration_x": ("length", "shift in x after that rotation"),
-    "registration_y": ("length", "shift in y after that rotation"),
+    "registration_x": ("length", "shift in x, after the rotation, that registers the measured points to the design"),
+    "registration_y": ("length", "shift in y, after the rotation, that registers the measured points to the design"),
     "registration_width": (
         "length",
-        "material on both flanks, along the normal, that the registration fitted; 0: none",
+        "extra material on both flanks, along the normal, as fitted by the registration; 0: none",
     ),
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
     "registration_y_per_width": (
@@ -49,17 +52,26 @@ BUILT_DEFINITIONS = {
         "shift in y that the registration finds for a cam that is wider on both flanks, per width along its normal",
     ),
     "profile_force_sd": ("force", "standard deviation (n - 1) of the force error due to the profile"),
-    "profile_force_share": ("ratio", "that standard deviation over the mean force of the design [SS, fig. 13: 0.8 %]"),
+    "profile_force_share": (
+        "ratio",
+        "standard deviation of the force error due to the profile, over the mean force of the design [SS, fig. 13: 0.8 "
+        "%]",
+    ),
     "rest_force_mean": ("force", "mean force error due to the rest length of the springs"),
     "manufacturing_force_share": (
         "ratio",
         "median over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force [SS, fig. 13: 0.8 %]",
     ),
-    "manufacturing_force_share_95": ("ratio", "the same for the 95th percentile of the sampled cams"),
+    "manufacturing_force_share_95": (
+        "ratio",
+        "95th percentile over the sampled cams of the standard deviation of the force error along the travel, over the "
+        "mean force",
+    ),
     "loop_area_per_friction": (
         "energy",
-        "area of the loop per unit of rolling friction, over the window: a measured area over it is the friction",
+        "area of the loop per unit of rolling friction, over the window: a measured loop area divided by it is the "
+        "friction",
     ),
 }
 

@@ -219,7 +219,7 @@ class Left(Model):
 
 
 class Errors(Model):
-    """Angles at which the flanks stand wrongly, turned about the origin that `analysis.dynamics.origin` names."""
+    """Angular errors of the flanks, which are turned about the origin that `analysis.dynamics.origin` names."""
 
     slider_deviation: SmallAngle = Field(
         0.0, description="between the guide and the cam's axis: both flanks turned in the same direction"
@@ -370,7 +370,7 @@ class CamDesign(DesignBlock):
         if (self.choose == "catalogue") != bool(self.catalogue):
             raise ValueError("'catalogue' and 'choose: catalogue' belong together: give both or neither")
         if self.spring_life is not None and not self.catalogue:
-            raise ValueError("'spring_life' is of springs that are picked: it needs a 'catalogue'")
+            raise ValueError("'spring_life' applies only to springs picked from a catalogue: give 'catalogue', too")
         return self
 
 

@@ -129,8 +129,8 @@ def check_bends(law: CurveSlopeLaw, profile: CamProfile) -> None:
         raise CannotBuild(
             finding(
                 "undercut_total",
-                f"at {mm(at)} of travel the force falls so quickly that the path is bent to a radius of {mm(radius)}, "
-                f"inside a roller of {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius'), "
-                "softer springs, or let the force fall over more travel ('design.target')",
+                f"at {mm(at)} of travel the force falls so quickly that the path has a radius of curvature of "
+                f"{mm(radius)}, less than the roller's {mm(profile.roller_radius)}; use a smaller roller "
+                "('mechanism.roller_radius'), softer springs, or let the force fall over more travel ('design.target')",
             )
         )

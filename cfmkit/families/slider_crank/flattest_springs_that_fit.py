@@ -31,7 +31,7 @@ SHARES = (0.5, 0.3, 0.7)
 """Of the room for springs on both sides of the links, what the pivot's has: the others are on the other side."""
 
 STILL = 1e-9
-"""Share of the slider's travel that is none."""
+"""Travels below this share of the slider's travel count as zero."""
 
 RESERVE = 0.999
 """Share of the largest rate that is used: it is known to a few digits."""

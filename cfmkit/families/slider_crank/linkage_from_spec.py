@@ -59,7 +59,7 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
         raise CannotBuild(
             finding(
                 "not_assemblable",
-                f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's way passes "
+                f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's path passes "
                 f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the "
                 "offset smaller: 'mechanism.coupler_length' or 'mechanism.offset'",
             )
@@ -82,8 +82,8 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
         raise CannotBuild(
             finding(
                 "not_assemblable",
-                f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's way; "
-                f"'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
+                f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's "
+                f"path; 'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
             )
         )
     return angle

@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 DIMENSIONS = (
     DrawingSymbol("r1", "mechanism.crank_length", "crank, from the pivot to the crank pin"),
     DrawingSymbol("r2", "mechanism.coupler_length", "coupler, from the crank pin to the slider pin"),
-    DrawingSymbol("e", "mechanism.offset", "height of the slider pin's way above the pivot"),
+    DrawingSymbol("e", "mechanism.offset", "height of the slider pin's path above the pivot"),
     DrawingSymbol(
         "x_in", "mechanism.stretched_position", "place of the slider where crank and coupler are in line; instead of r2"
     ),
     DrawingSymbol(
-        "theta", "analysis.angle", "crank angle from the slider's way; mechanism.unloaded_angle: springs at rest"
+        "theta", "analysis.angle", "crank angle from the slider's path; mechanism.unloaded_angle: springs at rest"
     ),
     DrawingSymbol("K1", "mechanism.springs.pivot", "torsion spring at the pivot (K_RA)"),
     DrawingSymbol("K2", "mechanism.springs.crank_pin", "torsion spring between crank and coupler (K_RB)"),
     DrawingSymbol("K3", "mechanism.springs.slider_pin", "torsion spring between coupler and slider (K_RC)"),
-    DrawingSymbol("K_P", "mechanism.springs.slider", "spring along the slider's way (K_PC)"),
+    DrawingSymbol("K_P", "mechanism.springs.slider", "spring along the slider's path (K_PC)"),
     DrawingSymbol(
         "T, F",
         "analysis.drive: torque or force",

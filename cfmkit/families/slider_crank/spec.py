@@ -79,8 +79,8 @@ class CrankAnalysis(PrintedAnalysis):
     )
     travel: tuple[Length, Length] | None = Field(
         None,
-        description="slider travel from the unloaded position, positive against the branch: inwards from where it is "
-        "stretched; default: all of it",
+        description="slider travel from the unloaded position; positive to the left for branch `right`, to the right "
+        "for `left`: from the stretched position towards the pivot; default: all of it",
     )
     side: Literal["before", "beyond"] | None = Field(
         None, description="where the crank is when a force drives: before or beyond the stretched position"
@@ -90,7 +90,8 @@ class CrankAnalysis(PrintedAnalysis):
     )
     reference_angle: Angle | None = Field(None, description="where the constant band is taken; default: stretched")
     reference_travel: Length | None = Field(
-        None, description="travel around which the constant band is evaluated for a force drive; default: half of it"
+        None,
+        description="travel around which the constant band is evaluated for a force drive; default: half the travel",
     )
     fidelity: Literal["prb", "lumped", "beam", "solid"] | None = Field(
         None,

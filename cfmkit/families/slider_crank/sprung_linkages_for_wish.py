@@ -91,7 +91,7 @@ LINK_SHARE = 1.0 / 12.0
 """Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
 
 STILL = 1e-9
-"""Share of the slider's travel that is none."""
+"""Travels below this share of the slider's travel count as zero."""
 
 FINISH = "cfmkit.families.slider_crank.sprung_linkages_for_wish:finish"
 """What finishes linkages with springs at their pins."""
@@ -111,7 +111,10 @@ def turned_linkages(wish: Wish) -> FamilyOffer:
 def _too_weak(wish: Wish, most: float) -> str:
     """Return what is wrong where no springs hold the torque."""
     if not most > 0.0:
-        return f"springs drive no crank one way over {deg(wish.travel)}: it would pass where it is stretched or folded"
+        return (
+            f"no springs turn a crank in one direction over {deg(wish.travel)}: it would pass the stretched or folded "
+            "position"
+        )
     reported = format_short(most, "torque", 2)
     return f"springs of steel wire that fit at the pins hold at most {reported} over this angle"
 

@@ -222,7 +222,7 @@ def check_room(target: VcfmDesign, sizes: DesignSizes) -> None:
             words = "across the motion" if path == "max_span" else "out of the plane"
             verb = "need" if name == "leaves" else "needs"
             raise Infeasible(
-                finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' gives {mm(limit)}"),
+                finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' allows {mm(limit)}"),
                 {f"design.{path}": at_least(ROOM * found[name])},
             )
 

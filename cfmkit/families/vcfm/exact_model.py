@@ -244,7 +244,7 @@ def problem_of(part: Literal["bistable", "positive"], paths: Sequence[Any], trav
         return ""
     subject = {"bistable": "leaves were", "positive": "spring was"}[part]
     keys = ", ".join(f"'mechanism.{part}.{size}'" for size in ("length", "angle", "thickness"))
-    return f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}; look at {keys}"
+    return f"the {subject} followed only to {mm(short.edges[-1] / travel)}: {short.problem}; check {keys}"
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:

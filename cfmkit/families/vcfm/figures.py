@@ -182,7 +182,7 @@ def adjustability(result: Result) -> Figure:
     if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():
         forces.append(Series(straight, "F + K_p dr", GREY, dashed=True, prefer=0.7))
     shifts = [
-        Series(rests, "rest position, moved back by", PURPLE, prefer=0.4),
+        Series(rests, "shift of the rest position", PURPLE, prefer=0.4),
         Series(by_rule, "K_p dr/(K_p + K_b1)", GREY, dashed=True, prefer=0.7),
     ]
     starts = _starts(solution, over)

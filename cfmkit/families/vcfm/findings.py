@@ -247,7 +247,7 @@ def _returns(solution: Solution) -> Iterator[Finding]:
 
 
 def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
-    """Return whether a mechanism comes back by itself: its least force past the peak of the leaves is a real one.
+    """Return whether a mechanism comes back by itself: its least force past the peak of the leaves is above rounding.
 
     Parameters
     ----------
@@ -389,7 +389,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
         )
         yield finding(
             "theory_range",
-            f"{much}; their stress is too low, by up to a half. Verify with 'analysis.fidelity: exact'",
+            f"{much}; their stress is underestimated, by up to a half. Verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     elif share > THICK:

@@ -89,7 +89,7 @@ def thickness_for(target: VcfmDesign) -> float:
             finding(
                 "stroke_unreachable",
                 f"a stroke of {mm(stroke)} ('design.stroke') needs leaves with a rise above {mm(0.75 * stroke)}; "
-                f"{_given(target)} {mm(rise)}: with that no stroke reaches {mm(4.0 * rise / 3.0)}",
+                f"{_given(target)} {mm(rise)}, with which every stroke is shorter than {mm(4.0 * rise / 3.0)}",
             ),
             {"design.stroke": at_most(longest)} if not least else {"design.stroke": at_most(_stroke_for(rise, least))},
         )

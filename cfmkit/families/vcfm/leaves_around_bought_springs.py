@@ -55,7 +55,7 @@ TRIED = 12
 
 
 NOTED = 0.01
-"""Preloads that are stated for other springs are told of beyond this: a force that is that far off shows [1]."""
+"""Preloads stated for other springs are reported beyond this: a force that is that far off shows [1]."""
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ VARIED = {
 
 
 def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
-    """Return what is asked about many variants of a mechanism; None where this model does not apply.
+    """Return what is requested about many variants of a mechanism; None where this model does not apply.
 
     Parameters
     ----------

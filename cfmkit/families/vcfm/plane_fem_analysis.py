@@ -234,10 +234,10 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except SolutionError as error:
-        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; check analysis.solid.mesh")
     found = result_of(solution := solve(spec, made, sampler), run)
     warnings = (*found.warnings, *_findings(spec, sampler))
     if not found.curves:

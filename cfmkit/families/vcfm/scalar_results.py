@@ -44,13 +44,16 @@ DEFINITIONS = {
         "half of the window is flat at that force",
     ),
     "window_start": ("length", "start of the longest window within analysis.flatness"),
-    "window_end": ("length", "end of it"),
-    "window_length": ("length", "length of it; 0 if there is none"),
-    "window_force": ("force", "mean force in it"),
+    "window_end": ("length", "end of the longest window within analysis.flatness"),
+    "window_length": ("length", "length of the longest window within analysis.flatness; 0 if there is none"),
+    "window_force": ("force", "mean force in the longest window within analysis.flatness"),
     "rest_position": ("length", "rest position of the shuttle at the nominal preload, from the as-made position"),
     "rest_shift_max": ("length", "largest distance of a rest position from the as-made position, over all preloads"),
     "force_change_max": ("force", "largest change of the mean force due to a preload, relative to the nominal one"),
-    "force_per_preload": ("stiffness", "that change over the change of the preload"),
+    "force_per_preload": (
+        "stiffness",
+        "largest change of the mean force due to a preload, over the change of the preload",
+    ),
     "least_force": ("force", "smallest force beyond the peak of the leaves; positive: the shuttle returns by itself"),
     "stiffness_mismatch": (
         "ratio",
@@ -64,7 +67,7 @@ DEFINITIONS = {
         "largest stress of leaves and spring over the whole travel and all preloads; decisive unless a stop ends "
         "the travel at the end of the window",
     ),
-    "travel_safety_factor": ("factor", "allowable stress over that"),
+    "travel_safety_factor": ("factor", "allowable stress over `travel_stress_max`"),
     "spring_deflection_max": ("length", "largest deflection of bought springs over the travel and all preloads"),
     **WIRE_DEFINITIONS,
 }
@@ -144,10 +147,13 @@ def _stresses(solution: Solution) -> dict[str, float | None]:
 def _why_not_constant(solution: Solution) -> str:
     """Return why no single force stands for the curve."""
     if solution.spring_alone is None:
-        return "leaves or spring are such that the spring alone decides nowhere"
+        return "there is no position at which the leaves carry nothing and the spring alone gives the force"
     flat = solution.window_force
-    found = "" if flat is None else f", and what is flat of it has {newton(flat)}"
-    return f"where the leaves carry nothing the curve passes {newton(solution.spring_alone)} without being flat{found}"
+    found = "" if flat is None else f"; its flat part is at {newton(flat)}"
+    return (
+        f"where the leaves carry nothing the force is {newton(solution.spring_alone)}, but the curve is not flat "
+        f"there{found}"
+    )
 
 
 def _bought(solution: Solution) -> dict[str, Quantity]:

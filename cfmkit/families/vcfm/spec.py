@@ -113,7 +113,7 @@ class BoughtSprings(Model):
     def _rate_is_known(self) -> Self:
         settle_rate(self, self.kind)
         if self.initial_tension and self.kind == "compression":
-            raise ValueError("'initial_tension' is of extension springs: compression springs have none")
+            raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
         return self
 
     @property
@@ -205,7 +205,7 @@ class Mechanism(Model):
         block = data if isinstance(data, Mapping) else {}
         old = block["material"].get("allowable_stress") if isinstance(block.get("material"), Mapping) else None
         if old is not None and block.get("safety_factor") not in (None, 1):
-            reported = "is an old word, and means nothing beside 'safety_factor': give 'yield_strength' instead"
+            reported = "is deprecated and has no effect beside 'safety_factor': give 'yield_strength' instead"
             refuse("Mechanism", {("material", "allowable_stress"): reported})
         return data
 
@@ -255,7 +255,8 @@ class VcfmDesign(DesignBlock):
     preload: PositiveLength | None = Field(None, description="preload that increases the force by that much")
     rise: PositiveLength | None = Field(
         None,
-        description="of the leaves, h; instead of 'preload'; with bought springs, whose rate determines it, its limit",
+        description="of the leaves, h; instead of 'preload'; with bought springs, whose rate determines it, its upper "
+        "limit",
     )
     catalogue: Catalogue = Field(
         (),
@@ -325,7 +326,7 @@ class VcfmDesign(DesignBlock):
 
 
 class Measured(Model):
-    """What is reported of a built mechanism, to be checked against itself."""
+    """What is reported of a built mechanism, to be checked for consistency."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
     positive_stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="K_p of the spring")
@@ -338,7 +339,7 @@ class VcfmAnalysis(Analysis):
         (0.0,),
         min_length=1,
         max_length=50,
-        description="of the spring's far end, the nominal one first; pull: negative",
+        description="displacements of the spring's far end, the nominal one first; negative: pulled",
     )
     travel: PositiveLength | None = Field(None, description="travel of the shuttle; default: 1.4 times the rise")
     fidelity: Literal["truss", "analytic", "exact", "solid"] = Field(
@@ -431,7 +432,7 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _wide_leaves_are_traced(self) -> Self:
         if self.mechanism.wide_beams and self.analysis.fidelity in ("truss", "analytic"):
-            reported = "no closed form knows it: add 'analysis.fidelity: exact'"
+            reported = "no closed form includes it: add 'analysis.fidelity: exact'"
             refuse("Spec", {("mechanism", "wide_beams"): reported})
         return self
 
@@ -447,7 +448,9 @@ class VcfmSpec(Spec):
         if self.analysis.fidelity == "solid" or (self.design is not None and self.design.verify == "solid"):
             found: dict[tuple[str | int, ...], str] = {}
             if self.mechanism.bistable.waviness:
-                found["mechanism", "bistable", "waviness"] = "the model 'solid' does not know it: leaves are as drawn"
+                found["mechanism", "bistable", "waviness"] = (
+                    "the model 'solid' does not support it: leaves are as drawn"
+                )
             if self.analysis.branch == "primary":
                 found["analysis", "branch"] = "the model 'solid' follows the stable branch only"
             refuse("Spec", found)
@@ -466,7 +469,9 @@ class VcfmSpec(Spec):
                 "'design' needs either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
             )
         if free and not self.design.catalogue and (self.design.spring_life or self.design.spring_room):
-            raise ValueError("'spring_life' and 'spring_room' are of springs that are picked: they need a 'catalogue'")
+            raise ValueError(
+                "'spring_life' and 'spring_room' apply only to springs picked from a catalogue: give 'catalogue', too"
+            )
         return self
 
     @property

@@ -61,7 +61,7 @@ def _oddity(char: str) -> str | None:
 
 
 def read_number(text: str) -> float:
-    """Return the number that `text` is.
+    """Return the number that `text` represents.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def _generic(wound: Wound) -> Offer:
 
 @dataclass(frozen=True)
 class Miss:
-    """A choice that was refused: what it is, by how much it misses (0: just not), and what, in words."""
+    """A choice that was refused: what it is, by how much it misses (0: only just), and why, in words."""
 
     label: str
     share: float
@@ -145,5 +145,5 @@ def nearest(misses: Sequence[Miss], count: int = 3) -> str:
     best = sorted(misses, key=lambda miss: miss.share)[:count]
     left = len(misses) - len(best)
     reported = "; ".join(f"{miss.label}: {miss.reason}" for miss in best)
-    more = "1 other misses more" if left == 1 else f"{left} others miss more"
+    more = "1 other misses by more" if left == 1 else f"{left} others miss by more"
     return f"{reported}; {more}" if left else reported

@@ -114,7 +114,9 @@ def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]
                 if one != other:
                     matrix[one, other] = correlation
     if np.linalg.eigvalsh(matrix).min() < -1e-9:
-        raise Incompatible("no parts can be correlated like that: each of three cannot oppose both others")
+        raise Incompatible(
+            "these correlations are impossible together: of three parameters not all pairs can be opposed"
+        )
     return matrix
 
 

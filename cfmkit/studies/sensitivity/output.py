@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 YIELD = "share of parts that meet every requirement, of those drawn from the tolerances"
 POLICIES = {
     "fail": "an index that needs a failed sample is not stated",
-    "resample": "blocks with failed samples were drawn again, whole: the indices are those of the part that works",
+    "resample": "blocks with failed samples were drawn again, whole: the indices hold for those parameter values at "
+    "which the mechanism works",
     "bound": "failed samples taken as the smallest and as the largest value found: the intervals hold both",
 }
 
@@ -75,7 +76,7 @@ def lines_table(lines: Sequence[IndexLine]) -> Table:
 
 
 def exit_code(found: Findings) -> ExitCode:
-    """Return what the process is to say: samples that failed count before requirements that are missed."""
+    """Return the exit code of the process: samples that failed count before requirements that are missed."""
     if found.interrupted:
         return ExitCode.INTERRUPTED
     evaluator = found.evaluator
@@ -137,8 +138,8 @@ def warnings(found: Findings) -> tuple[Finding, ...]:
     elif found.unstated and not found.interrupted:
         reported = f"{found.unstated} indices are not stated: "
         if setup.method == "inverse":
-            reported = f"{found.unstated} tolerances are not stated: even without the error of that parameter alone, "
-            reported += "or of all, the yield would stay too low"
+            reported = f"{found.unstated} tolerances are not stated: even without the error of that parameter, "
+            reported += "or of all parameters, the yield would be too low"
         else:
             reported += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
         extra.append(Finding("not_stated", reported))

@@ -62,7 +62,7 @@ class Setup:
     Attributes
     ----------
     block : Sensitivity
-        What was asked.
+        What was requested.
     parameters : tuple of Parameter
         What varies.
     study : Study
@@ -91,7 +91,7 @@ class Setup:
 
     @property
     def method(self) -> Method:
-        """Of the five."""
+        """How the indices or tolerances are computed."""
         return self.block.method
 
     @property
@@ -181,7 +181,7 @@ def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) ->
         reported = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
         raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", reported)])
     if block.method == "inverse" and not spec.part_requirements:
-        lacking = "asks which tolerances keep a yield: give 'requirements' that a part meets or misses"
+        lacking = "finds the tolerances that keep a yield: give 'requirements' that a part meets or misses"
         raise SpecError([Problem("", 0, 0, "sensitivity.method", lacking)])
     unknown = [path for path in block.costs if path not in {one.path for one in parameters}]
     if unknown:

@@ -228,9 +228,9 @@ def _note(moved: Moved) -> str:
 def _tried(moved: Moved | None, obstacle: str) -> str:
     """Return why margins did not help."""
     if moved is None:
-        return "no value may move for it"
-    reported = f"margins reach no more, and the tolerance of {moved.costliest} costs most"
-    return f"{reported}; moved farther, the mechanism misses more: {obstacle}" if obstacle else reported
+        return "no value of the design may change to improve it"
+    reported = f"design margins cannot improve it further, and the tolerance of {moved.costliest} costs most"
+    return f"{reported}; with larger changes it misses another requirement: {obstacle}" if obstacle else reported
 
 
 def _seconds(clock: Clock) -> float:
@@ -370,8 +370,8 @@ def _badly_adjusted(wish: Wish, result: Result) -> Iterator[str]:
             yield f"changes by {100 * ripple:.3g} % at {at}: {100 * wish.ripple:.3g} % wished"
     low, high = wish.adjustable
     if min(means) > low * (1.0 + 0.025) or max(means) < high * (1.0 - 0.025):
-        ends = ", ".join(format_short(end, "force") for end in (min(means), max(means), low, high))
-        yield f"is adjusted between the first two of {ends}, the others are wished"
+        ends = [format_short(end, "force") for end in (min(means), max(means), low, high)]
+        yield f"is adjustable from {ends[0]} to {ends[1]}: {ends[2]} to {ends[3]} wished"
 
 
 def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, float | None]:

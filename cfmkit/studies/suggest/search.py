@@ -465,7 +465,7 @@ def verified(proposal: Proposal) -> Proposal:
     )
 
 
-NOT_VERIFIED = "it had not ended when the time budget did"
+NOT_VERIFIED = "it was not finished when the time budget ended"
 
 
 def unverified(proposal: Proposal, why: str = "--verify") -> Proposal:

@@ -44,7 +44,7 @@ class WishBlock(Model):
         None, description="force to keep constant; or a band that contains every force: [19 N, 21 N]"
     )
     torque: PositiveTorque | tuple[PositiveTorque, PositiveTorque] | None = Field(
-        None, description="the same at a crank"
+        None, description="torque at a crank to keep constant; or a band that contains every torque"
     )
     travel: PositiveLength | None = Field(None, description="over which the force is constant")
     angle: Annotated[Angle, Field(gt=0)] | None = Field(None, description="over which the torque is constant")
@@ -64,14 +64,15 @@ class WishBlock(Model):
     adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
         None, description="lowest and highest force of the adjustment"
     )
-    hysteresis: Share | None = Field(None, description="largest loss of a cycle, over its work")
+    hysteresis: Share | None = Field(None, description="largest energy loss of a cycle, as a share of its work")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
         None, description="required life in cycles; checked for materials with `fatigue` data"
     )
     made_well: Share | None = Field(
         None,
         alias="yield",
-        description="share of made parts that meet all of it, under the tolerances assumed of the process",
+        description="share of manufactured parts that must meet the whole wish, with the tolerances assumed for the "
+        "process",
     )
     prefer: tuple[Prefer, ...] = Field(
         ("size", "ripple", "parts", "stress"), description="criteria for the order of the proposals"

@@ -129,7 +129,9 @@ def good_parts(result: Result, wish: Wish, clock: Clock, draw: bool) -> GoodPart
     wanted = float(wish.good_parts or 0.0)
     found = assumed(result.spec, wish.process)
     if found is None or result.spec.sensitivity is None:
-        return GoodParts(None, "its yield is not known: the errors of its dimensions by the process are not known")
+        return GoodParts(
+            None, "its yield is not known: the errors that the process causes in its dimensions are not known"
+        )
     first = _first_order(result, found)
     most = 1.0 if first is None else _most(first, found, wish)
     if first is not None and first.good < wanted:
@@ -162,9 +164,9 @@ def _cures(first: FirstOrderShares, found: Assumed, most: float, wanted: float) 
         return text
     ends = " to ".join(format_short(end, "stress") for end in found.modulus)
     return (
-        f"{text}; no shape gets beyond {_percent(most)}, as its force goes with the modulus of {ends}: measure it on a "
-        "coupon and state it as the wish's material, fit it to a measured part with 'cfmkit calibrate', or trim the "
-        "force of each part"
+        f"{text}; no shape exceeds {_percent(most)}, because its force is proportional to the modulus of {ends}: "
+        "measure it on a coupon and state it as the wish's material, fit it to a measured part with 'cfmkit "
+        "calibrate', or trim the force of each part"
     )
 
 

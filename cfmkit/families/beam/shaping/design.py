@@ -165,7 +165,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
         if plan.late():
             said = (
                 f"none of {len(some)} starts met all limits in the time allowed: increase it "
-                "(design.optimise.time_budget), or run again to go on"
+                "(design.optimise.time_budget), or run again to continue"
             )
             return Design(None, Status.INFEASIBLE, said)
         free = replace(plan, clock=Clock())
@@ -196,12 +196,12 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: StartBudget) -> Ju
 
 def _nothing(result: Explored, plan: StartBudget) -> Design:
     if result.lost:
-        return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(result.lost)}")
+        return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(result.lost)}")
     if result.missing or plan.late():
         return Design(
             None,
             Status.INFEASIBLE,
-            "the time budget ended before any start led to a design: give it more (design.optimise.time_budget)",
+            "the time budget ended before any start led to a design: increase it (design.optimise.time_budget)",
         )
     said = (
         "no random network could be followed over the window without losing stability or crossing beams: "
@@ -217,13 +217,15 @@ def _reported(task: Task, design: Judged, result: Explored) -> str:
     some = [one for one in result.found.values() if one is not None]
     feasible = [one for one in some if one.feasible]
     unsound = len(feasible) - sum(one.sound for one in result.audits.values())
-    refuted = f", the audit refutes {unsound} of them" if unsound else ""
+    refuted = f", the audit rejects {unsound} of them" if unsound else ""
     total = sum(one.evaluations for one in some)
     reused = f", {result.reused} from the journal" if result.reused else ""
-    left = f", {result.missing} not done in the time" if result.missing else ""
+    left = f", {result.missing} not finished in time" if result.missing else ""
     reached = "the analysis has no force at the end of the window"
     if task.shape is not None:
-        reached = f"force within {percent(design.miss or 0.0)} of the largest of 'design.target' in the window"
+        reached = (
+            f"force off 'design.target' by at most {percent(design.miss or 0.0)} of its largest value in the window"
+        )
     elif design.half_band is not None:
         share = 1 - window[0] / window[1]
         reached = f"force within ± {percent(design.half_band)} over {percent(share)} of the travel"

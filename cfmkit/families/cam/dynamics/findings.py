@@ -43,7 +43,7 @@ def old_word(spec: CamSpec) -> tuple[Finding, ...]:
     if dynamics is None or dynamics.method != "direct":
         return ()
     message = (
-        "'analysis.dynamics.method: direct' is the old word for 'inverse': forces follow from a given motion, which is "
+        "'analysis.dynamics.method: direct' is the old name of 'inverse': forces follow from a given motion, which is "
         "inverse dynamics; the next version will no longer accept it"
     )
     return (finding("old_word", message, "analysis.dynamics.method=inverse"),)
@@ -172,8 +172,8 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
     if dynamics and dynamics.method == "multibody" and spec.gravity and directions(spec.mechanism.mounting)[1]:
         yield finding(
             "friction_left_out",
-            "the nine-coordinate model has no weight across the slider's way, which 'mechanism.mounting' implies; "
-            "'analysis.dynamics.method: inverse' includes it",
+            "the nine-coordinate model neglects the weight across the slider's travel, which 'mechanism.mounting' "
+            "implies; 'analysis.dynamics.method: inverse' includes it",
         )
 
 

@@ -50,20 +50,25 @@ class Profile(Model):
 
     force_constant: PositiveLength = Field(description="A; the force is 4 K A, K the sum of all springs")
     friction: DesignFriction = Field(
-        0.0, description="rolling friction that it is cut for; positive: exact on the way up, negative: on the way down"
+        0.0,
+        description="rolling friction that the profile is cut for; positive: exact on the way up, negative: on the way "
+        "down",
     )
     slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
         1.0,
-        description="1, or more if the profile carries the weight of the moving parts, less if they hang down",
+        description="factor on the slope of the profile: 1; more if it carries the weight of the moving parts, less if "
+        "they hang down",
     )
     curve: ProfileCurve | None = Field(
-        None, description="force over travel, as shares of 4 K A, that it is cut for; default: constant"
+        None, description="force over travel that the profile is cut for, as shares of 4 K A; default: constant"
     )
     stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
-    brace_length: PositiveLength | None = Field(None, description="length of the brace it is cut for")
+    brace_length: PositiveLength | None = Field(None, description="length of the brace that the profile is cut for")
     rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
-    roller_radius: PositiveLength | None = Field(None, description="radius of the roller it is cut for")
-    preload: NonNegativeLength | None = Field(None, description="elongation of the springs at the start it is cut for")
+    roller_radius: PositiveLength | None = Field(None, description="radius of the roller that the profile is cut for")
+    preload: NonNegativeLength | None = Field(
+        None, description="elongation of the springs at the start that the profile is cut for"
+    )
     offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
     file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
     noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")

@@ -270,7 +270,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> StripTa
     reach = slider_reach(linkage, unloaded)
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:
-        raise InputError("'design.travel' must begin behind the run-in, above 0: the force begins at zero there")
+        raise InputError("'design.travel' must begin after the run-in, above 0: the force begins at zero there")
     if beam.goal == "stroke" and beam.longest is not None and beam.longest <= start + SHORTEST:
         raise InputError(
             f"'design.beam.longest' must be more than {mm(SHORTEST)} beyond 'design.beam.start', {mm(float(start))}"
@@ -463,7 +463,7 @@ def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> st
     force, stress = reported.opinion or (judged.opinion.force, judged.opinion.stress)
     opinion, shown = judged.opinion, judged.active[:TOLD]
     more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
-    held = f"; held by {', '.join(shown)}{more}" if shown else ""
+    held = f"; limited by {', '.join(shown)}{more}" if shown else ""
     return (
         f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
         f"{opinion.elements} corotational elements: force {100 * force:+.2g} %, stress {100 * stress:+.2g} %"
@@ -478,5 +478,5 @@ def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
     if found.lost:
         findings.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
     if not judged.opinion.stable:
-        findings.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
+        findings.append(finding("second_opinion", "according to corotational elements the equilibrium is unstable"))
     return tuple(findings)

@@ -170,7 +170,10 @@ class Chain(ShortRepr):
         taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
         if len(taut):
             near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
-            text = f"the chain is taut before {travel[taut[0]] * 1e3:.4g} mm; beyond, it could only be torn"
+            text = (
+                f"the chain is pulled taut before a travel of {travel[taut[0]] * 1e3:.4g} mm is reached; it cannot "
+                "follow beyond"
+            )
             return (
                 replace(near, ending=PressingEnd.LIMIT_POINT, message=text)
                 if near.ending is PressingEnd.COMPLETE
@@ -208,7 +211,7 @@ class Chain(ShortRepr):
         first = _beginning(path, drive) if other else 0
         if other and 0 < first < len(drive.points):
             path = _from_its_limit(part_of(path, path.requested >= first), drive.points[:first])
-            text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
+            text = f"with its kink the other way the chain has an equilibrium only from {path.drive[0] * 1e3:.4g} mm on"
             return Pressed(path, PressingEnd.STARTS_LATE, text, wanted)
         return self._judged(path, wanted)
 

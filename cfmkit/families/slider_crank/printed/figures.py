@@ -85,11 +85,11 @@ def guide(result: Result) -> Figure:
     """Return what the slider's guide carries beside the force."""
     solution: Solution = result.state
     over = Scale("travel of the slider", "length")
-    forces = [Series(solution.force, "force", INK), Series(solution.side_force, "on the guide, across the way", OCHRE)]
+    forces = [Series(solution.force, "force", INK), Series(solution.side_force, "on the guide, transverse", OCHRE)]
     upper = Diagram(solution.travel, over, Scale("force", "force"), forces)
     moment = [Series(solution.guide_moment, "on the guide", OCHRE)]
     lower = Diagram(solution.travel, over, Scale("moment", "torque"), moment)
-    return diagram_figure(Heading.of(result, "what the guide of the slider carries"), [upper, lower])
+    return diagram_figure(Heading.of(result, "force and moment on the slider's guide"), [upper, lower])
 
 
 @styled

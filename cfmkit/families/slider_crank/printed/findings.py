@@ -55,7 +55,7 @@ def friction_left_out(spec: SliderCrankSpec) -> Iterator[Finding]:
     if stated:
         yield finding(
             "friction_left_out",
-            f"{' and '.join(stated)} {'counts' if len(stated) == 1 else 'count'} in the model with springs only: the "
+            f"{' and '.join(stated)} {'applies' if len(stated) == 1 else 'apply'} only to the model with springs: the "
             "force of a one-piece part is computed without friction",
         )
 
@@ -154,5 +154,5 @@ def _opinion(solution: Solution) -> Iterator[Finding]:
     yield finding(
         "second_opinion",
         f"{check.elements} corotational elements differ by {100 * check.force:.2g} % in force and "
-        f"{100 * check.stress:.2g} % in stress" + ("" if check.stable else ", and call the equilibrium unstable"),
+        f"{100 * check.stress:.2g} % in stress" + ("" if check.stable else ", and find the equilibrium unstable"),
     )

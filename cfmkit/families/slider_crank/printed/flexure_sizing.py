@@ -181,8 +181,8 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
-        cure = "make them longer ('design.flexures.length'), or the stroke larger ('design.travel')"
-        return no_design(finding("target_unreachable", f"{text}: no flexure; {cure}"))
+        cure = "make the flexures longer ('design.flexures.length'), or increase the stroke ('design.travel')"
+        return no_design(finding("target_unreachable", f"{text}: too stubby for a flexure; {cure}"))
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
     springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
     kept = None if sheet is None else FixedWidth(tuple(lengths), stays)
@@ -200,8 +200,8 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         )
         return no_design(finding("target_unreachable", text), {"design.flexures.length": longer})
     over = (
-        "over that of the springs, on average, of flexures by the closed forms",
-        "over that of pure bending, of those",
+        "of flexures sized by the closed forms over that of the springs, on average",
+        "of flexures sized by the closed forms over that of pure bending",
     )
     factors: dict[str, tuple[float | None, str, str]] = {
         "closed_form_force": (found.force_factor, "factor", f"force {over[0]}"),
@@ -323,7 +323,7 @@ def _written(spec: SliderCrankSpec, parts: Sequence[Flexure], stroke: float) -> 
 
 def _message(found: Sized, exact: bool) -> str:
     parts = ", ".join(mm(one.thickness) for one in found.flexures)
-    done = "corrected for it" if exact else "not corrected for it"
+    done = "which the sizes are corrected for" if exact else "which the sizes are not corrected for"
     harder = format_short(found.force_factor - 1.0, "ratio")
     return (
         f"thickness of pivot, crank pin and slider pin: {parts}, width {mm(found.flexures[0].width)}; flexures push "

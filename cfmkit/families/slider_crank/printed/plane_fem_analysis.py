@@ -133,13 +133,13 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except InputError as problem:
         return Result(spec, Status.INVALID, str(problem))
     low, high = spec.analysis.travel or (0.0, 0.0)
     if why := meshes.no_curve(3):
-        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; look at analysis.solid.mesh")
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; check analysis.solid.mesh")
     asked = np.linspace(low, high, spec.analysis.points)
     course = meshes.fine.course
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])

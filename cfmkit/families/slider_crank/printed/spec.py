@@ -83,26 +83,29 @@ class StripSpec(Model):
             inner = [share for piece in self.shares for share in piece]
             if len(inner) + 2 != len(self.values):
                 raise ValueError(
-                    f"'shares' places {len(inner)} thicknesses between the ends, and {len(self.values) - 2} are given"
+                    f"'shares' gives the positions of {len(inner)} thicknesses between the ends, but "
+                    f"{len(self.values) - 2} are given"
                 )
             if any(a >= b for piece in self.shares for a, b in itertools.pairwise(piece)):
                 raise ValueError("'shares' must increase within each piece")
         if any(a == b for a, b in itertools.pairwise(self.centreline or ())):
             raise ValueError("'centreline' has the same corner twice in a row")
         if min(self.values) + self.offset <= 0:
-            raise ValueError("'offset' leaves no thickness")
+            raise ValueError("'offset' reduces the smallest thickness to zero or less")
         if max(self.values) + self.offset > MOST_TAPER * (min(self.values) + self.offset):
             raise ValueError(
                 f"the largest thickness is over {MOST_TAPER} times the smallest: a place that is a million times as "
-                "soft is a hinge; make it thicker, or say 'flexures'"
+                "soft is a hinge; make it thicker, or use 'flexures'"
             )
         return self
 
 
 class Process(Model):
-    """What the process can make: parts below it are warned of."""
+    """The smallest features that the process can make: smaller ones cause a warning."""
 
-    layer: PositiveLength | None = Field(None, description="layer or position error in the plane: hides smaller kinks")
+    layer: PositiveLength | None = Field(
+        None, description="layer or position error in the plane; smaller kinks are lost in it"
+    )
     thinnest: PositiveLength | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
 
 
@@ -127,7 +130,8 @@ class Printed(Model):
 
     @property
     def resolved(self) -> tuple[float | None, float | None]:
-        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None where nothing says."""
+        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None where neither is
+        stated."""
         position = thinnest = None
         if self.part is not None and self.part.process is not None:
             stated = self.part.process
@@ -156,7 +160,9 @@ class FlexureDesign(Model):
     """Sections of the flexures from the springs' rates and the stress: closed forms, then the exact force."""
 
     length: PositiveLength | None = Field(None, description="of all three; default: as stated, or a fifth of r1")
-    exact: bool = Field(True, description="correct the closed forms until the beam model has the force and the stress")
+    exact: bool = Field(
+        True, description="correct the sizes from the closed forms until the beam model gives the force and the stress"
+    )
 
 
 class StripDesign(Model):
@@ -170,7 +176,9 @@ class StripDesign(Model):
     )
     nodes: int = Field(17, ge=2, le=65, description="thicknesses of the shape 'even'")
     thickness: LengthRange | None = Field(None, description="smallest and largest thickness")
-    thicknesses: tuple[LengthRange, ...] | None = Field(None, description="the same for each of the thicknesses")
+    thicknesses: tuple[LengthRange, ...] | None = Field(
+        None, description="smallest and largest value of each of the thicknesses"
+    )
     shares: tuple[ShareRange, ...] | None = Field(None, description="ranges of 'beam.shares'; default: fixed")
     width: PositiveLength | LengthRange | None = Field(
         None, description="one value, or a range to choose from; default: that of the beam"

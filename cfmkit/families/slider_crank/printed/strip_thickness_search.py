@@ -305,9 +305,9 @@ def _with_its_ripple(found: FoundStrip) -> FoundStrip:
 def _nothing(lost: tuple[str, ...]) -> Design:
     """Return why no start led to anything."""
     if lost:
-        return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(lost)}")
+        return Design(None, Status.CRASHED, f"no start was completed: {'; '.join(lost)}")
     return no_design(
-        finding("target_unreachable", "the time budget ended before any start led to a strip: give it more")
+        finding("target_unreachable", "the time budget ended before any start led to a strip: increase it")
     )
 
 
@@ -426,7 +426,7 @@ def infeasible(found: FoundStrip) -> Design:
         why += "for other ranges in 'design.beam'"
         return no_design(finding("target_unreachable", f"the search {why}"))
     if descent.ending is SearchEnding.OUT_OF_TIME:
-        text = "the time budget ended before a strip met its targets: give it more"
+        text = "the time budget ended before a strip met its targets: increase it"
         return no_design(finding("target_unreachable", text))
     state = program.state(descent.z)
     if state is None:

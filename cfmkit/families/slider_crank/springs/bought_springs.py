@@ -137,7 +137,7 @@ def choose(task: SpringTask, goal: RateGoal, window: tuple[float, float]) -> Cho
     misses = [_missed(one) for one in (_sets(goal, options, 3) if best else [])]
     reported = nearest(misses) if misses else _none_together(task, refused)
     allowed = f", 'design.tolerance' allows {percent(tolerance)}" if tolerance and misses else ""
-    raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {reported}{allowed}"))
+    raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue keep the target: {reported}{allowed}"))
 
 
 def next_sets(task: SpringTask, goal: RateGoal, window: tuple[float, float], count: int) -> list[Chosen]:
@@ -227,7 +227,7 @@ def _why_not(offer: Offer, moved: float, wanted: CrankDesign) -> tuple[float, st
         return offer.free_length / room - 1.0, f"{reported} ('design.spring_room' {format_short(room, kind)})"
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
-        return moved / offer.largest - 1.0, f"moved by {needed}, it allows {allowed}"
+        return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
     return SpringInUse.of(offer, 0.0, moved).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
 
 

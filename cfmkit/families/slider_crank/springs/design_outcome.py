@@ -116,7 +116,8 @@ def cannot_hold(task: SpringTask) -> Finding:
         )
         return finding("infeasible_targets", text)
     text = (
-        "no springs, none of them negative, have 'design.stiffness' in the stretched position within 'design.max_rates'"
+        "no springs with rates of zero or more have 'design.stiffness' in the stretched position within "
+        "'design.max_rates'"
     )
     if task.assembly.stretched == task.assembly.start:
         text += ": the springs are relaxed there, and only positive slopes exist"
@@ -130,7 +131,7 @@ def nowhere(task: SpringTask) -> Finding:
     window = task.wanted.window
     goal = task.goal(window) if window is not None else None
     if task.wanted.curve is not None:
-        text = "the best springs are none: no others come closer to 'design.target'"
+        text = "no springs come closer to 'design.target' than having none at all"
         return finding("infeasible_targets", f"{text}; change it, its window, or 'design.springs'")
     if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
         other = format_short(-task.wanted.size, "torque")
@@ -141,7 +142,7 @@ def nowhere(task: SpringTask) -> Finding:
         text += "use the slider's, too, in 'design.springs'"
         return finding("no_zero_stiffness", text)
     if window is not None:
-        text = f"in the window the best springs are none: no others come closer to a constant {task.assembly.drive}"
+        text = f"in the window no springs come closer to a constant {task.assembly.drive} than having none at all"
         return finding("infeasible_targets", f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
     return finding(
         "infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'"
@@ -205,7 +206,11 @@ def about_springs(solved: Solved) -> tuple[Finding, ...]:
         found.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
     at_cap = [path for path in active_bounds(solved, wanted) if "max_rates" in path]
     if at_cap:
-        found.append(finding("spring_at_bound", f"{' and '.join(at_cap)} limits the design: more would be better"))
+        found.append(
+            finding(
+                "spring_at_bound", f"{' and '.join(at_cap)} limits the design: a larger value would give a better one"
+            ),
+        )
     return tuple(found)
 
 
@@ -245,12 +250,12 @@ def search_of(solved: Solved) -> dict[str, Searched]:
         "largest_miss": (
             solved.deviation,
             "ratio",
-            f"farthest from the target, over it, at the {solved.places} places searched",
+            f"largest deviation from the target, relative to it, at the {solved.places} places searched",
         ),
         "mean_square_miss": (
             solved.rms,
             "ratio",
-            f"root mean square distance from the target, over it, at those {solved.places}",
+            f"root mean square deviation from the target, relative to it, at the {solved.places} places searched",
         ),
     }
     return searched(about, "prb", solved.window, solved.task.assembly.dimension)

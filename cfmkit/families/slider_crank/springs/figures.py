@@ -241,7 +241,7 @@ def energy(result: Result) -> Figure:
             if rates[k] > 0.0
         ]
     diagram = Diagram(solution.motion, motion_scale(solution), Scale("energy", "energy"), series)
-    figure = diagram_figure(Heading.of(result, "energy of the springs, and where it has its wells"), [diagram])
+    figure = diagram_figure(Heading.of(result, "energy of the springs, and its minima"), [diagram])
     _equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
     _name_wells(figure.axes[0], solution)
     return figure

@@ -200,4 +200,4 @@ def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             dimension = "length" if name == "slider" else "angle"
             reported, allowed = format_short(value, dimension), format_short(limit, dimension)
             what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
-            yield finding("joint_overrotated", f"the {what} is moved by {reported}; its limit is {allowed}")
+            yield finding("joint_overrotated", f"the {what} is deflected by {reported}; its limit is {allowed}")

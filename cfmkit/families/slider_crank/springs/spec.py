@@ -78,7 +78,7 @@ class Springs(Model):
                     "Springs",
                     {
                         (joint,): f"wires of 'bought' give {total / max(getattr(self, joint), 1e-300):.3g} "
-                        "times that: leave one of them out, or give the wire's modulus"
+                        "times the stated rate: leave one of them out, or give the wire's modulus"
                     },
                 )
         return self
@@ -199,7 +199,9 @@ class SpringDesign(DesignBlock):
         None,
         description="increase of the force by the trim: by the anchor of the slider's spring, or by the unloaded angle",
     )
-    anchor_travel: PositiveLength | None = Field(None, description="how far that anchor can be screwed")
+    anchor_travel: PositiveLength | None = Field(
+        None, description="range over which the anchor of the slider's spring can be adjusted"
+    )
     angle_travel: PositiveAngle | None = Field(
         None,
         description="range of the unloaded angle in each direction: rotation of the anchors of the torsion springs",
@@ -209,15 +211,15 @@ class SpringDesign(DesignBlock):
     def _adjustment_has_its_travel(self) -> Self:
         ways = [self.anchor_travel, self.angle_travel]
         if self.adjustment is None and ways != [None, None]:
-            raise ValueError("'anchor_travel' and 'angle_travel' are of an 'adjustment': give it, too")
+            raise ValueError("'anchor_travel' and 'angle_travel' apply only to an 'adjustment': give that, too")
         if self.adjustment is not None and ways.count(None) != 1:
             raise ValueError("'adjustment' needs either 'anchor_travel' or 'angle_travel', by which it is made")
         if self.adjustment is not None and self.torque is not None:
-            raise ValueError("'adjustment' is that of a force: it needs 'force' instead of 'torque'")
+            raise ValueError("'adjustment' applies to a force only: give 'force' instead of 'torque'")
         if self.anchor_travel is not None and "slider" not in self.springs:
-            raise ValueError("'anchor_travel' is that of the slider's spring: add 'slider' to 'springs'")
+            raise ValueError("'anchor_travel' moves the anchor of the slider's spring: add 'slider' to 'springs'")
         if self.angle_travel is not None and self.objective == "least-squares":
-            raise ValueError("'angle_travel' needs 'objective: minimax': least squares know no such limit")
+            raise ValueError("'angle_travel' needs 'objective: minimax': least squares cannot impose this limit")
         return self
 
     @model_validator(mode="after")
@@ -225,16 +227,18 @@ class SpringDesign(DesignBlock):
         if not self.catalogue:
             for name in ("spring_life", "spring_room"):
                 if getattr(self, name) is not None:
-                    raise ValueError(f"{name!r} is of springs that are picked: it needs a 'catalogue'")
+                    raise ValueError(f"{name!r} applies only to springs picked from a catalogue: give 'catalogue', too")
             return self
         if self.window is None:
             raise ValueError("springs of a 'catalogue' are picked for a window: give 'travel' (or 'angle'), too")
         if self.objective == "least-squares":
-            raise ValueError("springs of a 'catalogue' have the smallest largest deviation: remove 'objective'")
+            raise ValueError(
+                "springs of a 'catalogue' are chosen for the smallest maximum deviation: remove 'objective'"
+            )
         if self.hold_stiffness or self.slack:
             name = "hold_stiffness" if self.hold_stiffness else "slack"
             raise ValueError(
-                f"{name!r} needs rates of any value, which a 'catalogue' does not have: remove one of both"
+                f"{name!r} needs freely chosen rates, which a 'catalogue' does not offer: remove one of the two"
             )
         return self
 
@@ -244,9 +248,9 @@ class SpringDesign(DesignBlock):
             self._check_curve(self.target)
             return self
         if (self.torque is None) == (self.force is None):
-            raise ValueError("state either 'torque' or 'force', to keep constant, or 'target', a curve of one")
+            raise ValueError("state 'torque' or 'force', which is kept constant, or 'target', a curve of one of them")
         if self.torque == 0.0:
-            raise ValueError("'torque' must not be 0: springs that are absent do that")
+            raise ValueError("'torque' must not be 0: no springs at all give that")
         if self.torque is None and (self.angle or self.stiffness is not None or self.hold_stiffness):
             raise ValueError("'angle', 'stiffness' and 'hold_stiffness' belong to 'torque'; with 'force' give 'travel'")
         if self.force is None and self.travel:
@@ -260,7 +264,7 @@ class SpringDesign(DesignBlock):
         if self.window is None and self.tolerance is None:
             raise ValueError("give a window ('angle' or 'travel'), or a 'tolerance' for the widest one, or both")
         if self.window is None and self.objective == "least-squares":
-            raise ValueError("the widest window is a matter of the largest deviation: remove 'objective'")
+            raise ValueError("the widest window is defined by the largest deviation: remove 'objective'")
         if self.hold_stiffness and self.stiffness is None:
             raise ValueError("'hold_stiffness' needs the 'stiffness' to hold")
         return self
@@ -288,7 +292,7 @@ class SpringDesign(DesignBlock):
         if not (curve := target.curve(self.torque or self.force)).covers(*self.window):
             raise ValueError(f"the window {name!r} is beyond the points of 'target'")
         if not curve.largest(*self.window):
-            raise ValueError("'target' is zero all over its window: springs that are absent do that")
+            raise ValueError("'target' is zero all over its window: no springs at all give that")
 
     @property
     def drive(self) -> Literal["torque", "force"]:
