@@ -34,7 +34,7 @@ PART_NOT_DRAWN = "part_not_drawn"
 """Name of the finding that a design has no part that can be cut as it is."""
 
 THIN_WALL = "thin_wall"
-"""Name of the finding that a part is thinner somewhere than its process makes."""
+"""Name of the finding that a part is thinner somewhere than its process can make."""
 
 OVERWRITTEN = "overwritten"
 """Finding that a design replaces a value that was stated."""
@@ -234,7 +234,7 @@ class Result:
     allowable_stress : float, optional
         What the column ``max_stress`` is compared with [Pa].
     stress_overrated : float
-        By what share the model is known to overrate the stress at most: so much above the allowable one is no finding.
+        By what share the model may overestimate the stress at most: so much above the allowable one is no finding.
     load_cases : tuple of Curve
         Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal one,
         in ``stress_max``, ``safety_factor`` and ``usable_stroke``.

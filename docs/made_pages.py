@@ -147,7 +147,7 @@ def _materials() -> str:
         for one in MATERIALS.values()
     ]
     head = ("material", "E [GPa]", "yield [MPa]", "Poisson", "density [kg/m^3]", "source")
-    return "\n".join(["# Materials\n", "At room temperature, for short loads.\n", *_table(head, rows)]) + "\n"
+    return "\n".join(["# Materials\n", "At room temperature, under short-term loads.\n", *_table(head, rows)]) + "\n"
 
 
 def _commands() -> str:

@@ -267,7 +267,7 @@ def _allowed(report: Report) -> str:
 
 
 def _overrated(report: Report, name: str) -> str:
-    """Return why a safety factor below one is no finding: the model is known to overrate the stress by as much."""
+    """Return why a safety factor below one is no finding: the model is known to overestimate the stress by as much."""
     factor, share = report.metrics[name].value, report.result.stress_overrated
     reported = {one.name for one in report.result.warnings}
     if factor is None or "overstressed" in reported or not 1 / (1 + share) <= factor < 1:

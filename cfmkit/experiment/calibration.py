@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 POOR = 0.3
-"""Parameters whose interval exceeds this part of their size are reported as poorly determined."""
+"""Parameters whose half interval exceeds this part of their size are reported as poorly determined."""
 
 BY_CHANCE = 1e-3
 """Residuals are not random where chance makes their means as large less often than that."""

@@ -42,7 +42,7 @@ def corrected(
     zero : str or float, optional
         Displacement or angle that the sensor shows at the mechanism's zero, likewise [m or rad].
     flip : collection of str
-        ``force`` and ``displacement``, or ``torque`` and ``angle``: what is recorded with the other sign.
+        ``force`` and ``displacement``, or ``torque`` and ``angle``: what is recorded with the sign reversed.
 
     Raises
     ------

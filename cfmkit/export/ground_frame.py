@@ -155,8 +155,8 @@ def _bar(
                 return bar
             tried = tried or _place(inside_way if inside_way.area > beside.area else beside)
     raise GeometryError(
-        f"no bar leads from the pad of {name} to the frame: moving parts are in the way, of the shortest bar at "
-        f"{tried}; leave out 'mechanism.part.frame.ground', or reduce 'mechanism.part.frame.clearance' "
+        f"no bar leads from the pad of {name} to the frame: moving parts are in the way (of the shortest bar, at "
+        f"{tried}); leave out 'mechanism.part.frame.ground', or reduce 'mechanism.part.frame.clearance' "
         f"({format_short(clearance, 'length')})"
     )
 

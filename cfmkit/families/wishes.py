@@ -50,7 +50,7 @@ class Wish:
     thinnest : float
         Thinnest leaf that the process makes [m].
     good_parts : float, optional
-        Least share of made parts that meet all of it.
+        Least share of manufactured parts that meet all of it.
     process : str, optional
         By which tolerances they are made; None: those of the process that is usual for the material.
     """
@@ -84,7 +84,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A design that is worth being made.
+    """A design that is worth trying.
 
     Attributes
     ----------

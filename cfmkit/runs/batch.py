@@ -128,7 +128,7 @@ def _verb(name: str, fresh: bool) -> Verb:
 
 
 def _ended(entry: Entry, outcome: FinishedRun) -> Entry:
-    """Return what became of a specification that was computed."""
+    """Return the outcome of a specification that was computed."""
     data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
     reported = [one["sentence"] for one in data["requirements"] if not one["ok"]]
     if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
@@ -161,7 +161,7 @@ def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
 
 
 def lost(job: BatchJob, outcome: Lost) -> Entry:
-    """Return what became of a specification whose process did not answer."""
+    """Return the outcome of a specification whose process did not answer."""
     bug = outcome.status is Status.CRASHED
     code = ExitCode.BUG if bug else outcome.status.exit_code
     return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
@@ -212,7 +212,7 @@ class Crew:
 
 
 def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[Entry, ...]:
-    """Return what became of every specification, in their order; those that were not run are skipped.
+    """Return the outcome of every specification, in their order; those that were not run are skipped.
 
     What an earlier batch has finished and nobody has changed since is not computed again.
     """

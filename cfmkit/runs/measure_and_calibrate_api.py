@@ -51,7 +51,7 @@ def measure(
     tare, zero : str or float, optional
         What the sensors show without load [N or N m] and at the mechanism's zero [m or rad]; ``"start"``: at first.
     flip : str or iterable of str
-        ``"force"``, ``"displacement"``, ``"torque"``, ``"angle"``: what is recorded with the other sign.
+        ``"force"``, ``"displacement"``, ``"torque"``, ``"angle"``: what is recorded with the sign reversed.
     as_recorded : bool
         Leave out neither spikes nor points next to reversals.
     one_branch : bool

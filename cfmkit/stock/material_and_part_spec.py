@@ -221,7 +221,7 @@ class Pins(Model):
 
 
 class Guide(Model):
-    """The slider's way: what it takes from the force."""
+    """The slider's path: what it takes from the force."""
 
     friction: Friction = Field(0.0, description="coefficient of Coulomb friction, on the transverse load of the slider")
     drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")

@@ -286,7 +286,7 @@ class Records:
         return self._rows(reported) if "n" in reported else recalled_row(reported)
 
     def _rows(self, reported: Any) -> ResultRows:
-        """Return the rows that a record is; of one among others its own, the line being read once for all of them."""
+        """Return the rows stored in a record; of one among others its own, the line being read once for all of them."""
         if "at" not in reported:
             return self.work.recall(reported)
         keys, whole = self._line

@@ -97,7 +97,7 @@ def _follows_the_travel(study: Study) -> bool:
 
 
 def measures(study: Study) -> tuple[Measure, ...]:
-    """Return what is asked of each point: the metrics, then the requirements."""
+    """Return what is requested of each point: the metrics, then the requirements."""
     asked = [(one.name, one.over) for one in study.metrics]
     asked += [(one.metric, one.over) for one in study.spec.part_requirements]
     return tuple(Measure(split_name(name)[0], _window(study, over)) for name, over in asked)

@@ -138,7 +138,7 @@ def test_tare_zero_and_flip_are_taken_out_and_spikes_and_reversals_left_out(cli,
     assert raw["force_mean[unload]"]["value"] == pytest.approx(49.5, abs=0.02)
     assert done.document["window"]["from"] == pytest.approx(1.5)
     assert done.document["reading"][-3:] == [
-        "-0.4 N taken off the force", "3 mm taken off the displacement", "force with the other sign",
+        "-0.4 N subtracted from the force", "3 mm subtracted from the displacement", "sign of the force reversed",
     ]  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def test_as_recorded_nothing_is_left_out(cli, spoilt):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("--tare", "0.4"), "--tare: 0.4 has no unit; write '0.4 N'; or say 'start'"),
+        (("--tare", "0.4"), "--tare: 0.4 has no unit; write '0.4 N'; or write 'start'"),
         (("--zero", "1 N"), "--zero: '1 N' is a force"),
         (("--flip", "torque"), "--flip: 'torque' is not in this recording; it has force and displacement"),
     ],
@@ -166,7 +166,7 @@ def test_one_branch_only_is_refused_unless_it_is_all_there_is(cli):
     (cli.folder / "up.csv").write_text("s [mm];F [N]\n" + rows((np.arange(200.0), 50 + np.arange(200.0) / 100)))
     done = cli("measure", "up.csv", "--no-plots", "-o", "out")
     assert (done.code, done.err.count("\n")) == (3, 1)
-    assert done.err.startswith("error    up.csv: holds the branch 'load' only")
+    assert done.err.startswith("error    up.csv: holds only the branch 'load'")
     assert not (cli.folder / "out").exists()
     accepted = cli("measure", "up.csv", "--no-plots", "--one-branch", "-o", "out")
     assert accepted.code == 0
@@ -180,7 +180,7 @@ def test_exchanged_units_are_told_in_one_line(cli):
     assert done.code == 3
     assert done.err == (
         "error    rig.csv: no travel is measured on every branch; are the columns or units of displacement and force "
-        "exchanged?\n"
+        "swapped?\n"
     )
 
 

@@ -91,7 +91,7 @@ def test_a_family_has_its_article(monkeypatch):
         cfmkit.drawing(SPRINGS)
     from cfmkit.studies.comparison_of_fidelities import choices_of
 
-    with pytest.raises(cfmkit.UsageError, match=r": an oblique mechanism has one model only"):
+    with pytest.raises(cfmkit.UsageError, match=r": an oblique mechanism has only one model"):
         choices_of(cfmkit.load(SPRINGS))
     assert families.family("cam").phrase == "a cam mechanism"
 

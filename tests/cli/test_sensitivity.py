@@ -287,4 +287,4 @@ def test_a_sensitivity_without_any_value_names_the_window_that_is_outside(cli, t
         "out",
     )
     assert done.code == 4
-    assert "no value over 250 ... 300 mm (analysis.window): the curve covers 0 ... 240 mm only" in done.err
+    assert "no value over 250 ... 300 mm (analysis.window): the curve covers only 0 ... 240 mm" in done.err

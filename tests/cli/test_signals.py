@@ -87,8 +87,8 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
                 raise Stopped(signal.SIGTERM)
         except Stopped as stop:
             reported.append(stop.reported)
-    more = "what is finished is kept: run the same command again to go on"
-    anew = "nothing is finished that could be kept: the same command starts over"
+    more = "what is finished is kept: run the same command again to continue"
+    anew = "nothing that could be reused is finished yet: the same command starts from the beginning"
     assert reported == [f"terminated; {more if finished else anew}"]
 
 

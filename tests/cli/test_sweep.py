@@ -186,7 +186,7 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     process.send_signal(signal.SIGINT)
     _, complaints = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert b"run the same command again to go on" in complaints
+    assert b"run the same command again to continue" in complaints
     part = rows(tmp_path / "out")
     assert 0 < len(part) < 400
     assert cli(*command).code == 0
@@ -196,7 +196,7 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("options", "reported"), [((), b"again to go on"), (("--fresh",), b"again without --fresh to go on")]
+    ("options", "reported"), [((), b"again to continue"), (("--fresh",), b"again without --fresh to continue")]
 )
 def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, reported):
     command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2", *options)
@@ -346,8 +346,8 @@ def test_a_table_says_why_cells_are_empty_where_a_window_does_not_follow_a_swept
     found = rows(tmp_path / "out")
     assert [row["force_mean [N]"] == "" for row in found] == [True, True, False]
     assert [row["message"] for row in found] == [
-        f"no value over 2 ... 240 mm (analysis.window, requirements.0.over): the curve covers 0 ... {end} mm only; "
-        f"no value over 5 ... 240 mm (requirements.1.over): the curve covers 0 ... {end} mm only"
+        f"no value over 2 ... 240 mm (analysis.window, requirements.0.over): the curve covers only 0 ... {end} mm; "
+        f"no value over 5 ... 240 mm (requirements.1.over): the curve covers only 0 ... {end} mm"
         for end in (150, 200)
     ] + [""]
     (reported,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"]

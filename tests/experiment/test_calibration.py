@@ -144,7 +144,7 @@ def test_a_fitted_value_on_its_bound_is_reported():
     [
         (["mechanism.rolling_frictio"], "did you mean 'mechanism.rolling_friction'"),
         (["mechanism.springs"], "is a block"),
-        (["mechanism.springs.count"], "is not a number that can change by small steps"),
+        (["mechanism.springs.count"], "is not a number that varies continuously"),
         (["mechanism.springs.max_elongation"], "has no value to start from; give one with --set"),
         (["requirements.0.max"], "nothing to vary"),
         ([""], "--fit is empty"),
@@ -226,9 +226,9 @@ def test_vibration_that_the_sampling_resolves_is_no_lack_of_fit():
         (
             "data.tare",
             "force",
-            "there is no 'data.tare'; of a recording there are data.force_offset, data.displacement",
+            "there is no 'data.tare'; a recording has data.force_offset, data.displacement",
         ),
-        ("data.force_offset", "torque", "of a recording there are data.torque_offset, data.angle_offset, data.drift"),
+        ("data.force_offset", "torque", "a recording has data.torque_offset, data.angle_offset, data.drift"),
     ],
 )
 def test_what_a_recording_does_not_have_is_a_usage_error(path, kind, complaint):

@@ -956,7 +956,7 @@ def test_a_straight_strip_pressed_along_itself_names_the_strip_and_a_cure_that_b
     pressed = pressed.replace("direction: 0 deg}\nanalysis", "direction: 180 deg}\nanalysis")
     result = cfmkit.analyze(cfmkit.loads(pressed))
     assert result.status.exit_code == 4
-    assert "s, straight along the drive, cannot change its length and holds until it buckles" in result.message
+    assert "inextensible beams that lie straight along the drive (s) do not move until they buckle" in result.message
     assert "\n" not in result.message
     (early,) = (item for item in result.warnings if item.name == "ends_early")
     assert early.cures == ("analysis.fidelity=extensible",)

@@ -75,26 +75,26 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
 @pytest.mark.parametrize(
     ("config", "said", "changes"),
     [
-        ("beam_lee_frame", "mechanism.drive.follows is not known to it: its", {"mechanism.drive.follows": True}),
-        ("beam_v_bifurcation", "analysis.modes is not known to it: it has no masses; leave", {}),
+        ("beam_lee_frame", "mechanism.drive.follows is not supported: its", {"mechanism.drive.follows": True}),
+        ("beam_v_bifurcation", "analysis.modes is not supported: it has no masses; leave", {}),
         (
             "beam_lan2010",
-            "analysis.through_folds is not known to it: a motion is followed to its first fold; leave",
+            "analysis.through_folds is not supported: a motion is followed to its first fold; leave",
             {"analysis.through_folds": True},
         ),
         (
             "beam_lan2010",
-            "mechanism.loads is not known to it: constant loads act on nodes, and keep their direction; leave",
+            "mechanism.loads is not supported: constant loads act on nodes, and keep their direction; leave",
             {"mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N", "follows": True}]},
         ),
         (
             "beam_lan2010",
-            "mechanism.loads is not known to it: constant loads act on nodes, and keep their direction; leave",
+            "mechanism.loads is not supported: constant loads act on nodes, and keep their direction; leave",
             {"mechanism.loads": [{"kind": "line", "beam": "b1", "wx": "1 N/m"}]},
         ),
         (
             "beam_lan2010",
-            "analysis.loads_first is not known to it: constant loads act from the start; leave",
+            "analysis.loads_first is not supported: constant loads act from the start; leave",
             {
                 "mechanism.loads": [{"kind": "point", "node": "n3", "fx": "1 N"}],
                 "analysis.loads_first": False,
@@ -102,12 +102,12 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
         ),
         (
             "beam_design_arch",
-            "mechanism.loads is not known to it: its force, with them, does not grow as its width does; leave",
+            "mechanism.loads is not supported: with constant loads the force is not proportional to the width; leave",
             {"mechanism.loads": [{"kind": "point", "node": "b", "fx": "1 N"}], "design.verify": "solid"},
         ),
         (
             "beam_lan2010",
-            "mechanism.springs is not known to it: only the .*; mechanism.beams is not .* must have one width; leave",
+            "mechanism.springs is not supported: only the .*; mechanism.beams is not .* must have one width; leave",
             {
                 "mechanism.springs": {
                     "s": {"kind": "slide", "node": "n3", "direction": "0 deg", "stiffness": "1 N/mm"}
@@ -117,12 +117,12 @@ def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
         ),
         (
             "beam_lan2010",
-            r"mechanism\.nodes\.n2\.moved is not known to it: the part is solved as drawn",
+            r"mechanism\.nodes\.n2\.moved is not supported: the part is solved as drawn",
             {"mechanism.nodes.n2.moved": {"along": "1 mm"}},
         ),
         (
             "beam_lan2010",
-            r"mechanism\.beams\.b3\.start_joint is not known to it: the outline is one piece",
+            r"mechanism\.beams\.b3\.start_joint is not supported: the outline is one piece",
             {"mechanism.beams.b3.start_joint": "pin"},
         ),
     ],

@@ -188,7 +188,7 @@ LONG = "1" * 401
     ("shape", "key", "words"),
     [
         ("{kind: polynomial, coefficients: [0 deg, 1e12 deg]}", "coefficients.1", "at most 10000 turns of 360 deg"),
-        ("{kind: polynomial, coefficients: [0 deg, 3e6 deg]}", "coefficients", "at most 1000 are computed with"),
+        ("{kind: polynomial, coefficients: [0 deg, 3e6 deg]}", "coefficients", "at most 1000 are supported"),
         ("{kind: polynomial, coefficients: [" + "1 deg, " * 10_000 + "1 deg]}", "coefficients", "at most 10000 may be"),
         ("{kind: arc, sweep: 1e12 deg}", "sweep", "at most 10000 turns of 360 deg"),
         ("{kind: arc, sweep: -3e6 deg}", "sweep", "must be >= -360000 deg and <= 360000 deg"),

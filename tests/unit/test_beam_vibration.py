@@ -189,5 +189,5 @@ def test_a_drive_that_turns_has_nothing_across():
     turned = ("{kind: displacement, node: tip, direction: -90 deg}", "{kind: rotation, node: tip}")
     travel = ("travel: 100 mm", "travel: 10 deg")
     assert cfmkit.analyze(cantilever(turned, travel)).values["cross_stiffness"].value is None
-    with pytest.raises(SpecError, match="no axis to be across of"):
+    with pytest.raises(SpecError, match="no direction, and so no stiffness across it"):
         cantilever(turned, travel, ("points: 21", "points: 21\n  outputs: {cross_stiffness: true}"))

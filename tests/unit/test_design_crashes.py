@@ -40,7 +40,7 @@ def broken(*_: Any, **__: Any) -> Any:
 def test_a_design_all_of_whose_starts_crash_ends_as_a_bug(name: str, changes: list[str]) -> None:
     report = compute(cfmkit.load(CONFIGS / f"{name}.yaml", changes), Run(executor=all_lost))
     assert report.exit_code is ExitCode.BUG
-    assert report.message == f"no start came to an end: {FAULT}"
+    assert report.message == f"no start was completed: {FAULT}"
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,7 @@ def test_what_happens_on_the_finest_cuts_is_not_looked_into_for_hours(code: int)
     move = decided(problem, Leg(code, trail, problem.solver.rest()), False)
     assert isinstance(move, Stop)
     assert move.trail.ending.status is PathStatus.LOST
-    assert "too thin" in move.trail.ending.message
+    assert "too slender" in move.trail.ending.message
 
 
 def test_beams_that_lose_stability_are_not_cut_into_more_segments_than_can_be_looked_into() -> None:

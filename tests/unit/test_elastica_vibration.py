@@ -292,7 +292,7 @@ def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> Non
 
 def test_masses_must_be_known_and_positive() -> None:
     path = under(1e-9, beam())
-    with pytest.raises(InputError, match="no density is given of the beams x"):
+    with pytest.raises(InputError, match="no density is given for the beams x"):
         frequencies(path, NetworkMasses({}), 1)
     with pytest.raises(InputError, match="'there', which is not a node"):
         frequencies(path, NetworkMasses({"x": 1.0}, {"there": (1.0, 0.0)}), 1)
@@ -306,5 +306,5 @@ def test_masses_must_be_known_and_positive() -> None:
 
 def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cfmkit.elastica.vibration.stiffness_and_mass_matrices._MOST", 20)
-    with pytest.raises(InputError, match="unknowns, more than 20: beams wind or are taut"):
+    with pytest.raises(InputError, match="unknowns, more than 20: the beams have too many windings or too much"):
         frequencies(under(1e-9, beam()), WHOLE, 3)

@@ -188,7 +188,7 @@ def test_a_single_cycle_that_was_broken_off_is_measured_with_a_warning():
     source = measured(looped(motion[:300]), None)
     assert len(source.raw) == 1
     assert source.warnings[0].name == "unfinished_cycle"
-    assert "covers 49 % of the longer one only" in source.warnings[0].message
+    assert "covers only 49 % of the longer one" in source.warnings[0].message
 
 
 @pytest.mark.parametrize(("gap", "found"), [(1.0, []), (-1.0, ["negative_loop"]), (0.01, []), (-0.01, [])])

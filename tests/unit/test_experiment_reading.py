@@ -126,7 +126,8 @@ BAD = {
     "no travel": (csv_text(change=lambda i, cells: [cells[0], "3", cells[2]]), "the displacement is the same"),
     "time goes back": (csv_text(change=at(8, 0, "0.1")), "line 10: the time goes back from 0.7 s to 0.1 s"),
     "no units": (
-        csv_text("t;s;F"), 'the header names no units, and they are never guessed; say --units "t=...,s=...,F=..."',
+        csv_text("t;s;F"),
+        'the header names no units, and they are never guessed; state them with --units "t=...,s=...,F=..."',
     ),
     "no header": (rows(COLUMNS), 'say --units "1=...,2=...,3=..."'),
     "force in volts": (csv_text("t [s];s [mm];F [V]"), "no column for the force among 't' [s], 's' [mm], 'F' [V]"),

@@ -72,7 +72,7 @@ def test_a_branch_that_does_not_cover_the_window_has_no_value_and_says_what_it_c
     found = measure(short, BARE, Window(0.01, 0.2))
     assert found["force_mean[load]"].value == 1
     assert found["force_mean[unload]"].value is None
-    assert found["force_mean"].reason == "branch 'unload' covers 50 ... 200 mm only"
+    assert found["force_mean"].reason == "branch 'unload' covers only 50 ... 200 mm"
 
 
 def test_a_window_needs_a_width():

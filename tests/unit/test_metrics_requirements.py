@@ -42,8 +42,8 @@ def problems(kind="force", **entry):
         ({"metric": "spring_elongaton", "max": "5 mm"}, "metric", "did you mean 'spring_elongation'?"),
         ({"metric": "qqq", "max": 1}, "metric", "`cfmkit show metrics` lists them"),
         ({"metric": "torque_mean", "max": "5 N"}, "metric", "on a force curve; did you mean 'force_mean'?"),
-        ({"metric": "hysteresis_area[load]", "max": "5 N*mm"}, "metric", "not a matter of one branch"),
-        ({"metric": "spring_elongation[load]", "max": "5 mm"}, "metric", "not a matter of one branch"),
+        ({"metric": "hysteresis_area[load]", "max": "5 N*mm"}, "metric", "does not refer to a single branch"),
+        ({"metric": "spring_elongation[load]", "max": "5 mm"}, "metric", "does not refer to a single branch"),
         ({"metric": "force_ripple", "max": "5 N"}, "max", "'5 N' is a force; a ratio is needed"),
         ({"metric": "force_mean", "min": "5"}, "min", "no unit"),
         ({"metric": "usable_stroke", "min": "5 deg"}, "min", "a length is needed"),
@@ -151,7 +151,7 @@ def test_a_ratio_is_shown_as_its_bound_is_written():
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ({"metric": "force_mean", "min": "1 N", "over": ["0 mm", "300 mm"]}, "branch 'load' covers 0 ... 200 mm only"),
+        ({"metric": "force_mean", "min": "1 N", "over": ["0 mm", "300 mm"]}, "branch 'load' covers only 0 ... 200 mm"),
         ({"metric": "deviation_from_target", "max": "5 %"}, "there is no target"),
         ({"metric": "force_mean[up]", "min": "1 N"}, "there is no branch 'up'; there are 'load', 'unload'"),
     ],

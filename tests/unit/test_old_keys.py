@@ -86,5 +86,5 @@ def test_a_requirement_on_the_yield_is_content_with_tolerances_under_an_old_name
     made = tolerances_of(spec, spec.design, 0)
     assert made.paths
     unsaid = OLD_TOLERANCES[name][:-1]
-    with pytest.raises(SpecError, match=r"say with 'design\.tolerances' how they are made"):
+    with pytest.raises(SpecError, match=r"state their tolerances in 'design\.tolerances'"):
         cfmkit.load(file, [*unsaid, asked])

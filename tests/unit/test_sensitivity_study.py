@@ -147,9 +147,9 @@ def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
     assert "indices.csv" not in written
     assert done[0] < points_of("sobol", 32, 3, 2)
     assert len(written["results.csv"].splitlines()) == 1 + done[0]
-    assert message(found).endswith("run the same command again to go on")
+    assert message(found).endswith("run the same command again to continue")
     assert message(dataclasses.replace(found, fresh=True)).endswith(
-        "run the same command again without --fresh to go on"
+        "run the same command again without --fresh to continue"
     )
     assert as_json(found)["status"] == "interrupted"
 

@@ -180,7 +180,7 @@ def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted()
 @pytest.mark.parametrize(
     ("block", "reported"),
     [
-        ({"angle_travel": "1 deg"}, "are of an 'adjustment'"),
+        ({"angle_travel": "1 deg"}, "apply only to an 'adjustment'"),
         ({"adjustment": "1 N"}, "needs either 'anchor_travel' or 'angle_travel'"),
         ({"adjustment": "1 N", "angle_travel": "1 deg", "anchor_travel": "1 mm"}, "needs either"),
         ({"adjustment": "1 N", "anchor_travel": "1 mm"}, "add 'slider' to 'springs'"),

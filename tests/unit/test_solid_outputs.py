@@ -87,5 +87,5 @@ def test_the_material_around_a_point_tells_its_motion_and_its_turn():
 
 
 def test_a_stiffness_across_is_refused_of_a_solid():
-    with pytest.raises(SpecError, match=r"analysis\.outputs\.cross_stiffness is not known to it"):
+    with pytest.raises(SpecError, match=r"analysis\.outputs\.cross_stiffness is not supported"):
         cfmkit.loads(VEE).replace({"analysis.outputs.cross_stiffness": True})

@@ -206,7 +206,7 @@ def test_a_compression_spring_is_not_pressed_beyond_its_turns(block, largest):
 
 def test_of_what_misses_the_nearest_three_are_told():
     misses = [Miss(f"s{k}", share, f"by {share}") for k, share in enumerate((0.5, 0.1, 0.3, 0.2))]
-    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses more"
+    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 other misses by more"
 
 
 def test_a_design_with_the_generic_series_is_written_and_read_again(tmp_path):
@@ -334,8 +334,8 @@ def test_free_lengths_are_chosen_for_the_springs_that_can_be_had():
     [
         ({"travel": None}, "are picked for a window"),
         ({"objective": "least-squares"}, "remove 'objective'"),
-        ({"slack": "1 %"}, "'slack' needs rates of any value"),
-        ({"catalogue": None, "spring_room": "40 mm"}, "'spring_room' is of springs that are picked"),
+        ({"slack": "1 %"}, "'slack' needs freely chosen rates"),
+        ({"catalogue": None, "spring_room": "40 mm"}, "'spring_room' applies only to springs picked"),
     ],
 )
 def test_what_a_catalogue_does_not_go_with_is_refused(changes, reported):

@@ -213,7 +213,7 @@ def test_a_disk_that_fails_from_some_change_on_leaves_whole_files_and_one_set_fo
             assert which_set(out) == "new"
         else:
             assert isinstance(error, OutputError)
-            half_way += "the next run into it puts it right" in str(error)
+            half_way += "the next run into it repairs it" in str(error)
         label = recovered_set(out, tidy=False)
         assert label == "new" if error is None else label in ("old", "new")
     assert half_way > 0

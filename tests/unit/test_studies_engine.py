@@ -340,7 +340,7 @@ def test_the_default_columns_are_every_metric_that_such_a_curve_can_have():
 
 @pytest.mark.parametrize("name", ["force_riple", "torque_mean", "hysteresis_area[load]"])
 def test_an_unknown_metric_is_refused(name):
-    with pytest.raises(UsageError, match=r"no metric|not a matter of one branch"):
+    with pytest.raises(UsageError, match=r"no metric|does not refer to a single branch"):
         metrics_of(SPEC, (name,))
 
 

@@ -505,7 +505,7 @@ def test_a_torque_whose_springs_are_wider_than_the_linkage_is_refused():
 def test_an_angle_that_no_crank_turns_with_its_springs_is_refused_before_any_design():
     _, refused = torque_offer("100 N*mm", "200 deg", "[300 mm, 300 mm]")
     assert not refused.candidates
-    assert "drive no crank one way over 200 deg" in refused.reason
+    assert "no springs turn a crank in one direction over 200 deg" in refused.reason
 
 
 def test_springs_for_a_torque_are_the_flattest_of_those_that_fit():

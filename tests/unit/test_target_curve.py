@@ -243,7 +243,7 @@ def test_a_window_that_the_curve_does_not_cover_has_no_deviation():
     result = cfmkit.analyze(cam(RISING).replace({"analysis.target": {"points": ((0.0, 1.0), (0.01, 2.0))}}))
     found = evaluate(result)["deviation_from_curve"]
     assert found.value is None
-    assert "covers 0 ... 10 mm only" in found.reason
+    assert "covers only 0 ... 10 mm" in found.reason
 
 
 def test_without_a_curve_there_are_no_metrics_of_one_and_a_requirement_says_why():

@@ -97,7 +97,7 @@ def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):
         swept = api.sweep(spec, vary={"mechanism.bistable.width": spec.mechanism.bistable.width * np.ones(1)})
         assert ("overstressed" in (swept.table["warnings"][0] or "")) is reported
     main(["analyze", str(CONFIGS / "vcfm_pla.yaml"), "--no-plots", "-o", str(tmp_path / "out")])
-    assert "(this model overrates the stress by up to" in " ".join(capsys.readouterr().out.split())
+    assert "(this model overestimates the stress by up to" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize("name", ["not_flat", "overload", "measured_contradiction"])
@@ -211,7 +211,7 @@ def test_no_constant_force_is_stated_where_the_curve_is_not_flat_at_it(changes):
     assert "not_flat" in names(found)
     flat, none = found.values["window_force"], found.values["constant_force"]
     assert none.value is None
-    assert "without being flat" in none.reason
+    assert "but the curve is not flat there" in none.reason
     inside = (found.curve.motion >= found.values["window_start"].value) & (
         found.curve.motion <= found.values["window_end"].value
     )
@@ -383,7 +383,7 @@ def test_leaves_too_thin_to_be_traced_are_said_to_be():
     about = (*leaf(thickness="1e-6 mm"), "analysis.fidelity=exact", "requirements=[]")
     found = analyzed(*about, preloads="[0 mm, 2.5 mm]")
     assert found.status is Status.NO_EQUILIBRIUM
-    assert "the leaves were followed to 0 mm only" in found.message
+    assert "the leaves were followed only to 0 mm" in found.message
     assert "'mechanism.bistable.thickness'" in found.message
 
 

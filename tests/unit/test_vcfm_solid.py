@@ -121,7 +121,7 @@ def test_what_is_solved_is_a_part_of_what_is_drawn(leaf, positive):
 @pytest.mark.parametrize(
     ("change", "reported"),
     [
-        ("mechanism.bistable.waviness=0.1 mm", "does not know it: leaves are as drawn"),
+        ("mechanism.bistable.waviness=0.1 mm", "does not support it: leaves are as drawn"),
         ("analysis.branch=primary", "follows the stable branch only"),
     ],
 )

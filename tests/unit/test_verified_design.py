@@ -51,7 +51,7 @@ def test_a_design_that_cannot_be_a_solid_is_refused_in_a_sentence():
     spec = cfmkit.load("configs/cam.yaml")
     found = verified(spec, Design(spec, Status.COMPLETE), Run())
     assert found.status is Status.INVALID
-    assert found.message.startswith("design.verify: this design cannot be a solid")
+    assert found.message.startswith("design.verify: this design cannot be analysed as a solid")
 
 
 def test_no_design_stays_no_design():

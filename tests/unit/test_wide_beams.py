@@ -48,7 +48,7 @@ def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
     (one,) = reported(DING, wide, "analysis.preloads=[0 mm]")
     assert "4.74 % more energy in the leaves at 4.263 mm" in one.message
     assert "only 'analysis.fidelity: exact' accounts for it" in one.message
-    with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
+    with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form includes it"):
         changed(DING, wide, "mechanism.wide_beams=true")
 
 

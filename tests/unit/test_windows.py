@@ -92,7 +92,7 @@ def test_shares_are_of_the_travel_requested_where_a_curve_ends_early():
     (reported,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
     assert "analysis.window and requirements.0.over: the window 150 ... 300 mm" in reported.message
     assert (
-        "ends before the requested travel does (0 ... 300 mm): metrics are those over 150 ... 240 mm"
+        "ends before the requested travel does (0 ... 300 mm): metrics are taken over 150 ... 240 mm"
         in reported.message
     )
     (outcome,) = cfmkit.check(result)

@@ -74,7 +74,7 @@ def test_a_yield_that_the_modulus_rules_out_is_said_to_be_so_with_what_to_do():
     assert one.near, one.missed or one.message
     assert not one.movable
     # 1 - 0.975/1.025 of 4 GPa, out of 1.6 to 4 GPa
-    assert "no shape gets beyond 8.13 %" in one.missed[0]
+    assert "no shape exceeds 8.13 %" in one.missed[0]
     for words in ("once the modulus is measured", "after a trim", "1600 MPa to 4000 MPa", "cfmkit calibrate"):
         assert words in one.missed[0]
 
@@ -121,7 +121,7 @@ def test_what_margins_do_not_reach_names_the_largest_yield_and_the_costliest_tol
     assert found.near
     assert not found.movable
     assert found.numbers["yield"] == 0.58
-    assert found.missed[0].startswith("yield 58 %; margins reach no more")
+    assert found.missed[0].startswith("yield 58 %; design margins cannot improve it further")
     assert "mechanism.bistable.thickness costs most" in found.missed[0]
 
 

@@ -92,7 +92,7 @@ def _verb(name: str, path: str) -> str:
 
 
 def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
-    """Return what became of examples that were run in a folder that is gone afterwards, the quick ones first."""
+    """Return the outcome of examples that were run in a folder that is gone afterwards, the quick ones first."""
     from tempfile import TemporaryDirectory
 
     from cfmkit.cli.progress import watching

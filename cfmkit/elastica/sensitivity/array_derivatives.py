@@ -269,7 +269,7 @@ class ComplexSteps:
         Raises
         ------
         cfmkit.errors.InputError
-            If a variable changes how the network is made up, not only its values.
+            If a variable changes the make-up of the network, not only its values.
         """
         if self.plain is not None:
             return in_order(self.plain.arrays(cut, every))

@@ -437,7 +437,7 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
     Raises
     ------
     cfmkit.errors.InputError
-        If a variable changes how the network is made up, moves a corner of a beam and a step of its thickness past
+        If a variable changes the make-up of the network, moves a corner of a beam and a step of its thickness past
         each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
     """
     from cfmkit.elastica.sensitivity.array_derivatives import ComplexSteps

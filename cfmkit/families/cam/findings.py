@@ -277,7 +277,7 @@ def _contact(solution: Solution) -> Iterator[Finding]:
 
 
 def _lift_off(solution: Solution) -> Iterator[Finding]:
-    """Yield where weight across the slider's way pulls the lower roller off the cam."""
+    """Yield where weight across the slider's travel pulls the lower roller off the cam."""
     loads = solution.assembly.loads
     beside = abs(loads.sideways[0])
     if beside and beside > float(spring_force(solution.states, loads)[0]):

@@ -249,8 +249,8 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
         raise CannotBuild(
             finding(
                 "design_singular",
-                f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
-                f"{p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
+                f"a profile cut for a friction of {law.friction:g} does not rise at its start: |friction| must stay "
+                f"below {p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
             )
         )
 

@@ -37,7 +37,7 @@ DRAWN = 60_000
 """Proportions that are looked at."""
 
 OFFERED = 16
-"""Designs that are worth being made."""
+"""Designs that are worth trying."""
 
 TAB, TOP, HOLE = 0.06, 0.02, 0.0066
 """Height of the plate's tab and of its margin above the flanks over that of the room; largest fixing hole [m]."""

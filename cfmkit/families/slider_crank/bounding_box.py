@@ -21,11 +21,11 @@ POSES = 13
 """Places of the motion at which a printed part is looked at."""
 
 PLATES = 3
-"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's way."""
+"""Sheets above each other: crank, coupler, and the ground that carries the pivot and the slider's path."""
 
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism, along the slider's way and across it; None where nothing was solved."""
+    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved."""
     if result.state is None or result.spec.fidelity == "solid":
         return None
     return _linkage(result) if result.spec.fidelity == "prb" else _part(result)

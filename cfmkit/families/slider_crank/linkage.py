@@ -32,7 +32,7 @@ class Linkage:
     crank, coupler : float
         r1 and r2 [m].
     offset : float
-        e, height of the slider's way above the pivot; either sign [m].
+        e, height of the slider's path above the pivot; either sign [m].
     branch : int
         1: the slider is to the right of the crank pin, x = r1 cos t + a; -1: to its left.
     """
@@ -44,7 +44,7 @@ class Linkage:
 
     @property
     def assemblable(self) -> bool:
-        """Whether crank and coupler reach the slider's way at all [LH, eq. 1]: this is not a full turn yet."""
+        """Whether crank and coupler reach the slider's path at all [LH, eq. 1]: this is not a full turn yet."""
         return abs(self.offset) < self.crank + self.coupler
 
     @property
@@ -76,7 +76,7 @@ class Linkage:
         return math.sqrt((reach - self.offset) * (reach + self.offset))
 
     def way(self, angle: float) -> tuple[float, float]:
-        """Return the ends of the slider's way around the place it has at a crank angle [m], seen to the right.
+        """Return the ends of the slider's path around the place it has at a crank angle [m], seen to the right.
 
         Distances along the way from the pivot's foot; of the left branch those of its mirror image. From stretched
         to folded on one side of the foot; where the offset is too large to fold, stretched on either side.
@@ -108,7 +108,7 @@ class Linkage:
     def arc(self, angle: float) -> tuple[float, float]:
         """Return the ends of the crank angles that can be reached from `angle` [rad]; infinite for a full turn.
 
-        At a finite end the coupler stands across the slider's way: a dead point of the slider's drive.
+        At a finite end the coupler stands across the slider's path: a dead point of the slider's drive.
         """
         if self.turns_fully:
             return -math.inf, math.inf
@@ -125,7 +125,7 @@ class Linkage:
         return abs(self.crank * math.sin(angle) - self.offset) <= self.coupler
 
     def mirrored(self) -> Linkage:
-        """Return the mirror image about a line across the slider's way: the other branch, with angles pi - t."""
+        """Return the mirror image about a line across the slider's path: the other branch, with angles pi - t."""
         return Linkage(self.crank, self.coupler, self.offset, -self.branch)
 
     def coupler_angle(self, angle: FloatArray) -> FloatArray:

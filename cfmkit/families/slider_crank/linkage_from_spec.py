@@ -51,7 +51,7 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
     Raises
     ------
     CannotBuild
-        If crank and coupler do not reach the slider's way.
+        If crank and coupler do not reach the slider's path.
     """
     branch = 1 if mechanism.branch == "right" else -1
     linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)

@@ -47,7 +47,7 @@ SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
 """Sizes that are tried, over the largest that the room allows."""
 
 PADS = (0.031, 0.040)
-"""What the pads at both ends of a printed part add across the slider's way and along it [m]: twice their length, and
+"""What the pads at both ends of a printed part add across the slider's path and along it [m]: twice their length, and
 the corners of the inclined one."""
 
 PAIR_GAP = (0.1, 4e-3)
@@ -109,7 +109,7 @@ def _of_force(wish: Wish) -> FamilyOffer:
 
 
 def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
-    """Return the room that a linkage needs across and along the slider's way [m]."""
+    """Return the room that a linkage needs across and along the slider's path [m]."""
     pin = crank * np.sin(lengths.unloaded)
     across = max(lengths.offset * crank, pin) + PADS[0] * pads + 2.0 * EYE_SHARE * crank * (not pads)
     along = lengths.stretched * crank + PADS[1] * pads + 2.0 * EYE_SHARE * crank * (not pads)

@@ -68,7 +68,7 @@ def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
 
     Differences from the unloaded position are formed without cancellation. NaN where the
-    linkage does not reach; infinite where the coupler stands across the slider's way.
+    linkage does not reach; infinite where the coupler stands across the slider's path.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def slider_forces(linkage: Linkage, unloaded: float, side: int, travel: FloatArr
 
 @dataclass(frozen=True)
 class _SliderState:
-    """Places on the slider's way: knee angle, x, q of the four joints, and sine and cosine of the knee angle."""
+    """Places on the slider's path: knee angle, x, q of the four joints, and sine and cosine of the knee angle."""
 
     knee: FloatArray
     position: FloatArray

@@ -147,7 +147,7 @@ def _stresses(solution: Solution) -> dict[str, float | None]:
 def _why_not_constant(solution: Solution) -> str:
     """Return why no single force stands for the curve."""
     if solution.spring_alone is None:
-        return "there is no position at which the leaves carry nothing and the spring alone gives the force"
+        return "the leaves carry a force where they are flat, or the spring has no constant stiffness"
     flat = solution.window_force
     found = "" if flat is None else f"; its flat part is at {newton(flat)}"
     return (

@@ -160,7 +160,7 @@ class Solution(ShortRepr):
 
     @property
     def overrating(self) -> float:
-        """By what share the model overrates the stress of the leaves at most, where that is known; else zero."""
+        """By what share the model overestimates the stress of the leaves at most, where that is known; else zero."""
         closed = isinstance(self.parts.leaf, VBeam) and self.spec.analysis.fidelity == "analytic"
         return float(overrated(self.parts.strip.angle)) if closed else 0.0
 

@@ -119,7 +119,7 @@ def correlations(block: Sensitivity, paths: Sequence[str]) -> FloatArray:
     Raises
     ------
     Incompatible
-        If no parts can be correlated so.
+        If the correlations are impossible together.
     """
     return correlation_matrix(len(paths), groups(block, paths))
 

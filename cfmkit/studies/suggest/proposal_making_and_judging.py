@@ -77,7 +77,7 @@ class Proposal:
         Why nothing came of it.
     numbers : mapping of str to float or None
         In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
-        ``life`` (cycles), ``yield`` (share of made parts that are good, where one is wished),
+        ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished),
         ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
@@ -230,7 +230,7 @@ def _tried(moved: Moved | None, obstacle: str) -> str:
     if moved is None:
         return "no value of the design may change to improve it"
     reported = f"design margins cannot improve it further, and the tolerance of {moved.costliest} costs most"
-    return f"{reported}; with larger changes it misses another requirement: {obstacle}" if obstacle else reported
+    return f"{reported}; larger changes make it fail otherwise: {obstacle}" if obstacle else reported
 
 
 def _seconds(clock: Clock) -> float:

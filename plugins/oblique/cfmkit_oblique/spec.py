@@ -25,7 +25,7 @@ class Coil(Model):
 class Mechanism(Model):
     """A slider between two anchors."""
 
-    half_span: PositiveLength = Field(description="from the slider's way to either anchor")
+    half_span: PositiveLength = Field(description="from the slider's path to either anchor")
     oblique: Coil = Field(description="each of the two springs from an anchor to the slider")
     vertical: Coil = Field(description="the spring below the slider")
 

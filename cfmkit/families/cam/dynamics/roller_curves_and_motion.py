@@ -63,11 +63,11 @@ class Machine:
     stiffness, rest_length : float
         Of all springs together, between the axes of the rollers [N/m, m].
     gravity : float
-        Acceleration against the slider's way up; 0 switches weight off [m/s^2].
+        Acceleration against the slider's travel up; 0 switches weight off [m/s^2].
     friction : float
         Rolling resistance over roller radius.
     sideways : float
-        Acceleration across the slider's way, to the right, with which weight acts [m/s^2].
+        Acceleration across the slider's travel, to the right, with which weight acts [m/s^2].
     """
 
     right: Side

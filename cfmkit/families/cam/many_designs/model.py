@@ -89,7 +89,7 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
 def _answer(
     spec: CamSpec, block: Block, designs: Designs, slabs: Iterable[tuple[NDArray[np.intp], Slab]]
 ) -> BlockAnswer:
-    """Return what is asked, from designs that are worked on together: their places, and the designs."""
+    """Return what is requested, from designs that are worked on together: their places, and the designs."""
     done = np.zeros(block.size, dtype=bool)
     values = [_empty(measure.name, block.size) for measure in block.measures]
     warnings: dict[str, NDArray[np.bool_]] = {}

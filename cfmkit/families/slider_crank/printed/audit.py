@@ -68,7 +68,7 @@ def judge(
     limits: tuple[float | None, float | None],
     pins: FloatArray,
 ) -> FinishedStrip | None:
-    """Return what became of a strip; None if it has no equilibrium over its travel, or breaks its band at once.
+    """Return the outcome of a strip; None if it has no equilibrium over its travel, or breaks its band at once.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_SHARE = 0.35
-"""Travel where none is requested, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
+"""Travel where none is requested, in lengths of the slider's path from the pivot: that of [B, sec. 2.1]."""
 
 _NAMES = {
     PressingEnd.LIMIT_POINT: "limit_point",

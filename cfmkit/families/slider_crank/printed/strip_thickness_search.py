@@ -268,7 +268,7 @@ def search(
     Returns
     -------
     FoundStrip or Design
-        Why there is none, where no start came to an end.
+        Why there is none, where no start was completed.
     """
 
     def tell(records: Mapping[int, Any]) -> None:

@@ -395,7 +395,7 @@ def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     wanted = solved.task.wanted
     extra = max(wanted.slack, NEGLIGIBLE)
     cure = "" if wanted.slack else "; 'design.slack' and 'design.prefer' choose among them"
-    text = f"many designs have a deviation at most {100 * extra:.2g} % larger: {'; '.join(reported)}{cure}"
+    text = f"many designs deviate by at most another {100 * extra:.2g} % of the target: {'; '.join(reported)}{cure}"
     return (finding("near_optima", text),)
 
 

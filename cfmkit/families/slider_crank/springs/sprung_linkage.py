@@ -291,7 +291,7 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
     Returns
     -------
     coupler, guide : (n,) array
-        Tension in the coupler, and force on the guide across the slider's way (positive
+        Tension in the coupler, and force on the guide across the slider's path (positive
         upwards) [N]; for the rates and the drive given, so of all legs together or of one.
     """
     link, rates, turn = assembly.linkage, assembly.rates, units.turn

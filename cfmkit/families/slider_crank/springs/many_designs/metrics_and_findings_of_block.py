@@ -48,7 +48,7 @@ SLAB = 400_000
 
 
 def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
-    """Return what is asked about many sets of springs; None where something else is varied or asked.
+    """Return what is requested about many sets of springs; None where something else is varied or requested.
 
     Parameters
     ----------
