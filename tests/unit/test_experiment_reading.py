@@ -129,8 +129,10 @@ BAD = {
         csv_text("t;s;F"),
         'the header names no units, and they are never guessed; state them with --units "t=...,s=...,F=..."',
     ),
-    "no header": (rows(COLUMNS), 'say --units "1=...,2=...,3=..."'),
-    "force in volts": (csv_text("t [s];s [mm];F [V]"), "no column for the force among 't' [s], 's' [mm], 'F' [V]"),
+    "no header": (rows(COLUMNS), 'state them with --units "1=...,2=...,3=..."'),
+    "force in volts": (
+        csv_text("t [s];s [mm];F [V]"), "no column for the force was found among 't' [s], 's' [mm], 'F' [V]",
+    ),
     "two displacements": (
         "a [mm];b [mm];F [N]\n" + rows(COLUMNS), "2 columns could be the displacement: 'a' [mm], 'b' [mm]; choose with",
     ),

@@ -414,7 +414,7 @@ def test_a_part_that_is_missing_is_refused_with_its_name() -> None:
 
 
 def test_shares_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(cfmkit.SpecError, match="places 2 thicknesses"):
+    with pytest.raises(cfmkit.SpecError, match="gives the positions of 2 thicknesses"):
         spec("strip", "mechanism.beam.shares=[[0.2, 0.8], [], [], [], []]")
     result = api.analyze(spec("tapered", "mechanism.beam.centreline=[[0 mm, 0 mm], [105 mm, 63 mm]]"))
     assert result.status is Status.INVALID

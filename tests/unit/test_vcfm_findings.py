@@ -88,7 +88,7 @@ def test_a_stress_that_is_too_high_from_the_first_point_on_passes_no_limit_there
 
 
 def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):
-    """The closed form overrates the stress of leaves by up to 0.75 % at 7 deg, and that of the spring by nothing."""
+    """It overestimates the stress of leaves by up to 0.75 % at 7 deg, and that of the spring by nothing."""
     spring = cfmkit.load(CONFIGS / "vcfm_pla_adjustable.yaml", ["mechanism.material.yield_strength=29.56 MPa"])
     for spec, reported in ((spring, True), (cfmkit.load(CONFIGS / "vcfm_pla.yaml"), False)):
         found = api.analyze(spec)

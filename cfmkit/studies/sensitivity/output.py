@@ -118,7 +118,7 @@ def message(found: Findings) -> str:
     if found.interrupted:
         of = f"{evaluator.missing} of {evaluator.count + evaluator.missing} samples"
         again = "run the same command again without --fresh" if found.fresh else "run the same command again"
-        return f"{reported}; interrupted: {of} were not computed; {again} to go on"
+        return f"{reported}; interrupted: {of} were not computed; {again} to continue"
     if evaluator.failed:
         reported += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
     if found.unstated:
