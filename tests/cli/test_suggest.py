@@ -79,7 +79,7 @@ def test_a_proposal_whose_files_were_not_made_in_time_is_named(capsys):
     page = list(_page(data | {"families": [], "warnings": []}, written, False))
     notes = [block.text for block in page if isinstance(block, Paragraph) and block.word == "note"]
     assert len(notes) == 1
-    assert "written of 1-cam-2-springs:" in notes[0]
+    assert "the time ran out: of 1-cam-2-springs only design.yaml was written" in notes[0]
 
 
 def test_a_wish_beyond_everybody_ends_with_4_and_a_reason_from_each_family(tmp_path):
