@@ -38,6 +38,8 @@ _PAUSE = 0.02
 
 _SHORTEST_PAUSE = 12
 _JITTERS = 8.0
+"""Standard deviations of the jitter up to a reversal: either end may be off by four, as one value in 16 000 is."""
+
 _FEWEST = 4
 
 

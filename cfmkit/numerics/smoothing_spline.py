@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 FEWEST = 5
+"""What scipy's smoothing spline needs."""
+
 _STIFFEST, _SOFTEST = 6.0, -14.0
 """Decades of lambda, for data scaled to unit spacing, between which the spline is sought."""
 

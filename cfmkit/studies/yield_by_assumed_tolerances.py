@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.stated_or_assumed_tolerances import Assumed
 
 PARTS = 4000
+"""The standard error of a share is then 0.8 % at most."""
 
 PROPORTIONAL = 1e-3
 """To this share a force goes with the modulus; differences are as good as that."""

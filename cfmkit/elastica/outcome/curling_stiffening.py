@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.outcome.sections import Sampler, Sections
 
 _STEP = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 
 @dataclass(frozen=True)

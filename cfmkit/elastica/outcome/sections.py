@@ -26,6 +26,7 @@ _TIGHT = (
 _CLOSED = np.array([989, 5888, -928, 10496, -4540, 10496, -928, 5888, 989]) / 28350  # Newton-Cotes on nine rows
 
 _STEP = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 X, Y, TURN, MOMENT, H, V, ENERGY = range(7)
 

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 
 STEP = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
+
 _WHOLE = ("place_dof", "slot", "load_place", "load_follows", "spring_place", "spring_kind", "beam_end")
 _MOVING = {
     "origin": "place_origin",

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.outcome.path import Path
 
 _STEP = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
+
 _ITERATIONS = 40
 """Of Newton's method: up to 5 on a V-beam and Lan's network, 8 on a cantilever bent by six tenths of its length. Early
 steps are cut to 0.3 rad, so that forty reach 12 rad: nearly two revolutions."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 BAND = 0.05
+"""Share of F_d by which the force may differ from it: the range begins at 0.95 F_d [Lan, sec. 2]."""
 
 
 DEFINITIONS = {
@@ -166,6 +167,8 @@ def _stress_reaches(solution: OnCurve, allowable: float) -> float | None:
 
 
 _ROUNDS = 4
+"""Lan's mechanism (`configs/beam_lan2010.yaml`) needs three."""
+
 _SETTLED = 1e-11  # of the travel: a place that moves by less is known
 
 

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 
 _NOTHING = 1e-15
+"""Share of the largest displacement: a few units in the last place, as of the cosine of 90 deg."""
+
 _POSES = 7
 _FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 

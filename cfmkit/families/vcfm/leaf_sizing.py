@@ -40,6 +40,7 @@ MIDDLE = 0.84
 """Part of the linear region over which the widths are fitted to the force."""
 
 RESCALES = 4
+"""Two do for the shipped mechanisms."""
 
 ROUNDS = 40
 """Of iterations that end after five, since forces and stresses are powers of the sizes within a few per cent."""

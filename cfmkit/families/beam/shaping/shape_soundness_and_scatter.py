@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 POSES = 61
 STRICT = 0.05
+"""Of the largest force: the strict range is that of `cfmkit analyze`, (max - min) <= 5 % of max."""
+
 _JOINED = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
 
 

@@ -112,6 +112,8 @@ class Shaping(DesignProgram):
 
 LEAST_MIDDLE = 1e-3
 _FINER = 3
+"""A whole number, so that the points at which the force is solved are among the finer ones."""
+
 WEIGHT = 10.0
 """On the half band: a solver that begins with the identity for the Hessian takes too small a slope for none."""
 

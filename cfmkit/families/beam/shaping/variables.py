@@ -98,6 +98,7 @@ _U, _W = np.polynomial.legendre.leggauss(24)
 _U, _W = 0.5 * (_U + 1), 0.5 * _W
 
 _TINY = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
 
 @dataclass(frozen=True)

@@ -247,6 +247,8 @@ def multibody_history(
 
 
 BISECTIONS = 60
+"""They leave 1e-18 of a step in time: less than rounding."""
+
 ROUNDING = 1e-9
 """A contact force below zero by this part of the largest is rounding: springs at rest press with nothing."""
 

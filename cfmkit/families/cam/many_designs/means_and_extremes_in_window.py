@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     """Where the window of each cam starts and ends, (d,) each [m]; None: the whole travel."""
 
 _SLACK = 1e-9
+"""Share of a window: places that are so near to its ends are at them, but for rounding."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,6 +92,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray, side: int =
 
 
 _ROUNDS = 8
+"""`configs/slider_crank_lumped.yaml` needs four; a fixed width may take four times as many."""
 
 _POINTS = 40
 

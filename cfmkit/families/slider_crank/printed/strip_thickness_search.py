@@ -83,6 +83,7 @@ GUESS = 1e-3
 """Thickness of one that is searched, at first [m]."""
 
 _ROUNDS, _CLOSE = 12, 1e-10
+"""Steps at most, of which strips of the shipped specifications need four to six, and how near the last two lie."""
 
 
 @dataclass(frozen=True)

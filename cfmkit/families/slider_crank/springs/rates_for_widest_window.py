@@ -34,6 +34,7 @@ LAW = 0.533
 """Width of the best window over the lead of the unloaded position, for 0.5 % and small angles."""
 
 STEPS = 24
+"""Twenty halvings leave 1e-6 of a width, which ends the search; with steps by the law, the tests need ten."""
 
 CLOSE = 1.0 - 1e-4
 """A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
