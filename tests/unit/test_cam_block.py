@@ -299,6 +299,7 @@ PRESSED = {"mechanism.contact": {"width": "8 mm"}}
         (WINDOW | BARE | {"mechanism.profile.friction": 0.002}, SMALL),
         (WINDOW | HEAVY | {"mechanism.profile.slope_factor": 1.05}, AROUND),
         (WINDOW | PRESSED | {"mechanism.profile.offset": "-0.1 mm"}, AROUND),
+        (WINDOW | {"mechanism.profile.preload": "60 mm", "mechanism.springs.preload": "60 mm"}, AROUND),
         (WINDOW, AROUND | {"mechanism.brace_length": "190 mm:260 mm", "mechanism.rolling_friction": "0:0.1"}),
     ],
     ids=(
@@ -314,6 +315,7 @@ PRESSED = {"mechanism.contact": {"width": "8 mm"}}
         "friction",
         "carrying",
         "offset",
+        "stretched",
         "wide",
     ),
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cam_support import analyze, cam, design
+from cam_support import analyze, cam, design, message
 from scipy.optimize import root
 
 import cfmkit
@@ -141,6 +141,38 @@ def test_a_profile_that_hangs_down_is_cut_for_the_help_of_the_weight():
     assert found.spec.mechanism.profile.slope_factor < 1
     force = analyze(found.spec).state.up.slider[2:]
     np.testing.assert_allclose(force, 40.0, rtol=1e-9)
+
+
+def test_where_weights_help_the_slider_falls_at_first_and_the_page_says_so():
+    heavy = cam(
+        mounting="down",
+        roller_radius="5 mm",
+        springs={"stiffness": "0.69 N/mm", "count": 2},
+        masses={"slider": "0.2 kg", "brace": "0.077 kg", "roller": "3 kg"},
+    ).replace({"design": {"force": "50 N", "stroke": "100 mm", "gravity": True}})
+    found = analyze(design(heavy).spec)
+    path = found.state.assembly.profile
+    lowest = path.path.travel(np.linspace(0.068, path.end, 4001)).min()
+    assert lowest == pytest.approx(-0.4008e-3, rel=1e-3)
+    assert found.state.assembly.track.dead_point - found.state.assembly.track.start == pytest.approx(lowest, rel=1e-4)
+    assert "go down before the rollers move out, by 0.4008 mm" in message(found, "dead_point")
+    np.testing.assert_allclose(found.state.up.slider, 50.0, rtol=1e-9)
+
+
+def test_a_path_that_weights_help_is_not_designed_inside_the_roller():
+    wide = cam(
+        brace_length="100 mm",
+        rest_half_width="85.933 mm",
+        roller_radius="85 mm",
+        masses={"slider": "1 g", "brace": "0.1 g", "roller": "1 kg"},
+        mounting="down",
+        springs={"stiffness": "0.1 N/mm", "count": 2, "preload": "46.99185 mm"},
+    )
+    asked = {"force": "8.8936 N", "stroke": "31.8 mm", "gravity": True, "friction": 0.0504868, "choose": "stiffness"}
+    found = design(wide.replace({"design": asked | {"force_constant": "2.977068 mm"}}))
+    assert found.spec is None
+    assert "bent to a radius of 81.87 mm at x = 99.92 mm, inside a roller of 85 mm" in found.message
+    assert found.nearest_feasible["mechanism.roller_radius"].startswith("81.87 mm")
 
 
 def test_the_life_of_a_bearing_is_that_of_iso_281_for_its_turns_against_the_brace():

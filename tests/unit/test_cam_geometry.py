@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cam_oracles
 import numpy as np
@@ -159,6 +160,26 @@ def test_where_the_slider_rises_no_path_is_curved_more_tightly_than_at_its_start
     radius = law.curvature_radius(np.linspace(law.rest_half_width, end, 501))
     tightest = min(law.curvature_radius(law.rest_half_width), law.brace_length)
     assert radius.min() >= tightest * (1 - 1e-3)
+
+
+@SLOW
+@given(laws((0.0, 0.002, 0.05, -0.002)), st.floats(0.05, 1.4), st.floats(0.0, 0.9), st.floats(0.1, 0.99))
+def test_the_tightest_place_of_any_path_is_found(law, factor, stretched, share):
+    law = replace(law, slope_factor=factor, preload=stretched * law.rest_half_width)
+    start = law.rest_half_width
+    assume(law.frictionless(start) + law.friction > 0 and law.vertical_at > start * (1 + 1e-9))
+    end = start + share * (law.vertical_at - start)
+    place, radius = law.tightest(end)
+    assert radius == pytest.approx(law.curvature_radius(np.linspace(start, end, 4001)).min(), rel=1e-5)
+    assert radius == law.curvature_radius(place)
+    assert start <= place <= end
+
+
+def test_a_path_that_weights_help_is_curved_most_behind_its_start():
+    law = SlopeLaw(200 * MM, 20 * MM, 100 * MM, slope_factor=0.3)
+    assert law.curvature_radius(20 * MM) == pytest.approx(214.4457 * MM, rel=1e-6)
+    assert law.tightest(60 * MM) == (60 * MM, pytest.approx(152.7683 * MM, rel=1e-6))
+    assert law.tightest(80 * MM) == (80 * MM, pytest.approx(89.7383 * MM, rel=1e-6))
 
 
 @FAST

@@ -156,6 +156,17 @@ def test_a_path_cut_for_much_friction_on_the_way_down_ends_where_the_slider_woul
     assert path.travel(end) == pytest.approx(RollerPath(law, x[-1]).travel(x).max(), rel=1e-8)
 
 
+@pytest.mark.parametrize("stroke", [1.1321e-3, 2e-3])
+def test_a_path_that_weights_help_ends_at_the_stroke_or_where_the_slider_would_fall(stroke):
+    law = SlopeLaw(0.03435, 0.05973, 0.1, slope_factor=0.7526)
+    path, end = reach(law, stroke)
+    x = np.linspace(0.05973, 0.1 * (1 - 1e-9), 100_001)
+    highest = path.travel(x).max()
+    assert highest == pytest.approx(1.514e-3, rel=1e-3)
+    assert path.travel(end) == pytest.approx(min(stroke, highest), rel=1e-8)
+    assert end <= x[np.argmax(path.travel(x))] * (1 + 1e-5)
+
+
 def test_a_path_on_which_the_slider_never_rises_has_no_length():
     law = SlopeLaw(2.0, 0.1, 0.2, -0.4)
     assert law.slope(0.1) > 0

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cam_support import analyze, cam
 
 import cfmkit
 from cfmkit.errors import SpecError
@@ -34,6 +35,21 @@ def test_the_published_springs_6_4_mm_shorter_need_no_undercut(tight):
     assert found.values["spring_elongation_max"].value == pytest.approx(132.03e-3, abs=5e-6)
     up, down = ends(tight)
     assert (up[0], down[0]) == (pytest.approx(50.43, abs=5e-3), pytest.approx(49.58, abs=5e-3))
+
+
+@pytest.mark.parametrize(
+    ("mounted", "start", "radius"),
+    [({}, 954.91e-3, 565.20e-3), ({"mounting": "down", "profile__slope_factor": 0.8}, 659.41e-3, 249.42e-3)],
+)
+def test_the_largest_roller_is_that_of_the_tightest_place_wherever_that_is(mounted, start, radius):
+    """Springs that are stretched much make the start steep, and nearly straight."""
+    springs = {"stiffness": "0.69 N/mm", "count": 2, "preload": "200 mm"}
+    found = analyze(cam(rest_half_width="150 mm", springs=springs, profile__force_constant="50 mm", **mounted,
+                        profile__stroke="118.9 mm"))  # fmt: skip
+    law = found.state.assembly.profile.path.law
+    along = law.curvature_radius(np.linspace(0.15, found.state.assembly.profile.end, 4001))
+    assert along[0] == pytest.approx(start, rel=1e-4)
+    assert found.values["roller_radius_max"].value == along.min() == pytest.approx(radius, rel=1e-4)
 
 
 def test_without_friction_the_force_is_constant_from_the_first_point_on(tight):

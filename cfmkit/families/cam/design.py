@@ -32,6 +32,7 @@ from cfmkit.families.cam.mechanism_from_spec import (
     cut_profile,
     loads_of,
     rollers_overlap,
+    turns_vertical,
     weights_of,
 )
 from cfmkit.families.cam.outline import plate_notes
@@ -331,8 +332,8 @@ def _with_spring(
 
 
 def _check_bend(spec: CamSpec, law: SlopeLaw, target: CamDesign) -> None:
-    """Raise where a roller cannot follow the path of a curve: a corner in it, or nothing left of the flank."""
-    if not isinstance(law, CurveSlopeLaw):
+    """Raise where a roller cannot follow a path that may be bent most behind its start: of a curve, or with weights."""
+    if law.constant and law.slope_factor >= 1:
         return
     path, end = reach(law, target.stroke)
     try:
@@ -401,8 +402,8 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
     path, end = reach(law, target.stroke)
     reached = float(path.travel(end))
     if reached < target.stroke * (1 - CLOSE):
-        name = "path_vertical" if law.vertical_at < law.brace_length else "brace_too_short"
-        if reached <= 0:  # cut for so much friction on the way down that the slider never rises
+        name = "path_vertical" if turns_vertical(law, end) else "brace_too_short"
+        if reached <= 0:  # friction on the way down, or weights that help, are so large that the slider never rises
             name = "design_singular"
         raise Infeasible(
             finding(

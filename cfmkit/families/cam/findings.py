@@ -169,7 +169,8 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     if not profile.corner or not corner:
         return
     law = profile.path.law
-    radius, missing = float(law.curvature_radius(law.rest_half_width)), max(-_offset(solution), 0.0)
+    (place, radius), missing = law.tightest(profile.end), max(-_offset(solution), 0.0)
+    where = "at the start" if place <= law.rest_half_width else f"at x = {mm(place)}"
     roller = f"the {mm(profile.roller_radius - missing)} roller"
     roller += f", with {mm(missing)} of the flank missing," if missing else ""
     cure = law.smallest_force_constant(profile.roller_radius)
@@ -182,7 +183,7 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     yield finding(
         "undercut",
         f"{roller} is larger than the path's smallest radius of curvature "
-        f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, "
+        f"({mm(radius)}, {where}); the first {mm(corner)} run on a corner, "
         f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,

@@ -182,7 +182,7 @@ def assemble(spec: CamSpec) -> Assembly:
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
     path, end = reach(law, stroke, spec.analysis.path_method)
     reached = float(path.travel(end))
-    shortfall = _shortfall(law, stroke, reached)
+    shortfall = _shortfall(law, stroke, (end, reached))
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
@@ -255,12 +255,13 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
         )
 
 
-def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
-    """Return why the profile ends at `reached` and not at `stroke` [m]; None if it does not."""
+def _shortfall(law: SlopeLaw, stroke: float, ending: tuple[float, float]) -> Finding | None:
+    """Return why the profile ends at an x and a travel, and not at `stroke` [m]; None if it does not."""
+    end, reached = ending
     if reached >= stroke * (1 - CLOSE):
         return None
     ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"
-    if law.friction > 0 and law.vertical_at < law.brace_length:
+    if turns_vertical(law, end):
         return finding(
             "path_vertical",
             f"cut for a friction of {law.friction:g} the path turns vertical at x = {mm(law.vertical_at)}: {ends}; "
@@ -268,13 +269,14 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
             "of 'design')",
         )
     if reached <= 0:
+        helped = law.slope_factor < 1
+        cut_for = "that lets the weights help" if helped else f"cut for a friction of {law.friction:g}"
+        less = "lighter parts ('mechanism.masses')" if helped else "less friction ('friction' of 'mechanism.profile')"
         raise CannotBuild(
             finding(
                 "design_singular",
-                f"a profile cut for a friction of {law.friction:g} self-locks: the slider cannot rise anywhere as the "
-                "rollers move out; use less friction or a smaller force constant ('friction' and "
-                "'force_constant' of "
-                "'mechanism.profile')",
+                f"a profile {cut_for} self-locks: the slider cannot rise anywhere as the rollers move out; use {less} "
+                "or a smaller force constant ('force_constant' of 'mechanism.profile')",
             )
         )
     return finding(
@@ -283,6 +285,11 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         "('mechanism.brace_length') or a smaller force constant ('force_constant' of 'mechanism.profile', or of "
         "'design')",
     )
+
+
+def turns_vertical(law: SlopeLaw, end: float) -> bool:
+    """Return whether a path that ends at an x [m] does so because it turns vertical there."""
+    return law.vertical_at < law.brace_length and end >= law.vertical_at * (1 - CLOSE)
 
 
 def cut_profile(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
@@ -319,16 +326,14 @@ def _check_bend(profile: CamProfile) -> None:
         return
     if law.slope_factor >= 1.0:
         return
-    x = np.linspace(profile.start, profile.end, 1001)
-    radius = law.curvature_radius(x)
-    tightest = int(np.argmin(radius))
-    if tightest and radius[tightest] < profile.roller_radius:
+    place, radius = law.tightest(profile.end, profile.start)
+    if radius < profile.roller_radius and place > profile.start:
         raise CannotBuild(
             finding(
                 "undercut_total",
-                f"the path that lets the weights help has a radius of curvature of {mm(float(radius[tightest]))} at x "
-                f"= {mm(float(x[tightest]))}, less than the roller's {mm(profile.roller_radius)}; use a smaller roller "
-                "('mechanism.roller_radius') or leave the weight uncompensated ('design.gravity: false')",
+                f"the path that lets the weights help has a radius of curvature of {mm(radius)} at x = {mm(place)}, "
+                f"less than the roller's {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius') "
+                "or leave the weight uncompensated ('design.gravity: false')",
             )
         )
 

@@ -168,7 +168,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     numbers: dict[str, float | None] = {
         **design_values(assembly),
         "undercut_travel": solution.corner_travel,
-        "roller_radius_max": _largest_roller(assembly),
+        "roller_radius_max": largest_roller(assembly),
         "force_constant_min": law.smallest_force_constant(assembly.profile.roller_radius) if law.constant else None,
         "corner_force_max": _corner_peak(solution),
         "jam_travel": next((high for low, high in solution.jams if low == 0), 0.0),
@@ -206,13 +206,10 @@ def _wire(solution: Solution) -> dict[str, Quantity]:
     return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
 
 
-def _largest_roller(assembly: Assembly) -> float | None:
+def largest_roller(assembly: Assembly) -> float | None:
     """Return the smallest radius of curvature of the roller path [m]; None where no roller is too large for it."""
-    law = assembly.profile.path.law
-    if isinstance(law, CurveSlopeLaw):
-        radius = law.tightest(assembly.profile.end)[1]
-        return radius if isfinite(radius) else None
-    return float(law.curvature_radius(law.rest_half_width))
+    radius = assembly.profile.path.law.tightest(assembly.profile.end)[1]
+    return radius if isfinite(radius) else None
 
 
 def design_values(assembly: Assembly) -> dict[str, float]:

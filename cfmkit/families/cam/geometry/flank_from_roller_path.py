@@ -9,7 +9,8 @@ following the path (undercut). The published design does so at its start.
 The path begins at x0, so the shifted curve does not cross itself there: the corner
 is the point of it that is one roller radius from the path's first point. Elsewhere
 there is no undercut: where the slider rises, paths are curved most at their start
-(`SlopeLaw.curvature_radius`), for rollers smaller than the brace.
+(`SlopeLaw.curvature_radius`), for rollers smaller than the brace. Paths that weights help
+or whose force follows a curve may be curved more elsewhere: `mechanism_from_spec.cut_profile` refuses these.
 """
 
 from __future__ import annotations

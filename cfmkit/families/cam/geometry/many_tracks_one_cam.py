@@ -211,7 +211,7 @@ class ManyTracks:
         knots = np.linspace(low[:, 0], high[:, 0], KNOTS, axis=1)
         rising = rate(knots, every) > 0
         rising[:, 0] |= self._turns[2][:, 0] | (rate(low, every)[:, 0] >= -1e-12)
-        if self.profile.path.law.friction >= 0:
+        if self.profile.path.law.always_rises:
             rising |= self.follows
         anywhere, first = np.asarray(rising.any(axis=1)), rising.argmax(axis=1)
         falling = ~rising & (np.arange(KNOTS) > first[:, None])

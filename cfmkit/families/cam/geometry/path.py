@@ -184,7 +184,7 @@ def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[
         end = min(ideal, _farthest(law))
         return RollerPath(law, end, method), end
     high = x0 + 1.02 * (ideal - x0)
-    if high > 0.99 * law.brace_length or law.friction * law.frictionless(high) > 0.9:
+    if high > 0.99 * law.brace_length or law.friction * law.frictionless(high) > 0.9 or law.slope_factor < 1:
         high = min(high, _farthest(law))
     path = RollerPath(law, high)
     if float(path.travel(high)) < travel:
@@ -219,9 +219,10 @@ def _farthest(law: SlopeLaw) -> float:
     """Return the x at which the path must end at the latest: vertical, at the brace's reach, or falling [m]."""
     x0 = law.rest_half_width
     limit = max(law.vertical_at - max(1e-9 * (law.vertical_at - x0), 4e-15 * law.vertical_at), x0)
-    if law.friction >= 0:
+    if law.always_rises:
         return limit
-    # Cut for the way down the slider falls at first (friction exceeds the springs) and again near x = l.
+    # Cut for the way down, or with weights that help, the slider falls at first (friction or the weights exceed the
+    # springs) and again near x = l.
     x = law.brace_length * np.sin(
         np.linspace(math.asin(x0 / law.brace_length), math.asin(limit / law.brace_length), 257)
     )

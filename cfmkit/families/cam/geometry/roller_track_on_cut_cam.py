@@ -217,7 +217,7 @@ class Track:
         With `skip`, a part at the beginning on which it falls is left out.
         """
         low, high = self.profile.start, self._brace_limit()
-        if self._follows_law and self.profile.path.law.friction >= 0:
+        if self._follows_law and self.profile.path.law.always_rises:
             return (low, high), False
         knots = np.linspace(low, high, KNOTS)
         rising = self._on_flank(knots)[1] > 0

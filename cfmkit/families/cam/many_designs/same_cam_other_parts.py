@@ -21,6 +21,7 @@ from cfmkit.families.cam.many_designs.forces import ForcesOfCams, Pose, Slab
 from cfmkit.families.cam.many_designs.means_and_extremes_in_window import CutWindows, SampledBranch
 from cfmkit.families.cam.mechanism_from_spec import CLOSE
 from cfmkit.families.cam.model import nodes
+from cfmkit.families.cam.scalar_results import largest_roller
 from cfmkit.families.cam.solution import FEW
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point, levers, load_on_contact, load_on_slider, over
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
@@ -430,7 +431,7 @@ class BuiltSlab(Slab):
         "theoretical_force": lambda cams: (
             4.0 * cams.designs.stiffness * cams.designs.constant + cams.around.slider_weight
         ),
-        "roller_radius_max": lambda cams: cams.same(cams._law.curvature_radius(cams._law.rest_half_width)),
+        "roller_radius_max": lambda cams: cams.same(largest_roller(cams.around.cam)),
         "force_constant_min": lambda cams: cams.same(
             cams._law.smallest_force_constant(cams.around.cam.profile.roller_radius)
         ),
