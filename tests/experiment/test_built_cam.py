@@ -154,6 +154,15 @@ def test_what_is_uncertain_and_what_was_not_measured_is_reported(tmp_path):
     assert "measured up to 136.1 mm of travel only" in longer.message
 
 
+def test_a_travel_that_ends_before_the_first_measured_point_is_refused(tmp_path):
+    write(tmp_path, [side[side[:, 1] > 0.03] for side in measured()])
+    spec = spec_of(tmp_path).replace({"analysis.window": None, "requirements": ()})
+    motion = cfmkit.analyze(spec.replace({"analysis.travel": 0.02})).curve.on("load").motion
+    assert (motion[0], motion[-1]) == (pytest.approx(0.01795, abs=1e-5), pytest.approx(0.02))
+    with pytest.raises(DataError, match=r"is 5 mm, but the flanks were measured from 17.95 mm of travel on only"):
+        cfmkit.analyze(spec.replace({"analysis.travel": 0.005}))
+
+
 def test_the_spec_survives_changes_and_pickling(tmp_path):
     write(tmp_path, measured())
     spec = spec_of(tmp_path)

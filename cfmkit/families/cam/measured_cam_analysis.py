@@ -198,16 +198,21 @@ def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack,
 def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[FloatArray, Finding | None]:
     """Return the travels at which both sides were measured, and why they are short, if they are [m]."""
     start = assembly.track.start
-    low = max(float(track.slider[0]) for track in tracks) - start
+    low = max(0.0, *(float(track.slider[0]) - start for track in tracks))
     high = min(float(track.slider[-1]) for track in tracks) - start
-    asked = assembly.spec.analysis.travel
-    if high <= max(low, 0.0):
-        raise DataError(f"{assembly.spec.mechanism.profile.file}: the two flanks were measured at different heights")
+    asked, name = assembly.spec.analysis.travel, assembly.spec.mechanism.profile.file
+    if high <= low:
+        raise DataError(f"{name}: the two flanks were measured at different heights")
+    if asked is not None and asked <= low:
+        raise DataError(
+            f"{name}: the requested travel is {mm(asked)}, but the flanks were measured from {mm(low)} of travel on "
+            "only; request more ('analysis.travel')"
+        )
     short = None
     if asked is not None and asked > high * (1 + 1e-9):
         message = f"the requested travel is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
         short = finding("outside_profile", message)
-    travel = np.linspace(max(low, 0.0), min(asked or high, high), assembly.spec.analysis.points)
+    travel = np.linspace(low, min(asked or high, high), assembly.spec.analysis.points)
     x = tracks[0].at(start + travel)[0], tracks[1].at(start + travel)[0]
     count, overlap = until_overlap(travel, start + travel, x, assembly.spec.mechanism)
     return travel[:count], overlap or short
