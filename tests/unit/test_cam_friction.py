@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.optimize import root
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.figures import figures
+from cfmkit.families.cam.scalar_results import values_of
 
 PINS = {"diameter": "6 mm", "friction": 0.15}
 BEARINGS = {"bore": "8 mm", "friction": 0.004}
@@ -122,6 +124,15 @@ def test_a_cam_that_lies_flat_weighs_on_its_guide_only():
     rubs = analyze(cam(rolling_friction=0.002, mounting=flat, guide={"friction": 0.1})).state
     weight = 9.81 * (0.068 + 2 * 0.077 + 2 * 0.38)
     np.testing.assert_allclose((rubs.up.slider - plain.up.slider)[1:], 0.1 * weight, rtol=1e-9)
+
+
+def test_a_smallest_contact_force_that_is_nowhere_finite_is_unknown():
+    """Zero would say that a roller leaves the cam."""
+    solution = analyze(cam(mounting={"elevation": "0 deg", "roll": "0 deg"}, analysis__points=11)).state
+    least = np.concatenate([state.least_contact[1:] for state in (solution.up, solution.down)])
+    assert values_of(solution)["contact_force_least"].value == least.min()
+    up, down = (replace(state, least_contact=np.full(11, np.nan)) for state in (solution.up, solution.down))
+    assert values_of(replace(solution, up=up, down=down))["contact_force_least"].value is None
 
 
 def test_hanging_down_the_weight_helps_by_what_it_hinders_standing_up():

@@ -185,9 +185,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     if assembly.spec.mechanism.bearings:
         numbers |= _bearing(solution)
     if solution.up.least_contact is not None and solution.down.least_contact is not None:
-        numbers["contact_force_least"] = -(
-            largest(-solution.up.least_contact[1:], -solution.down.least_contact[1:]) or 0.0
-        )
+        numbers["contact_force_least"] = smallest(solution.up.least_contact[1:], solution.down.least_contact[1:])
     if solution.band is not None:
         shares = solution.band.deviations()
         numbers["manufacturing_force_share"] = float(np.median(shares))
@@ -253,6 +251,12 @@ def largest(*arrays: FloatArray) -> float | None:
     """Return the largest finite value of all arrays; None if there is none."""
     finite = [array[np.isfinite(array)] for array in arrays]
     return max((float(array.max()) for array in finite if array.size), default=None)
+
+
+def smallest(*arrays: FloatArray) -> float | None:
+    """Return the smallest finite value of all arrays; None if there is none."""
+    found = largest(*(-array for array in arrays))
+    return None if found is None else -found
 
 
 def loop_shares(solution: Solution) -> dict[str, float | None]:
