@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
@@ -99,7 +99,9 @@ class MeasuredCurves(ShortRepr):
 
 
 def measured(
-    recording: Recording, low_pass: LowPass | str | None = "default", leave_out: Collection[str] = ("reversals",)
+    recording: Recording,
+    low_pass: LowPass | Literal["default"] | None = "default",
+    leave_out: Collection[str] = ("reversals",),
 ) -> MeasuredCurves:
     """Return a recording as raw and filtered curves.
 
@@ -118,11 +120,14 @@ def measured(
     ------
     cfmkit.errors.DataError
         If there is no stroke in the recording, or a filter that was named cannot be used.
+    cfmkit.errors.UsageError
+        If another word stands for the filter, or for what is left out.
     """
+    _check_words(low_pass, leave_out)
     strokes, reached, left_out = _strokes(recording, leave_out)
     cycles = _cycles(strokes)
     warnings = (*_warnings(recording, strokes), *left_out)
-    chosen = _default(recording) if isinstance(low_pass, str) else low_pass
+    chosen = _default(recording) if low_pass == "default" else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
     if turned_loop(raw):
         reported = (
@@ -140,6 +145,16 @@ def measured(
         return replace(plain, warnings=(*warnings, Finding("not_filtered", str(problem))))
     filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in cycles)
     return replace(plain, filtered=filtered, low_pass=chosen)
+
+
+def _check_words(low_pass: LowPass | str | None, leave_out: Collection[str]) -> None:
+    if isinstance(low_pass, str) and low_pass != "default":
+        raise UsageError(
+            f"low_pass: {low_pass!r} is no filter; give 'default', None for no filter, or a LowPass "
+            f"('read_filter({low_pass!r})' of cfmkit.experiment.low_pass reads one)"
+        )
+    if isinstance(leave_out, str) or not set(leave_out) <= set(LEFT_OUT):
+        raise UsageError(f"leave_out: a collection of {' and '.join(map(repr, LEFT_OUT))} is needed, not {leave_out!r}")
 
 
 def read_measured(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from cfmkit.api import resolve
 from cfmkit.errors import QuantityError, UsageError
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
+    from cfmkit.experiment.low_pass import LowPass
     from cfmkit.experiment.measurement_and_calibration_outputs import MeasureReport
     from cfmkit.experiment.reading import Recording
     from cfmkit.numerics.least_squares import Loss
@@ -78,7 +79,7 @@ def measure(
     from cfmkit.experiment.zeros_and_signs import corrected
     from cfmkit.metrics import MeasuringFrame
 
-    low_pass = filter if filter == "default" else read_filter(filter)
+    low_pass: LowPass | Literal["default"] | None = "default" if filter == "default" else read_filter(filter)
     recording = data if isinstance(data, Recording) else read_recording(_file(data), units)
     place = read_window(window, recording.kind)
     frame = MeasuringFrame(target=read_target(target, recording.kind))

@@ -57,6 +57,20 @@ def test_successive_reversals_are_farther_apart_than_the_threshold(values, thres
     assert (inner > threshold).all()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("none",), "'none' is no filter; give 'default', None for no filter, or a LowPass"),
+        (("2 Hz",), r"read_filter\('2 Hz'\)"),
+        ((None, ("reversal",)), "a collection of 'reversals' and 'spikes' is needed, not"),
+        ((None, "spikes"), "a collection of 'reversals' and 'spikes' is needed, not 'spikes'"),
+    ],
+)
+def test_an_unknown_word_is_not_taken_for_the_default(arguments, words):
+    with pytest.raises(UsageError, match=words):
+        measured(recording(triangle(1)), *arguments)
+
+
 def test_points_at_which_the_machine_stood_are_left_out_and_counted():
     up = np.linspace(0, 100, 401)
     motion = np.concatenate([np.zeros(100), up, np.full(150, 100.0), up[::-1], np.zeros(80)])
