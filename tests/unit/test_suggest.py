@@ -374,7 +374,7 @@ def test_the_order_follows_what_is_preferred():
     found = [
         one for one in (made(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good
     ]
-    flat = ordered(found, asked, ("ripple",))
+    flat = ordered(found, ("ripple",))
     assert [one.numbers["ripple"] for one in flat] == sorted(one.numbers["ripple"] for one in found)
 
 
@@ -553,7 +553,14 @@ def test_a_force_that_no_springs_at_the_pins_hold_is_refused_with_the_largest_th
 def test_proposals_that_differ_by_what_nobody_sees_stay_in_their_order():
     ripples = (0.0102, 0.0102 * (1.0 - 1e-5), 0.009)
     three = [Proposal("slider-crank", str(k), numbers={"ripple": ripple}) for k, ripple in enumerate(ripples)]
-    assert [one.variant for one in ordered(three, wish(), ("ripple",))] == ["2", "0", "1"]
+    assert [one.variant for one in ordered(three, ("ripple",))] == ["2", "0", "1"]
+
+
+@pytest.mark.parametrize(("name", "key"), [("stress", "safety_factor"), ("ripple", "ripple"), ("depth", "depth")])
+def test_what_is_not_known_of_a_proposal_does_not_make_it_the_best(name, key):
+    known = {"stress": (1.2, 3.0)}.get(name, (0.03, 0.01))
+    three = [Proposal("beam", str(k), numbers={key: value}) for k, value in enumerate((None, *known))]
+    assert [one.variant for one in ordered(three, (name,))] == ["2", "1", "0"]
 
 
 @pytest.mark.parametrize(("kind", "make"), [("torsion", torsion_spring), ("extension", extension_spring)])

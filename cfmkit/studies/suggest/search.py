@@ -160,8 +160,8 @@ def suggest(
         answers = _with_nearest(answers, wish, run, times.without)
     return Suggestions(
         wish,
-        tuple(ordered(distinct([one for one in done if one.good]), wish, prefer)),
-        tuple(_near(done, wish)),
+        tuple(ordered(distinct([one for one in done if one.good]), prefer)),
+        tuple(_near(done)),
         tuple(replace(one, made=counts[one.family]) for one in answers),
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
@@ -377,13 +377,13 @@ EQUAL = 1e-3
 """Numbers that differ by less than this share are equal: searches leave as much in them, and nobody sees it."""
 
 
-def ordered(proposals: Sequence[Proposal], wish: Wish, prefer: Sequence[str]) -> list[Proposal]:
+def ordered(proposals: Sequence[Proposal], prefer: Sequence[str]) -> list[Proposal]:
     """Return proposals, the best first: each preference counts half as much as the one before it.
 
     Of equal ones, as two sizes of one shape are in their ripple, the one that was made first is the first.
     """
     weights = {name: 0.5**place for place, name in enumerate(dict.fromkeys(prefer))}
-    measures = {name: [measure(one, wish, name) for one in proposals] for name in weights}
+    measures = {name: [measure(one, name) for one in proposals] for name in weights}
 
     def score(index: int) -> float:
         total = 0.0
@@ -396,25 +396,26 @@ def ordered(proposals: Sequence[Proposal], wish: Wish, prefer: Sequence[str]) ->
     return [proposals[index] for index in order]
 
 
-def measure(proposal: Proposal, wish: Wish, name: str) -> float:
-    """Return what is the smaller the better: area in the plane, ripple, parts, stress over the allowable one, depth."""
+def measure(proposal: Proposal, name: str) -> float:
+    """Return what is the smaller the better: area in the plane, ripple, parts, stress over the allowable one, depth.
+
+    What is unknown is the worst: of a mechanism without a modelled stress, or a material without a strength, nobody
+    knows that it bears its load.
+    """
     numbers = {key: value for key, value in proposal.numbers.items() if value is not None}
-    found = {
-        "size": numbers.get("across", 1e9) * numbers.get("along", 1e9),
-        "ripple": numbers.get("ripple", 1.0),
-        "parts": numbers.get("parts", 1e9),
-        "stress": 1.0 / numbers["safety_factor"] if numbers.get("safety_factor") else 0.0,
-        "depth": numbers.get("depth", 1e9),
-    }
-    return found[name]
+    if name == "size":
+        return numbers.get("across", np.inf) * numbers.get("along", np.inf)
+    if name == "stress":
+        return 1.0 / numbers["safety_factor"] if numbers.get("safety_factor") else np.inf
+    return numbers.get(name, np.inf)
 
 
-def _near(done: Sequence[Proposal], wish: Wish) -> list[Proposal]:
+def _near(done: Sequence[Proposal]) -> list[Proposal]:
     """Return those that miss one wish, two of each family at most."""
     found: list[Proposal] = []
     for name in dict.fromkeys(one.family for one in done):
         near = [one for one in done if one.family == name and one.near]
-        found += sorted(near, key=lambda one: measure(one, wish, "ripple"))[:2]
+        found += sorted(near, key=lambda one: measure(one, "ripple"))[:2]
     return found
 
 
