@@ -67,6 +67,10 @@ class Clock:
         """Return whether the time is up."""
         return self.deadline is not None and time() > self.deadline
 
+    def left(self) -> float | None:
+        """Return the time that is left [s], at least 0; None: all the time."""
+        return None if self.deadline is None else max(self.deadline - time(), 0.0)
+
 
 NEVER = Clock()
 """The clock of a search that has all the time."""

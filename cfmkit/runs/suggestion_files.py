@@ -11,6 +11,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.runs.html_report_of_run import NAME, identifier, part, template
 from cfmkit.specs.units import format_short, to_border
 from cfmkit.studies.pool import until
+from cfmkit.studies.serial_and_cluster_executors import BUG
 from cfmkit.tables.json_writing import json_bytes
 
 if TYPE_CHECKING:
@@ -74,10 +75,23 @@ def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
     return reported(proposal) | {"mean": None if mean is None else float(to_border(mean, found.wish.kind))}
 
 
+STATUSES = {
+    ExitCode.OK: "complete",
+    ExitCode.PARTIAL: "partial",
+    ExitCode.NO_SOLUTION: "infeasible",
+    ExitCode.BUG: "crashed",
+}
+"""What metrics.json says of each end."""
+
+
 def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 where a proposal does all that is wished, else 6 where the time ended the search, and 4 where not."""
+    """Return 0 where a proposal does all that is wished, else 70 where a bug ended all, 6 where the time did, and 4."""
     if found.proposals:
         return ExitCode.OK
+    reasons = [one.offer.reason for one in found.answers if one.offer.reason]
+    reasons += [reason for each in found.failed.values() for reason in each]
+    if found.bugs and not found.near and all(reason.startswith(BUG) for reason in reasons):
+        return ExitCode.BUG
     return ExitCode.PARTIAL if found.late else ExitCode.NO_SOLUTION
 
 
@@ -91,7 +105,7 @@ def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
     """Return what metrics.json and ``--json`` say."""
     code = exit_code(found)
     return {
-        "status": "complete" if code is ExitCode.OK else "partial" if code is ExitCode.PARTIAL else "infeasible",
+        "status": STATUSES[code],
         "message": message(found),
         "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
@@ -117,6 +131,8 @@ def message(found: Suggestions) -> str:
         late = "; the time budget ended the search before everything was tried" if found.late else ""
         count = len(found.proposals)
         return f"{count} mechanism{' meets' if count == 1 else 's meet'} the wish{late}"
+    if exit_code(found) is ExitCode.BUG:
+        return "bugs in cfmkit ended every candidate"
     if found.late:
         return "the time budget ended the search before a mechanism met the wish; increase it (--time-budget)"
     return "no mechanism meets the wish"

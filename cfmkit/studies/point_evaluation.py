@@ -10,7 +10,6 @@ point only (status ``crashed``), and the row keeps the traceback.
 from __future__ import annotations
 
 import hashlib
-import traceback
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
@@ -25,6 +24,7 @@ from cfmkit.results import Result, Status
 from cfmkit.specs.data_file_paths import named_in
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
+from cfmkit.studies.serial_and_cluster_executors import lost_to
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -255,6 +255,5 @@ def _reported(error: CfmError) -> str:
 
 
 def _bug(error: Exception) -> Row:
-    reported = " ".join(f"{type(error).__name__}: {error}".split())
-    trace = "".join(traceback.format_exception(error))
-    return Row(Status.CRASHED, message=f"a bug in cfmkit: {reported}", bug=trace)
+    lost = lost_to(error)
+    return Row(lost.status, message=lost.message, bug=lost.bug)

@@ -27,7 +27,7 @@ from cfmkit.errors import CfmError, UsageError
 from cfmkit.numerics.one_blas_thread import ONE_THREAD
 from cfmkit.results import Status
 from cfmkit.studies import worker_process
-from cfmkit.studies.serial_and_cluster_executors import Lost, never
+from cfmkit.studies.serial_and_cluster_executors import BUG, Lost, never
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -179,7 +179,7 @@ class _Crew:
             one.started = None
             job, outcome = one.given.popleft(), pickle.loads(rest)
             if kind == worker_process.BROKEN:
-                outcome = Lost(Status.CRASHED, f"a bug in cfmkit: {outcome[0]}", outcome[1])
+                outcome = Lost(Status.CRASHED, f"{BUG}{outcome[0]}", outcome[1])
             yield job, outcome
 
     def _buried(self, one: _Worker) -> Iterator[tuple[Any, Any]]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 import pickle
 import re
+import traceback
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
     Executor = Callable[[Work, Iterator[Any], Stopping], Iterator[tuple[Any, Any]]]
 
 
+BUG = "a bug in cfmkit: "
+"""What the message of a job begins with that an exception ended which cfmkit does not raise on purpose."""
+
+
 @dataclass(frozen=True)
 class Lost:
     """The outcome of a job that nothing came back from."""
@@ -40,6 +45,20 @@ class Lost:
     status: Status
     message: str
     bug: str = ""
+
+
+def lost_to(error: Exception) -> Lost:
+    """Return the outcome of a job that a bug ended, with its traceback."""
+    reported = " ".join(f"{type(error).__name__}: {error}".split())
+    return Lost(Status.CRASHED, f"{BUG}{reported}", "".join(traceback.format_exception(error)))
+
+
+def surviving(work: Work, job: Any) -> Any:
+    """Return what comes of a job; `Lost` where a bug ends it."""
+    try:
+        return work(job)
+    except Exception as error:
+        return lost_to(error)
 
 
 def never() -> bool:
@@ -189,4 +208,4 @@ def _outcome(future: Any) -> Any:
     if type(error).__name__ == "KilledWorker":
         reported = f"the workers that worked on this point died {RETRIES + 1} times"
         return Lost(Status.CRASHED, reported)
-    return Lost(Status.CRASHED, f"a bug in cfmkit: {reported}")
+    return Lost(Status.CRASHED, f"{BUG}{reported}")

@@ -12,6 +12,7 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
+from cfmkit.curves import Curve
 from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
@@ -21,14 +22,16 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
-from cfmkit.results import Status
+from cfmkit.families.wishes import FamilyOffer
+from cfmkit.results import Result, Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length, stiffest, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
-from cfmkit.studies.suggest import pareto_and_scale_drawings, search, yield_of_proposal
+from cfmkit.studies.suggest import pareto_and_scale_drawings, proposal_making_and_judging, search, yield_of_proposal
+from cfmkit.studies.suggest.comparison_with_better_model import NOT_VERIFIED, _mean, with_better_models
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
@@ -88,11 +91,57 @@ def test_a_family_that_fails_to_answer_does_not_look_as_if_the_time_were_up():
     assert {one.offer.reason for one in found.answers} == {"a bug in cfmkit: oh"}
 
 
+@pytest.mark.parametrize("where", ["offer", "candidate"])
+def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch, where):
+    """In this process, too; what a family or a model refuses is no bug."""
+
+    def broken(*_):
+        raise KeyError("analysis.window")
+
+    def offer(*_):
+        return FamilyOffer((candidate,)) if where == "candidate" else broken()
+
+    candidate = offered("cam")[1][0]
+    finish = "oh" if where == "candidate" else None
+    candidate = replace(candidate, finish=finish)
+    monkeypatch.setattr(search, "names", lambda: ("cam",))
+    monkeypatch.setattr(search, "function_named", lambda _: offer)
+    monkeypatch.setattr(proposal_making_and_judging, "function_named", lambda _: broken)
+    monkeypatch.setattr(search, "_with_nearest", lambda answers, *_: answers)
+    found = suggest(wish(), Run())
+    reasons = [*found.failed.get("cam", ()), *(one.offer.reason for one in found.answers if one.offer.reason)]
+    assert reasons == ["a bug in cfmkit: KeyError: 'analysis.window'"]
+    assert len(found.bugs) == 1
+    assert 'raise KeyError("analysis.window")' in found.bugs[0]
+    assert exit_code(found) == 70
+    assert message(found) == "bugs in cfmkit ended every candidate"
+
+
+def test_a_mean_is_that_of_the_metrics_whatever_way_the_curve_takes():
+    """One that turns back is not put in the order of its motion; one that ends early has none."""
+    spec = cfmkit.load(WISHES.parents[1] / "configs" / "cam.yaml").replace({"requirements": ()})
+
+    def mean(window, motion, effort, status=Status.COMPLETE):
+        one = np.full(len(motion), ""), np.ones(len(motion), dtype=bool)
+        curve = Curve(motion, effort, *one, {}, "force", {})
+        changed = spec.replace({"analysis.window": window})
+        return _mean(Result(changed, status, "", (curve,), travel=(motion[0], motion[-1])))
+
+    part = np.linspace(0.0, 1.0, 301)
+    there_and_back = (np.interp(part, [0, 0.4, 0.6, 1], moved) for moved in ([0, 0.03, 0.02, 0.05], [0, 90, 10, 50]))
+    assert mean(("10 mm", "45 mm"), *there_and_back) == pytest.approx(43.58, abs=0.01)
+    back = np.linspace(0.0, -0.05, 101)
+    assert mean(("-40 mm", "-10 mm"), back, 50.0 + 100.0 * back) == pytest.approx(47.5)
+    short = np.linspace(0.0, 0.03, 101)
+    assert mean(("10 mm", "45 mm"), short, 50.0 + 0.0 * short, Status.PARTIAL) is None
+    assert mean(("10 mm", "100 %"), short, 50.0 + 0.0 * short) == pytest.approx(50.0)
+
+
 def test_a_comparison_that_the_time_ends_does_not_ask_for_the_option_that_was_given():
     asked, candidates = offered("beam")
     one = made(ProposalJob("beam", candidates[0], asked, 0))
-    compared = search.with_better_models(search.Suggestions(asked, (one,), (), ()), Run(time_budget=0.0), True)
-    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {search.NOT_VERIFIED}"
+    compared = with_better_models(search.Suggestions(asked, (one,), (), ()), Run(time_budget=0.0), True)
+    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {NOT_VERIFIED}"
 
 
 def test_options_replace_keys_of_a_file(tmp_path):

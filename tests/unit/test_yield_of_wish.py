@@ -138,7 +138,7 @@ def test_what_moves_out_of_the_room_for_a_yield_stays_as_it_was(near, monkeypatc
 
 def test_families_that_lack_proposals_try_their_nearest_again_once(near):
     asked = wish(**{"yield": "80 %"})
-    making = _Making(Run(), _Times(), 3)
+    making = _Making(Run(), _Times(), 3, [])
     job = ProposalJob("vcfm", Candidate("2 Vs", near.spec), asked, 0)
     worse = Proposal("vcfm", "1 V", near.text, ("yield 20 %",), movable=True, numbers={"yield": 0.2})
     for one in (worse, near):

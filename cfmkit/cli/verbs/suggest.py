@@ -28,7 +28,7 @@ from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
@@ -131,7 +131,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores
-    from cfmkit.studies.suggest.search import RESERVE, suggest, with_better_models
+    from cfmkit.studies.suggest.comparison_with_better_model import with_better_models
+    from cfmkit.studies.suggest.search import RESERVE, suggest
 
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
@@ -170,7 +171,16 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
     data = suggestion_files.as_json(found, block) | written.data | {"reused": found.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
-    return Answer(data, _page(data, written, terminal.verbose > 0), code, quiet_complaints=complaints)
+    page = _page(data, written, terminal.verbose > 0)
+    return Answer(data, page, code, tuple(_bugs(found.bugs, terminal.tracebacks)), quiet_complaints=complaints)
+
+
+def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
+    """Yield how many candidates a bug ended, and the first traceback if it is to be shown."""
+    if bugs:
+        yield f"error    {len(bugs)} candidate{'s' * (len(bugs) > 1)} hit a bug in cfmkit; -vv shows the first"
+    if bugs and shown:
+        yield from bugs[0].rstrip("\n").split("\n")
 
 
 def keys(options: SuggestOptions) -> dict[str, str]:

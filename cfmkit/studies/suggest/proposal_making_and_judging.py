@@ -129,7 +129,7 @@ def spec_of(name: str, text: str) -> Spec:
 
 
 def made(job: ProposalJob) -> Proposal:
-    """Return what becomes of a candidate; whatever its design or model refuses is its message."""
+    """Return what becomes of a candidate; what its design or model refuses is its message, a bug is raised."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
         if job.near is not None:
@@ -138,12 +138,7 @@ def made(job: ProposalJob) -> Proposal:
         if spec is None:
             return Proposal(job.family, candidate.variant, message=reported)
         return judged(job.family, candidate.variant, spec, job.wish, job.seed, clock)
-    except (
-        CfmError,
-        ValueError,
-        ArithmeticError,
-        KeyError,
-    ) as problem:  # a shape no solver was made for is no proposal
+    except (CfmError, np.linalg.LinAlgError) as problem:  # a shape no solver was made for is no proposal
         return Proposal(job.family, candidate.variant, message=" ".join(str(problem).split())[:300])
 
 
@@ -170,12 +165,11 @@ def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
     """Return a proposal designed again for the wished yield, or with what is missing of it."""
     if clock.late():
         return Proposal(job.family, near.variant, message=OUT_OF_TIME)
-    left = None if clock.deadline is None else clock.deadline - time.time()
 
     def judge(spec: Spec) -> Proposal:
         return judged(job.family, near.variant, spec, job.wish, job.seed, clock)
 
-    found = redesigned(near, job.candidate, job.wish, Run(job.seed, time_budget=left), judge)
+    found = redesigned(near, job.candidate, job.wish, Run(job.seed, time_budget=clock.left()), judge)
     return found if found.good or not clock.late() else Proposal(job.family, near.variant, message=OUT_OF_TIME)
 
 
@@ -201,8 +195,8 @@ def redesigned(
     wanted = asked = float(wish.good_parts or 0.0)
     best, spec, last, obstacle = near, near.spec, None, ""
     for _ in range(TRIES):
-        left = None if clock.deadline is None else clock.deadline - time.time()
-        moved = None if clock.late() else moved_for_yield(candidate, spec, wish, asked, replace(run, time_budget=left))
+        run = replace(run, time_budget=clock.left())
+        moved = None if clock.late() else moved_for_yield(candidate, spec, wish, asked, run)
         if moved is None:
             break
         last, there = moved, judge(moved.spec)
@@ -235,7 +229,8 @@ def _tried(moved: Moved | None, obstacle: str) -> str:
 
 def _seconds(clock: Clock) -> float:
     """Return how long one design may search [s]."""
-    return LONGEST if clock.deadline is None else min(LONGEST, max(clock.deadline - time.time(), 0.1))
+    left = clock.left()
+    return LONGEST if left is None else min(LONGEST, max(left, 0.1))
 
 
 def judged(name: str, variant: str, spec: Spec, wish: Wish, seed: int = 0, clock: Clock = NEVER) -> Proposal:

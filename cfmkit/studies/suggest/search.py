@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.run_many_starts import Clock
-from cfmkit.errors import CfmError
 from cfmkit.families import family, names
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -27,16 +26,16 @@ from cfmkit.families.wishes import FamilyOffer
 from cfmkit.results import Status
 from cfmkit.store.content_hashes_and_versions import code_stamp, stable_hash
 from cfmkit.studies.pool import until
-from cfmkit.studies.serial_and_cluster_executors import Lost
+from cfmkit.studies.serial_and_cluster_executors import Lost, surviving
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from typing import Any
 
     from cfmkit.families.wishes import Candidate, Wish
-    from cfmkit.results import Result
-    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
 
 ENOUGH, ENOUGH_WITH_PARTS = 3, 2
 """Proposals of a family after which no more of its candidates are made; fewer where parts of each are drawn."""
@@ -115,6 +114,8 @@ class Suggestions:
         Whether the time budget ended the search.
     reused : int
         Candidates that were found in the journal.
+    bugs : tuple of str
+        The traceback of each family, candidate or comparison that a bug ended.
     """
 
     wish: Wish
@@ -124,6 +125,7 @@ class Suggestions:
     failed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     late: bool = False
     reused: int = 0
+    bugs: tuple[str, ...] = ()
 
 
 def suggest(
@@ -143,10 +145,10 @@ def suggest(
         Of the time budget, kept for what comes after the search [s]; as long as nothing is found there is nothing to
         come, and the search goes on.
     """
-    times = _Times.of(run.time_budget, reserve)
-    answers, unasked = _answers(wish, run, times.asking)
+    times, bugs = _Times.of(run.time_budget, reserve), list[str]()
+    answers, unasked = _answers(wish, run, times.asking, bugs)
     queues = {one.family: list(one.offer.candidates) for one in answers}
-    making = _Making(run, times, sum(map(len, queues.values())))
+    making = _Making(run, times, sum(map(len, queues.values())), bugs)
     turn, cut, enough = 0, unasked, ENOUGH if wish.good_parts is None else ENOUGH_WITH_PARTS
     while not making.late() and (batch := list(_next(queues, making.done, ROUNDS[min(turn, len(ROUNDS) - 1)], enough))):
         turn += 1
@@ -157,7 +159,7 @@ def suggest(
     done = making.done
     counts = {name: sum(one.family == name for one in done) for name in queues}
     if not cut and not any(one.good for one in done):
-        answers = _with_nearest(answers, wish, run, times.without)
+        answers = _with_nearest(answers, wish, run, times.without, bugs)
     return Suggestions(
         wish,
         tuple(ordered(distinct([one for one in done if one.good]), prefer)),
@@ -166,7 +168,24 @@ def suggest(
         _failures(done),
         cut or (making.late() and bool(list(_next(queues, done, 1, enough)))),
         making.reused,
+        tuple(bugs),
     )
+
+
+def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Executor:
+    """Return an executor until a deadline, in `time.time` [s], in which a bug costs its own job only.
+
+    So it is in the processes of a pool; here it is so in this process, too. Tracebacks are added to `bugs`.
+    """
+    executor = until(run.executor, deadline)
+
+    def watched(work: Work, jobs: Iterator[Any], stopping: Stopping) -> Iterator[tuple[Any, Any]]:
+        for job, outcome in executor(partial(surviving, work), jobs, stopping):
+            if isinstance(outcome, Lost) and outcome.bug:
+                bugs.append(outcome.bug)
+            yield job, outcome
+
+    return watched
 
 
 class _Making:
@@ -180,8 +199,8 @@ class _Making:
         Those that were found in the journal.
     """
 
-    def __init__(self, run: Run, times: _Times, total: int) -> None:
-        self._run, self._times, self._total, self._tried = run, times, total, 0
+    def __init__(self, run: Run, times: _Times, total: int, bugs: list[str]) -> None:
+        self._run, self._times, self._total, self._tried, self._bugs = run, times, total, 0, bugs
         self._known: dict[int, Proposal] = {}
         self._jobs: list[ProposalJob] = []
         self.done: list[Proposal] = []
@@ -206,11 +225,13 @@ class _Making:
         self.reused += len(self._known)
         left = [index for index in range(len(jobs)) if index not in self._known]
         work = partial(_made_of, tuple(jobs))
-        for index, outcome in until(run.executor, self._times.without)(work, iter(left), self.late):
+        executor = surviving_until(run, self._times.without, self._bugs)
+        for index, outcome in executor(work, iter(left), self.late):
             proposal = _survived(jobs[index], outcome)
             if proposal.message != OUT_OF_TIME:
                 self._known[index] = proposal
-                if proposal.message != ENDED_EARLY:  # a machine with less to do may finish it next time
+                # A machine with less to do may finish it next time; a bug, or a process that died, may not be there.
+                if not isinstance(outcome, Lost) and proposal.message != ENDED_EARLY:
                     notes.add(keys[index], proposal.as_record())
             self._tried += jobs[index].near is None
             made = (self._tried + self.reused) / max(self._total, 1)
@@ -242,7 +263,9 @@ class _Making:
         return found
 
 
-def _with_nearest(answers: list[Answered], wish: Wish, run: Run, deadline: float | None) -> list[Answered]:
+def _with_nearest(
+    answers: list[Answered], wish: Wish, run: Run, deadline: float | None, bugs: list[str]
+) -> list[Answered]:
     """Return answers with the nearest wish that each family could meet, as far as the time allows."""
     names = [one.family for one in answers]
     content = {"wish": repr(wish), "seed": run.seed, "code": code_stamp()}
@@ -251,7 +274,7 @@ def _with_nearest(answers: list[Answered], wish: Wish, run: Run, deadline: float
     left = [name for name in names if name not in found]
     clock = Clock(deadline)
     work = partial(_nearest_of, wish, run.seed, clock)
-    for name, outcome in until(run.executor, deadline)(work, iter(left), clock.late):
+    for name, outcome in surviving_until(run, deadline, bugs)(work, iter(left), clock.late):
         if isinstance(outcome, dict) and not clock.late():
             found[name] = outcome
             run.notes.add(keys[name], outcome)
@@ -260,33 +283,6 @@ def _with_nearest(answers: list[Answered], wish: Wish, run: Run, deadline: float
 
 def _nearest_of(wish: Wish, seed: int, clock: Clock, name: str) -> dict[str, str]:
     return nearest(wish, name, seed, clock)
-
-
-def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions:
-    """Return suggestions whose proposals say what the next better model of their family makes of them.
-
-    Parameters
-    ----------
-    found : Suggestions
-    run : Run
-        Its executor does the work, its time budget ends it: what was not verified then says so.
-    solve : bool
-        Whether to run those models; else it is said that they were not.
-    """
-    if not solve:
-        return replace(found, proposals=tuple(map(unverified, found.proposals)))
-    clock = Clock.of(run.time_budget)
-    executor = until(run.executor, clock.deadline)
-    done = dict(executor(partial(_verified_of, found.proposals), iter(range(len(found.proposals))), clock.late))
-    kept = [
-        one if isinstance(one := done.get(index), Proposal) else unverified(old, NOT_VERIFIED)
-        for index, old in enumerate(found.proposals)
-    ]
-    return replace(found, proposals=tuple(kept))
-
-
-def _verified_of(proposals: Sequence[Proposal], index: int) -> Proposal:
-    return verified(proposals[index])
 
 
 def _made_of(jobs: Sequence[ProposalJob], index: int) -> Proposal:
@@ -302,11 +298,12 @@ def _survived(job: ProposalJob, outcome: Proposal | Lost) -> Proposal:
     )
 
 
-def _answers(wish: Wish, run: Run, deadline: float | None) -> tuple[list[Answered], bool]:
+def _answers(wish: Wish, run: Run, deadline: float | None, bugs: list[str]) -> tuple[list[Answered], bool]:
     """Return what the families have to say, in their order, and whether the time was up before all had."""
     asked = list(names())
     plain = Run(run.seed)
-    found = dict(until(run.executor, deadline)(partial(_asked, wish, plain), iter(asked), lambda: False))
+    executor = surviving_until(run, deadline, bugs)
+    found = dict(executor(partial(_asked, wish, plain), iter(asked), lambda: False))
     answers, late = [], False
     for name in asked:
         outcome: FamilyOffer | Lost = found.get(name) or Lost(Status.TIMEOUT, UNANSWERED)
@@ -427,69 +424,3 @@ def _failures(done: Sequence[Proposal]) -> dict[str, tuple[str, ...]]:
             reported = one.message or "; ".join(one.missed)
             found[one.family] = tuple(dict.fromkeys((*found.get(one.family, ()), reported)))
     return found
-
-
-AGREES = 0.05
-"""Difference of the means up to which two models say the same."""
-
-
-def better(proposal: Proposal) -> tuple[str, Spec] | None:
-    """Return the finest model of the family that can run a proposal, if it is finer than its own; else None."""
-    spec = proposal.spec
-    names = list(family(proposal.family).models)
-    own = names.index(spec.fidelity) if spec.fidelity in names else 0
-    for name in reversed(names[own + 1 :]):
-        try:
-            return name, spec.replace({"analysis.fidelity": name})
-        except CfmError:  # what that model needs is not there: other parts, a motion in time
-            continue
-    return None
-
-
-def verified(proposal: Proposal) -> Proposal:
-    """Return a proposal that says how far a better model is from it; as it is where there is none."""
-    found = better(proposal)
-    if found is None:
-        return proposal
-    name, spec = found
-    record = family(proposal.family)
-    try:
-        means = [_mean(record.analyze(one, Run())) for one in (proposal.spec, spec)]
-    except (CfmError, ValueError, ArithmeticError) as problem:
-        return _noted(proposal, f"{name}: {' '.join(str(problem).split())[:200]}", None)
-    if None in means or not means[0]:
-        return _noted(proposal, f"{name}: its curve ends before the travel does", None)
-    deviation = float(means[1] or 0.0) / means[0] - 1.0
-    verdict = "agrees" if abs(deviation) <= AGREES else "does not agree"
-    return _noted(
-        proposal, f"{name} {verdict}: the mean over the travel differs by {100 * deviation:+.2g} %", deviation
-    )
-
-
-NOT_VERIFIED = "it was not finished when the time budget ended"
-
-
-def unverified(proposal: Proposal, why: str = "--verify") -> Proposal:
-    """Return a proposal that says which better model was not run, and why or how it is."""
-    found = better(proposal)
-    return proposal if found is None else _noted(proposal, f"not compared with the model {found[0]!r}: {why}", None)
-
-
-def _noted(proposal: Proposal, note: str, deviation: float | None) -> Proposal:
-    numbers = {**proposal.numbers, "finer_deviation": deviation}
-    return replace(proposal, notes=(note, *proposal.notes), numbers=numbers)
-
-
-def _mean(result: Result) -> float | None:
-    """Return the mean over the window of the analysis; None where the nominal curve does not cover it."""
-    window = result.spec.at("analysis.window")
-    if not result.curves or window is None:
-        return None
-    low, high = (float(end) for end in window)
-    curve = result.curve
-    order = np.argsort(curve.motion, kind="stable")
-    motion, effort = curve.motion[order], curve.effort[order]
-    if motion[0] > low + 1e-9 or motion[-1] < high * (1.0 - 1e-6):
-        return None
-    mean = float(np.interp(np.linspace(low, high, 201), motion, effort).mean())
-    return mean if np.isfinite(mean) else None
