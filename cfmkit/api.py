@@ -6,6 +6,7 @@ Everything is a value: nothing here prints or plots, and a disk is written to on
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import Named
@@ -168,6 +169,14 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
 def design(spec: AnySpec, run: Run | None = None) -> Design:
     """Return a complete specification that meets the targets of the `design` block, or why there is none.
 
+    Parameters
+    ----------
+    spec : Spec or path-like
+        With a `design` block, or its file.
+    run : Run, optional
+        Seed, progress report, time budget. If a yield is requested, the search for the perfect part has half of the
+        time, and that for its margins what is left.
+
     Raises
     ------
     cfmkit.errors.UsageError
@@ -185,17 +194,23 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
     run, asked = run or Run(), getattr(spec, "design", None)
-    if getattr(asked, "yield", None) is None:
-        found = record.design(spec, run)
-    else:
-        from cfmkit.studies.redesign_for_yield import with_design_margins
-
-        found = with_design_margins(spec, record.design(spec, run.part(0.0, 0.5)), run.part(0.5, 1.0))
+    plain = getattr(asked, "yield", None) is None
+    found = record.design(spec, run) if plain else _with_yield(spec, record.design, run)
     if getattr(asked, "verify", None) is not None:
         from cfmkit.studies.correction_by_solid_model import verified
 
         found = verified(spec, found, run)
     return found
+
+
+def _with_yield(spec: Spec, designer: Callable[[Any, Run], Design], run: Run) -> Design:
+    """Return a design of perfect parts, in half of the time, with margins for the yield, in the time that is left."""
+    from cfmkit.designing.run_many_starts import Clock
+    from cfmkit.studies.redesign_for_yield import with_design_margins
+
+    clock, half = Clock.of(run.time_budget), None if run.time_budget is None else 0.5 * run.time_budget
+    found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
+    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.left()))
 
 
 def evaluate(

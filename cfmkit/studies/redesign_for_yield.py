@@ -260,26 +260,28 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     run : Run
         Seed, progress, time budget.
     """
-    others = design.next_best[:OTHER_SPRINGS]
-    good, found = _moved(given, design, run, not others)
+    others, clock = design.next_best[:OTHER_SPRINGS], Clock.of(run.time_budget)
+    good, found = _moved(given, design, run, clock, not others)
     if not others or design.spec is None or found.spec is not None:
         return found
-    tried, clock = [(good, design)], Clock.of(run.time_budget)
+    tried = [(good, design)]
     for make in others:
+        if clock.late():
+            break
         other = make()
-        if other.spec is None or clock.late():
+        if other.spec is None:
             continue
-        good, found = _moved(given, other, run, False)
+        good, found = _moved(given, other, run, clock, False)
         if found.spec is not None and good:  # without a part that was solved nothing is known of its yield
             reported = f"{len(tried)} with a smaller deviation miss the yield that is requested"
             return replace(found, notes=(*found.notes, ("springs", f"other springs of the catalogue: {reported}")))
         tried.append((good, other))
-    _, found = _moved(given, max(tried, key=lambda one: one[0])[1], run, True)
+    _, found = _moved(given, max(tried, key=lambda one: one[0])[1], run, clock, True)
     reported = f"the best {len(tried)} choices of the catalogue's springs were tried"
     return replace(found, message=f"{found.message}; {reported}") if len(tried) > 1 else found
 
 
-def _moved(given: Spec, design: Design, run: Run, largest: bool) -> tuple[int, Design]:
+def _moved(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -> tuple[int, Design]:
     """Return how many of `CHECKED` parts are good, where some were solved, and the design moved for its yield.
 
     `largest`: whether the largest yield is looked for where the requested one is not found.
@@ -298,7 +300,7 @@ def _moved(given: Spec, design: Design, run: Run, largest: bool) -> tuple[int, D
     if first is None:
         return 0, replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
     sight = Sight(design.spec, tuple(free), made, rows_of(nominal, first, places), run)
-    problem = problem_of(sight, free, wanted, run)
+    problem = problem_of(sight, free, wanted, clock)
     start = np.array([float(design.spec.at(path)) for path in free])
     try:
         found, good = _held(problem, sight, start, largest)
@@ -384,9 +386,9 @@ def _errors(sight: Sight) -> FloatArray:
     return np.asarray(sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal)
 
 
-def problem_of(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> RobustProblem:
-    """Return how the values with ranges `free` [SI] are to move until a share `wanted` of parts is good."""
-    made, clock = sight.made, Clock.of(run.time_budget)
+def problem_of(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, clock: Clock) -> RobustProblem:
+    """Return how values with ranges `free` [SI] are to move until a share `wanted` of parts is good, or time ends."""
+    made, run = sight.made, sight.run
     values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
     errors = values - made.nominal
     sigma = np.array([one.spread.standard_deviation for one in made.parameters])
@@ -461,6 +463,8 @@ def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Ro
             f". {short} of {CHECKED} parts end before the windows of the requirements do: state windows as shares of "
             "the travel, such as [1 %, 100 %], which then follow the travel of each part"
         )
+    if problem.late():
+        reported += "; the time budget ended the search"
     nearest = {"design.yield": f"{np.floor(value):.0f} %"}
     return Design(
         None, Status.INFEASIBLE, reported, nearest_feasible=nearest, search=design.search, tables=design.tables

@@ -11,7 +11,9 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
+from cfmkit.designing import run_many_starts
 from cfmkit.designing.robust_design import RobustProblem, with_margins
+from cfmkit.families import family
 from cfmkit.families.beam.force_at_few_poses import sampled, sampled_slopes
 from cfmkit.families.run_control import Run
 from cfmkit.families.vcfm import model
@@ -250,6 +252,46 @@ def test_a_closed_model_is_moved_as_well():
     means = [cfmkit.evaluate(cfmkit.analyze(one), ["force_mean[unload]"]) for one in (spec, design.spec)]
     before, after = (one["force_mean[unload]"].value for one in means)
     assert before < 50.2 < after
+
+
+def test_all_springs_that_are_tried_for_a_yield_share_one_time_budget(monkeypatch):
+    """Each search takes three of ten seconds: the fourth is not begun, and the last has no time left."""
+    now, left = [1000.0], []
+
+    def moved(_given, design, _run, clock, largest):
+        left.append(clock.left())
+        now[0] += 3.0
+        return len(left), replace(design, spec=None, message="no")
+
+    monkeypatch.setattr(run_many_starts, "time", lambda: now[0])
+    monkeypatch.setattr(redesign_for_yield, "_moved", moved)
+    spec = cfmkit.load("configs/cam.yaml")
+    one = cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE)
+    found = with_design_margins(spec, replace(one, next_best=(lambda: one,) * 4), Run(time_budget=10.0))
+    assert left == [10.0, 7.0, 4.0, 1.0, 0.0]
+    assert found.message == "no; the best 4 choices of the catalogue's springs were tried"
+
+
+def test_the_search_and_its_margins_share_the_time_budget(monkeypatch):
+    now, budgets = [1000.0], []
+
+    def designed(spec, run):
+        budgets.append(run.time_budget)
+        now[0] += 2.0
+        return cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE)
+
+    def margins(_given, design, run):
+        budgets.append(run.time_budget)
+        return design
+
+    monkeypatch.setattr(run_many_starts, "time", lambda: now[0])
+    monkeypatch.setattr(redesign_for_yield, "with_design_margins", margins)
+    monkeypatch.setattr("cfmkit.api.family", lambda name: replace(family(name), design=designed))
+    spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.yield": 0.9})
+    cfmkit.design(spec, Run(time_budget=10.0))
+    assert budgets == [5.0, 8.0]
+    cfmkit.design(spec)
+    assert budgets[2:] == [None, None]
 
 
 class TwoLimits:

@@ -19,6 +19,7 @@ import numpy as np
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.designing.robust_design import NoPart, with_margins
+from cfmkit.designing.run_many_starts import Clock
 from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.wishes import Candidate, Wish
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
@@ -243,7 +243,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
         return None
     made = DesignTolerances(spec, block, parameters_of(spec, block), block.samples or PARTS, run.seed)
     sight = Sight(spec, tuple(free), made, rows_of(nominal, first, places), run)
-    problem = problem_of(sight, free, asked, run)
+    problem = problem_of(sight, free, asked, Clock.of(run.time_budget))
     try:
         found = with_margins(problem, np.array([float(spec.at(path)) for path in free]), STEPS)
     except NoPart:
