@@ -58,12 +58,18 @@ def go_on(fresh: bool) -> str:
     return f"run the same command again{' without --fresh' if fresh else ''} to continue"
 
 
-def fail(error: BaseException, terminal: Terminal) -> ExitCode:
-    """Tell the user what ended the command; return the exit code."""
+def told(error: BaseException, terminal: Terminal) -> Answer:
+    """Tell the user what went wrong, with its traceback if that is wanted; return the answer that it is."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
     answer = answer_to(error)
     terminal.complain(answer.complaints)
+    return answer
+
+
+def fail(error: BaseException, terminal: Terminal) -> ExitCode:
+    """Tell the user what ended the command; return the exit code."""
+    answer = told(error, terminal)
     if terminal.json:
         # What could not be written may be this very output.
         with suppress(OutputError):

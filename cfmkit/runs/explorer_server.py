@@ -1,11 +1,11 @@
 """A specification whose numbers are moved by sliders, with everything computed again as they move.
 
-`Explorer` holds the file as it was written and answers changes of it as data for a page; `ExplorerServer` puts
-it on a port of this computer: reachable from this computer only, and only with its token. Changes are those of
+`Explorer` holds the file as it was written and answers changes of it as data for a page. Changes are those of
 ``--set``: a page can say no more than a command line.
 
-The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
-name by which it was reached (a page elsewhere that lets its own name point here is refused), the token, the size.
+`ExplorerServer` puts it on a port of this computer: reachable from this computer only, and only with its token. The
+server of the standard library does: one person asks, one answer at a time. What is checked on every request: the name
+by which it was reached (a page elsewhere that lets its own name point here is refused), the token, the size.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from cfmkit.runs.specfile import bind, changed, read_spec
 from cfmkit.specs.units.number_reading import NUMBER
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.curves import Curve
     from cfmkit.results import Result
@@ -325,6 +325,10 @@ LARGEST = 200_000
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; img-src data:"
 
 
+def ignored(_error: Exception) -> None:
+    """Tell nobody: the default for library use."""
+
+
 class ExplorerServer(ThreadingHTTPServer):
     """The server of one explorer.
 
@@ -334,11 +338,13 @@ class ExplorerServer(ThreadingHTTPServer):
         What answers.
     token : str
         What a request must have.
+    failed : callable
+        Is told the exception of an answer that a bug ended; the page has one line of it.
     """
 
     daemon_threads = True
 
-    def __init__(self, explorer: Explorer, port: int = 0) -> None:
+    def __init__(self, explorer: Explorer, port: int = 0, failed: Callable[[Exception], object] = ignored) -> None:
         """Bind to a port of this computer alone; 0 takes a free one.
 
         Raises
@@ -347,6 +353,7 @@ class ExplorerServer(ThreadingHTTPServer):
             If the port is taken.
         """
         self.explorer, self.token, self.turn = explorer, secrets.token_urlsafe(24), threading.Lock()
+        self.failed = failed
         super().__init__((HOST, port), _Handler)
 
     @property
@@ -419,6 +426,7 @@ class _Handler(BaseHTTPRequestHandler):
         except CfmError as error:
             return 200, {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
         except Exception as error:
+            self.server.failed(error)
             return 500, {"problem": [f"a bug in cfmkit: {type(error).__name__}: {error}"]}
         return 404, {}
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import cfmkit
+from cfmkit.cli.failures import told
+from cfmkit.cli.output import Terminal
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.runs.explorer_server import Explorer, ExplorerServer, suggested_name
 
@@ -127,6 +129,22 @@ def test_a_malformed_request_is_refused_and_the_next_one_answered(served, data):
     token = {"X-Token": served.token}
     assert asked(served, data=data, **token)[0] == 400
     assert asked(served, data={"changes": []}, **token)[0] == 200
+
+
+@pytest.mark.parametrize("verbose", [0, 2])
+def test_a_bug_is_one_line_for_the_page_and_its_traceback_is_not_lost(served, monkeypatch, capsys, verbose):
+    def broken(*_):
+        raise KeyError("analysis.window")
+
+    terminal = Terminal(verbose=verbose)
+    monkeypatch.setattr(served.explorer.__class__, "answer", broken)
+    monkeypatch.setattr(served, "failed", lambda error: told(error, terminal))
+    status, found = asked(served, data={"changes": []}, **{"X-Token": served.token})
+    assert status == 500
+    assert json.loads(found) == {"problem": ["a bug in cfmkit: KeyError: 'analysis.window'"]}
+    err = capsys.readouterr().err
+    assert err.endswith("error    this is a bug in cfmkit: KeyError: 'analysis.window'; -vv shows where\n")
+    assert ('raise KeyError("analysis.window")' in err) == (verbose == 2)
 
 
 def test_a_page_that_is_closed_before_its_answer_leaves_no_traceback(served, monkeypatch, capsys):

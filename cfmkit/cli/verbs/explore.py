@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.failures import Stopped
+from cfmkit.cli.failures import Stopped, told
 from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.cli.page_block_types import line, whole_line
 from cfmkit.cli.verb_result import Answer
@@ -46,7 +46,7 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
         raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")
     explorer = Explorer.of(options.spec, options.changes)
     try:
-        server = ExplorerServer(explorer, options.port)
+        server = ExplorerServer(explorer, options.port, lambda error: told(error, terminal))
     except OSError as error:
         reported = (error.strerror or str(error)).lower()
         raise UsageError(f"--port: {options.port} cannot be listened on: {reported}") from None
