@@ -16,6 +16,8 @@ from cfmkit import families
 from cfmkit.cli import shell_completion
 from cfmkit.cli.main import main
 from cfmkit.families import entry_point_plugins
+from cfmkit.studies.serial_and_cluster_executors import serial
+from cfmkit.studies.suggest import search
 
 SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml")
 
@@ -99,16 +101,23 @@ def test_a_family_has_its_article(monkeypatch):
 LINE = "warning  the family 'broken' of the package broken-one 1.0 cannot be used: it cannot be imported: "
 
 
-@pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",)])
-def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys):
+WISH = ("suggest", "--force", "10 N", "--travel", "3 mm", "--room", "80x60x6mm", "-o", "out", "--no-plots")
+
+
+@pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",), WISH])
+def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys, monkeypatch):
+    """Of the wish in this process, and without the families of cfmkit, which search for seconds."""
+    monkeypatch.setattr(search, "names", lambda: ("oblique", "broken"))
+    monkeypatch.setattr(search, "until", lambda _executor, _deadline: serial)
     packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
-    assert main(list(arguments)) == 0
+    code = 4 if arguments is WISH else 0
+    assert main(list(arguments)) == code
     out, err = capsys.readouterr()
     assert [line for line in err.splitlines() if line.startswith(LINE)] == err.splitlines()
     assert err.count("\n") == 1
     assert "doctor" in err
     assert "broken" not in out
-    assert main([*arguments, "--json"]) == 0
+    assert main([*arguments, "--json"]) == code
     (reported,) = json.loads(capsys.readouterr().out)["warnings"]
     assert reported["name"] == "family_skipped"
 

@@ -24,7 +24,7 @@ from cfmkit.cli.page_block_types import (
     line,
     next_command,
 )
-from cfmkit.cli.verb_result import Answer
+from cfmkit.cli.verb_result import Answer, reported_for
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -122,6 +122,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     Candidates from every family are designed and analysed from their written files with the exact model. Only those
     that meet the whole wish are listed.
     """
+    from cfmkit import families
     from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.run_control import Run
@@ -172,13 +173,14 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     data = suggestion_files.as_json(found, block) | written.data | {"reused": found.reused}
     complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
     page = _page(data, written, terminal.verbose > 0)
-    return Answer(data, page, code, tuple(_bugs(found.bugs, terminal.tracebacks)), quiet_complaints=complaints)
+    answer = Answer(data, page, code, tuple(_bugs(found.bugs, terminal.tracebacks)), quiet_complaints=complaints)
+    return reported_for(families.skipped(), answer)
 
 
 def _bugs(bugs: Sequence[str], shown: bool) -> Iterator[str]:
     """Yield how many candidates a bug ended, and the first traceback if it is to be shown."""
     if bugs:
-        yield f"error    {len(bugs)} candidate{'s' * (len(bugs) > 1)} hit a bug in cfmkit; -vv shows the first"
+        yield f"error    {len(bugs)} of the families and candidates hit a bug in cfmkit; -vv shows the first"
     if bugs and shown:
         yield from bugs[0].rstrip("\n").split("\n")
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.designing.run_many_starts import Clock
-from cfmkit.families import family, names
+from cfmkit.families import Unusable, family, names
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.families.wishes import FamilyOffer
@@ -316,7 +316,10 @@ def _answers(wish: Wish, run: Run, deadline: float | None, bugs: list[str]) -> t
 
 
 def _asked(wish: Wish, run: Run, name: str) -> FamilyOffer:
-    record = family(name)
+    try:
+        record = family(name)
+    except Unusable:  # of another package; `families.skipped` says why
+        return FamilyOffer()
     if record.propose is None:
         return FamilyOffer()
     offer: FamilyOffer = function_named(record.propose)(wish, run)
