@@ -49,12 +49,6 @@ class Body:
         """Corners of the triangles, (m, 3, 3) [mm]."""
         return np.asarray(to_border(self.points, "length"))[self.triangles]
 
-    @property
-    def volume(self) -> float:
-        """Of what is inside [m3]."""
-        a, b, c = self.points[self.triangles].swapaxes(0, 1)
-        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
-
 
 @dataclass(frozen=True)
 class LayeredPolygon:

@@ -167,33 +167,6 @@ def _extremes(levels: Levels, last: NDArray[np.intp]) -> tuple[FloatArray, Float
     return np.maximum(highs.take(head), highs.take(tail)), np.minimum(lows.take(head), lows.take(tail))
 
 
-def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return first and last sample of the longest window with (max - min)/max within `flatness`, for each curve.
-
-    Parameters
-    ----------
-    force : (k, n) array
-        Samples at even places [N]; a window holds positive ones only.
-    flatness : float
-        Largest (max - min)/max.
-
-    Returns
-    -------
-    first, last : (k,) array of int
-        Equal where no two neighbours are within the band. The first of several longest.
-
-    Examples
-    --------
-    >>> first, last = longest_window(np.array([[0.0, 5.0, 9.8, 10.0, 9.9, 7.0]]), 0.05)
-    >>> int(first[0]), int(last[0])
-    (2, 4)
-    """
-    force = np.where(np.isfinite(force), force, -1.0)
-    reach = _reach(_levels(force), flatness)
-    first = reach.argmax(axis=1)
-    return first, first + reach[np.arange(len(force)), first]
-
-
 def _reach(levels: Levels, flatness: float) -> NDArray[np.intp]:
     """Return how many samples behind each one are still within the band that begins there."""
     curves, n = levels[0][0].shape

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from cfmkit.plots.poses_in_one_svg import Moving
     from cfmkit.results import Result
 
-KINDS = ("gif", "mp4")
-
 WIDTH, HEIGHT = 240.0, 100.0
 """Of a frame [mm]; with `DOTS` 960 x 400 dots, half a slide."""
 

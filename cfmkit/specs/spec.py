@@ -256,12 +256,6 @@ else:
     )
 
 
-def yield_wanted(design: Any) -> float | None:
-    """Return the share of good parts that a `design` block asks for; None where it asks for none."""
-    found: float | None = getattr(design, "yield", None)
-    return found
-
-
 class Spec(Model):
     """A complete specification of one mechanism; families narrow the blocks."""
 
@@ -486,5 +480,4 @@ __all__ = [
     "frozen",
     "readable_requirement",
     "refuse",
-    "yield_wanted",
 ]

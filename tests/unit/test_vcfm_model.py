@@ -25,7 +25,7 @@ from cfmkit.families.vcfm.pose_outlines import centre_line
 from cfmkit.families.vcfm.scalar_results import forces, spread
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.metrics import Window, evaluate
-from cfmkit.metrics.longest_interval_in_band import longest_window
+from cfmkit.metrics.longest_interval_in_band import _levels, _reach
 from cfmkit.results import Status
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
@@ -125,22 +125,14 @@ def test_a_diamond_without_angle_is_a_parallel_guide():
 # --- windows ---------------------------------------------------------------------------------------------------
 
 
-def plain_longest(force, flatness):
-    best = (0, 0)
-    for i in range(len(force)):
-        for j in range(i, len(force)):
-            part = force[i : j + 1]
-            if part.min() > 0 and part.max() - part.min() <= flatness * part.max() and j - i > best[1] - best[0]:
-                best = (i, j)
-    return best
-
-
-def test_the_longest_window_is_what_trying_all_gives():
+def test_the_samples_within_the_band_behind_each_one_are_what_trying_all_gives():
     curves = np.random.default_rng(3).normal(size=(30, 40)).cumsum(axis=1) * 0.1 + 5
-    curves[4, 10] = np.nan
-    first, last = longest_window(curves, 0.05)
-    for curve, start, stop in zip(curves, first, last, strict=True):
-        assert (start, stop) == plain_longest(np.where(np.isnan(curve), -1, curve), 0.05)
+    curves[4, 10] = -1.0
+    for curve, found in zip(curves, _reach(_levels(curves), 0.05), strict=True):
+        for start, reach in enumerate(found.tolist()):
+            parts = [curve[start : end + 1] for end in range(start + 1, len(curve))]
+            fits = [part.min() > 0 and np.ptp(part) <= 0.05 * part.max() for part in parts]
+            assert reach == [*fits, False].index(False)
 
 
 @pytest.mark.parametrize("model", ["analytic", "exact"])

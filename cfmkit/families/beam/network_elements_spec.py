@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -23,10 +23,6 @@ from cfmkit.specs.units import (
 )
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PaddedPart, material_input
 from cfmkit.stock.materials import material
-
-if TYPE_CHECKING:
-    pass
-
 
 Point = tuple[Length, Length]
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 Policy = Literal["fail", "resample", "bound"]
-POLICIES: tuple[Policy, ...] = ("fail", "resample", "bound")
 
 MOST_DRAWN = 10
 """Blocks are drawn at most so many times as often as they are wanted."""

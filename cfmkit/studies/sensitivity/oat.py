@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.failed_sample_policy import Policy
 
 LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
-NAMES = (LOW, HIGH, SWING, SLOPE)
 
 
 def sample(nominal: FloatArray, ends: FloatArray, count: int) -> FloatArray:

@@ -32,8 +32,6 @@ USUAL: dict[str, tuple[str, ...]] = {
 }
 """What is made by a process where the wish names no material."""
 
-PREFERENCES = ("size", "ripple", "parts", "stress", "depth")
-
 Prefer = Literal["size", "ripple", "parts", "stress", "depth"]
 
 
