@@ -8,7 +8,8 @@
 with what was printed and the exit code. ``compare`` reads two such folders and reports three things apart:
 
 names
-    Files, columns, keys, lengths and exit codes that only one side has.
+    Files, columns, keys, lengths, exit codes and numbers that only one side has: a number that became an empty cell, a
+    text, nan or null has gone, and one in place of these is new.
 numbers
     The largest difference of a column, in parts of the column's largest absolute value; of a single number, in parts
     of itself. Differences up to the tolerance are not listed.
@@ -76,11 +77,17 @@ def record(out: Path, command: str, only: str, workers: int) -> None:
 
 
 def number(text: str) -> float | None:
-    """Return a cell as a number; None if it is none."""
+    """Return a cell as a number; None if it is none, or nan."""
     try:
-        return float(text)
+        found = float(text)
     except ValueError:
         return None
+    return None if math.isnan(found) else found
+
+
+def is_number(value: object) -> bool:
+    """Return whether a JSON leaf is a number."""
+    return isinstance(value, float | int) and not isinstance(value, bool) and not math.isnan(value)
 
 
 def columns(path: Path) -> dict[str, list[str]]:
@@ -121,13 +128,17 @@ class Differences:
             return
         pairs = [(number(a), number(b)) for a, b in zip(before, after, strict=True)]
         scale = max((abs(a) for a, _ in pairs if a is not None and math.isfinite(a)), default=0.0)
-        worst = 0.0
-        for (a, b), old, new in zip(pairs, before, after, strict=True):
-            if a is None or b is None:
-                if old != new:
-                    self.texts.append(f"{place}: {old!r}, now {new!r}")
-            elif a != b and not (math.isnan(a) and math.isnan(b)):
-                worst = max(worst, abs(a - b) / scale if scale else math.inf)
+        worst, gone = 0.0, []
+        for row, ((a, b), old, new) in enumerate(zip(pairs, before, after, strict=True), 1):
+            if a is not None and b is not None:
+                if a != b:
+                    worst = max(worst, abs(a - b) / scale if scale else math.inf)
+            elif a is not None or b is not None:
+                gone.append(f"row {row}: {old!r}, now {new!r}")
+            elif old != new:
+                self.texts.append(f"{place}: {old!r}, now {new!r}")
+        if gone:
+            self.names.append(f"{place}: {len(gone)} numbers on one side only, the first in {gone[0]}")
         if worst > self.tolerance:
             self.numbers.append(f"{place}: {worst:.2g} of the largest value")
 
@@ -144,10 +155,12 @@ class Differences:
         self.names += [f"{place}: {name} on one side only" for name in old.keys() ^ new.keys()]
         for name in old.keys() & new.keys():
             a, b = old[name], new[name]
-            if isinstance(a, float | int) and isinstance(b, float | int) and not isinstance(a, bool):
-                if a != b and abs(a - b) > self.tolerance * max(abs(a), abs(b)):
+            if is_number(a) and is_number(b):
+                if a != b and not abs(a - b) <= self.tolerance * max(abs(a), abs(b)):
                     self.numbers.append(f"{place}: {name}: {a!r}, now {b!r}")
-            elif a != b:
+            elif is_number(a) or is_number(b):
+                self.names.append(f"{place}: {name}: a number on one side only: {a!r}, now {b!r}")
+            elif str(a) != str(b):
                 self.text(f"{place}: {name}", str(a), str(b))
 
     def text(self, place: str, before: str, after: str) -> None:

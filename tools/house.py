@@ -7,7 +7,8 @@
 A knot is a strongly connected set of modules in the graph of *all* imports: those at the top of a file, inside
 functions and for types alone. A string that is exactly the dotted name of a module (``"cfmkit.families.cam.model"``,
 also with ``:function`` behind it) counts as an import of it: looking a module up by its name does not untie a knot.
-Importing ``cfmkit.a.b`` ties a file to ``b``, not to ``cfmkit/a/__init__.py``.
+An f-string that begins with the name of the package, or with ``module.__name__``, counts as an import of every module
+that it can name. Importing ``cfmkit.a.b`` ties a file to ``b``, not to ``cfmkit/a/__init__.py``.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import re
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -29,6 +31,39 @@ def modules(package: Path) -> dict[str, Path]:
         parts = path.relative_to(package.parent).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
+
+
+def formatted(node: ast.JoinedStr, aliases: dict[str, str]) -> str:
+    """Return a pattern for what an f-string may be; of ``module.__name__`` the name of that module."""
+    parts = []
+    for part in node.values:
+        value = part.value
+        if isinstance(part, ast.Constant):
+            parts.append(re.escape(str(value)))
+        elif (
+            isinstance(value, ast.Attribute)
+            and value.attr == "__name__"
+            and isinstance(value.value, ast.Name)
+            and value.value.id in aliases
+        ):
+            parts.append(re.escape(aliases[value.value.id]))
+        else:
+            parts.append(r"[\w.]+")
+    return "".join(parts).split(":")[0]
+
+
+def looked_up(tree: ast.AST, known: dict[str, Path]) -> set[str]:
+    """Return the modules among the known ones that f-strings in a syntax tree can name."""
+    package = min(known, key=len)
+    aliases = {
+        alias.asname or alias.name: f"{node.module}.{alias.name}" if isinstance(node, ast.ImportFrom) else alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in node.names
+    }
+    patterns = [formatted(node, aliases) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+    own = [re.compile(one) for one in patterns if one.startswith(re.escape(f"{package}."))]
+    return {name for name in known for one in own if one.fullmatch(name)}
 
 
 def imported(tree: ast.AST, known: dict[str, Path]) -> set[str]:
@@ -55,7 +90,7 @@ def imported(tree: ast.AST, known: dict[str, Path]) -> set[str]:
             and id(node) not in loggers
         ):
             found.add(node.value.split(":")[0])
-    return found & set(known)
+    return (found & set(known)) | looked_up(tree, known)
 
 
 def knots(graph: dict[str, set[str]]) -> list[list[str]]:

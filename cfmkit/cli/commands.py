@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import pkgutil
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -13,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from cfmkit.cli import verbs
+from cfmkit.cli.verbs import names
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,11 +54,6 @@ class Verbs(TyperGroup):
         if args and args[0] not in names() and not args[0].startswith("-") and not ctx.resilient_parsing:
             ctx.fail(_unknown(args[0]))
         return super().resolve_command(ctx, args)
-
-
-def names() -> list[str]:
-    """Return the names of all verbs."""
-    return [item.name.replace("_", "-") for item in pkgutil.iter_modules(verbs.__path__)]
 
 
 def _unknown(name: str) -> str:

@@ -32,6 +32,8 @@ def package(tmp_path):
         "def f():\n    import thing.a",
         'MODEL = "thing.a:solve"',
         "from thing import a",
+        'def f(name):\n    return look_up(f"thing.{name}:solve")',
+        'import thing\ndef f(name):\n    return look_up(f"{thing.__name__}.{name}")',
     ],
 )
 def test_two_modules_that_need_each_other_in_any_way_are_a_knot(package, way_back):
@@ -47,3 +49,8 @@ def test_a_long_circle_is_one_knot_and_a_chain_is_none(package):
 def test_a_class_name_in_two_modules_is_reported(package):
     figures = package(a="class Path: ...", b="class Path: ...", c="class Other: ...")
     assert figures["class_names_in_several_modules"] == {"Path": ["thing.a", "thing.b"]}
+
+
+def test_an_f_string_that_names_no_module_is_no_import(package):
+    way_back = 'def f(name, x):\n    return f"thing.{name} is {x}", f"{name}.a", f"thing_{name}.a", f"{x.__name__}.a"'
+    assert package(a="import thing.b", b=way_back)["knots"] == []

@@ -9,3 +9,12 @@ A verb module has
 A module that is added here is a command; nothing else needs to know. Anything slow to
 import is imported inside ``run``.
 """
+
+from __future__ import annotations
+
+import pkgutil
+
+
+def names() -> list[str]:
+    """Return the names of all verbs."""
+    return [item.name.replace("_", "-") for item in pkgutil.iter_modules(__path__)]

@@ -63,7 +63,7 @@ def _refer_to_help(name: str | None) -> None:
     cfmkit.errors.UsageError
         If it is one.
     """
-    from cfmkit.cli.commands import names
+    from cfmkit.cli.verbs import names
 
     if name in names():
         raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it") from None
