@@ -142,6 +142,15 @@ def single_use(trees: dict[str, ast.AST]) -> int:
     return sum(1 for name, count in defined.items() if count == 1 and used[name] == 1)
 
 
+def shared_classes(texts: dict[str, str]) -> dict[str, list[str]]:
+    """Return the names of classes that several modules have, with these."""
+    classes: dict[str, list[str]] = defaultdict(list)
+    for name, text in texts.items():
+        for found in re.findall(r"^ *class (\w+)[(:\[]", text, re.MULTILINE):
+            classes[found].append(name)
+    return {name: homes for name, homes in sorted(classes.items()) if len(homes) > 1}
+
+
 def survey(package: Path) -> dict[str, object]:
     """Return the figures of a package."""
     known = modules(package)
@@ -149,11 +158,6 @@ def survey(package: Path) -> dict[str, object]:
     trees = {name: ast.parse(text) for name, text in texts.items()}
     graph = {name: imported(tree, known) - {name} for name, tree in trees.items()}
     importers: Counter[str] = Counter(target for targets in graph.values() for target in targets)
-    classes: dict[str, list[str]] = defaultdict(list)
-    for name, tree in trees.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef):
-                classes[node.name].append(name)
     top = [path for path in package.iterdir() if path.name != "__pycache__"]
     tied = knots(graph)
     return {
@@ -163,7 +167,7 @@ def survey(package: Path) -> dict[str, object]:
         "top_files": sum(path.suffix == ".py" for path in top),
         "modules_with_one_importer": sum(1 for count in importers.values() if count == 1),
         "private_functions_used_once": single_use(trees),
-        "class_names_in_several_modules": {name: homes for name, homes in sorted(classes.items()) if len(homes) > 1},
+        "class_names_in_several_modules": shared_classes(texts),
         "knots": tied,
         "ties": [[f"{a} -> {b}" for a in members for b in sorted(graph[a] & set(members))] for members in tied],
     }

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
 import pytest
 
-HOUSE = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "house.py"))
+ROOT = Path(__file__).parents[2]
+HOUSE = runpy.run_path(str(ROOT / "tools" / "house.py"))
 
 
 @pytest.fixture
@@ -54,3 +56,12 @@ def test_a_class_name_in_two_modules_is_reported(package):
 def test_an_f_string_that_names_no_module_is_no_import(package):
     way_back = 'def f(name, x):\n    return f"thing.{name} is {x}", f"{name}.a", f"thing_{name}.a", f"{x.__name__}.a"'
     assert package(a="import thing.b", b=way_back)["knots"] == []
+
+
+def test_classes_of_one_name_are_those_that_the_architecture_explains():
+    texts = {name: path.read_text("utf-8") for name, path in HOUSE["modules"](ROOT / "cfmkit").items()}
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    (told,) = (part for part in text.split("\n\n") if "class names occur in several families" in part)
+    named = sorted(re.findall(r"`(\w+)`", told))
+    assert list(HOUSE["shared_classes"](texts)) == named
+    assert told.startswith({7: "Seven", 8: "Eight", 9: "Nine"}[len(named)])

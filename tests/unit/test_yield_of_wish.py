@@ -16,7 +16,7 @@ from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, made, redesigned
 from cfmkit.studies.suggest.search import _key, _Making, _Times
-from cfmkit.studies.suggest.yield_of_proposal import Moved, moved_for_yield
+from cfmkit.studies.suggest.yield_of_proposal import MovedForYield, moved_for_yield
 from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
 
 POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
@@ -91,7 +91,7 @@ def moved_to(monkeypatch, shares):
 
     def moved(_candidate, spec, _wish, share, _run):
         asked.append(share)
-        return Moved(spec, 0.5, shares[len(asked) - 1], "mechanism.bistable.thickness")
+        return MovedForYield(spec, 0.5, shares[len(asked) - 1], "mechanism.bistable.thickness")
 
     monkeypatch.setattr(proposal_making_and_judging, "moved_for_yield", moved)
     return asked

@@ -17,7 +17,13 @@ from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
-from cfmkit.studies.suggest.yield_of_proposal import GoodParts, Moved, good_parts, moved_for_yield, with_made_parts
+from cfmkit.studies.suggest.yield_of_proposal import (
+    GoodParts,
+    MovedForYield,
+    good_parts,
+    moved_for_yield,
+    with_made_parts,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -214,12 +220,12 @@ def redesigned(
     return replace(best, missed=(f"{best.missed[0]}; {_tried(last, obstacle)}",), movable=False)
 
 
-def _note(moved: Moved) -> str:
+def _note(moved: MovedForYield) -> str:
     shares = f"{100.0 * moved.began:.3g} % of parts were good before and {100.0 * moved.share:.3g} % are now"
     return f"designed with margins for the yield: to first order {shares}"
 
 
-def _tried(moved: Moved | None, obstacle: str) -> str:
+def _tried(moved: MovedForYield | None, obstacle: str) -> str:
     """Return why margins did not help."""
     if moved is None:
         return "no value of the design may change to improve it"

@@ -78,7 +78,7 @@ class GoodParts:
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedForYield:
     """A mechanism whose values were moved for a yield.
 
     Attributes
@@ -211,7 +211,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, run: Run) -> Moved | None:
+def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, run: Run) -> MovedForYield | None:
     """Return a proposal with the largest share of good parts that is found to first order, up to what is asked.
 
     Parameters
@@ -229,7 +229,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
 
     Returns
     -------
-    Moved or None
+    MovedForYield or None
         None where nothing may move, or the proposal cannot be followed at a few poses.
     """
     block = spec.sensitivity
@@ -248,7 +248,9 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
         found = with_margins(problem, np.array([float(spec.at(path)) for path in free]), STEPS)
     except NoPart:
         return None
-    return Moved(written(sight, found, problem), found.began, found.share, costliest_path(sight, found, problem))
+    return MovedForYield(
+        written(sight, found, problem), found.began, found.share, costliest_path(sight, found, problem)
+    )
 
 
 def _free(candidate: Candidate, spec: Spec, wish: Wish) -> dict[str, tuple[float, float]]:
