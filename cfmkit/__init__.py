@@ -96,7 +96,7 @@ _HOMES = {
     ),
     "cfmkit.experiment.reading": ("Recording",),
     "cfmkit.experiment.measurement_and_calibration_outputs": ("MeasureReport",),
-    "cfmkit.families.base": ("Run",),
+    "cfmkit.families.run_control": ("Run",),
     "cfmkit.runs.measure_and_calibrate_api": ("calibrate", "measure"),
     "cfmkit.runs.notebook_result": ("AnalysisView",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),

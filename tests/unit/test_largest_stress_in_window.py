@@ -12,8 +12,8 @@ import pytest
 
 from cfmkit import api
 from cfmkit.families import family
-from cfmkit.families.base import Run
 from cfmkit.families.beam.model import solve
+from cfmkit.families.run_control import Run
 from cfmkit.metrics import evaluate
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.point_evaluation import Study
