@@ -6,12 +6,14 @@ An option or argument is a field of the dataclass that a verb's `run` takes: its
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from cfmkit.cli import shell_completion
+from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -282,3 +284,24 @@ def refuse_without_data(options: Measuring) -> None:
     for name in ("units", "tare", "zero", "flip"):
         if getattr(options, name) is not None:
             raise UsageError(f"--{name} applies to a measurement: name its file with --data")
+
+
+def seconds(text: str) -> float:
+    """Return a time budget [s].
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is no time above zero.
+    """
+    from cfmkit.errors import QuantityError
+    from cfmkit.specs.units import read_quantity
+
+    spaced = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", text.strip())
+    try:
+        value = float(spaced) if re.fullmatch(r"[\d.]+", spaced) else read_quantity(spaced, "time")
+    except (QuantityError, ValueError) as error:
+        raise UsageError(f"--time-budget: {error}") from None
+    if not 0.0 < value < 1e6:
+        raise UsageError(f"--time-budget: {text} is not allowed: must be > 0")
+    return value

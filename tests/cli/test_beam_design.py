@@ -82,7 +82,8 @@ def test_a_task_that_makes_no_sense_is_refused_in_one_line(cli, arch, change, sa
     assert said in " ".join((done.out + done.err).split())
 
 
-def test_a_budget_of_no_time_is_told(cli, arch):
-    done = cli("design", arch, "-o", "out", "--no-plots", "--set", "design.optimise.time_budget=0.001 s")
+@pytest.mark.parametrize("budget", [("--set", "design.optimise.time_budget=0.001 s"), ("--time-budget", "0.001 s")])
+def test_a_budget_of_no_time_is_told(cli, arch, budget):
+    done = cli("design", arch, "-o", "out", "--no-plots", *budget)
     assert done.code == 4
     assert "the time budget ended before any start" in " ".join(done.out.split())

@@ -24,6 +24,7 @@ OUTCOMES = {
     "a-folder": (("analyze", "."), ExitCode.USAGE, "usage"),
     "malformed-set": ((*RUN, "--set", "points"), ExitCode.USAGE, "usage"),
     "negative-seed": ((*RUN, "--seed", "-1"), ExitCode.USAGE, "usage"),
+    "no-time": (("design", "cam.yaml", "--time-budget", "0 s"), ExitCode.USAGE, "usage"),
     "no-folder-for-stdin": (("analyze", "-"), ExitCode.USAGE, "usage"),
     "empty-folder-name": (("analyze", "cam.yaml", "-o", ""), ExitCode.USAGE, "usage"),
     "unknown-key": ((*RUN, "--set", "mechanism.roler=1 mm"), ExitCode.INVALID, "invalid"),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, WithReport
+from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, WithReport, option, seconds
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -28,6 +28,10 @@ class DesignOptions(Computing):
     animate: Animate = None
     jobs: Jobs = None
     fresh: Fresh = False
+    time_budget: Annotated[
+        str | None,
+        option("--time-budget", metavar="TIME", text="Time after which a search ends with the best found: 60s, 10min."),
+    ] = None
 
 
 def run(options: DesignOptions, terminal: Terminal) -> Answer:
@@ -36,15 +40,18 @@ def run(options: DesignOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.run import Verb, designed
     from cfmkit.studies.serial_and_cluster_executors import cores
 
-    running = partial(long_run, options.jobs or cores(), options.fresh)
+    budget = None if options.time_budget is None else seconds(options.time_budget)
+    running = partial(long_run, options.jobs or cores(), options.fresh, budget=budget)
     return execute(
         Verb("design", "designed and analysed", designed, running=running), options, terminal, options.report
     )
 
 
-def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> AbstractContextManager[Run]:
-    """Return a run in several processes that says on a signal whether the same command goes on."""
+def long_run(
+    jobs: int, fresh: bool, folder: RunFolder, plain: Run, budget: float | None = None
+) -> AbstractContextManager[Run]:
+    """Return a run in several processes, for so long [s], that says on a signal whether the same command continues."""
     from cfmkit.cli.run_study_in_folder import noting
     from cfmkit.runs import run
 
-    return run.long_run(jobs, fresh, folder, plain, noting)
+    return run.long_run(jobs, fresh, folder, replace(plain, time_budget=budget), noting)

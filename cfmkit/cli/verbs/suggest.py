@@ -10,7 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, WithReport, argument, flag, option
+from cfmkit.cli.options import (
+    Common,
+    Fresh,
+    Jobs,
+    NoPlots,
+    Out,
+    Quiet,
+    Seed,
+    WithReport,
+    argument,
+    flag,
+    option,
+    seconds,
+)
 from cfmkit.cli.page_block_types import (
     BAD,
     BLANK,
@@ -222,27 +235,6 @@ def room(text: str) -> str:
     unit = re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])
     full = [side if re.search(r"[a-zA-Z]", side) else f"{side} {unit}" for side in sides]
     return "[" + ", ".join(re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", side) for side in full) + "]"
-
-
-def seconds(text: str) -> float:
-    """Return a time budget [s].
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is no time above zero.
-    """
-    from cfmkit.errors import QuantityError
-    from cfmkit.specs.units import read_quantity
-
-    spaced = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", text.strip())
-    try:
-        value = float(spaced) if re.fullmatch(r"[\d.]+", spaced) else read_quantity(spaced, "time")
-    except (QuantityError, ValueError) as error:
-        raise UsageError(f"--time-budget: {error}") from None
-    if not 0.0 < value < 1e6:
-        raise UsageError(f"--time-budget: {text} is not allowed: must be > 0")
-    return value
 
 
 def _folder(options: SuggestOptions) -> str:
