@@ -166,7 +166,7 @@ def test_where_weights_help_the_slider_falls_at_first_and_the_page_says_so():
     lowest = path.path.travel(np.linspace(0.068, path.end, 4001)).min()
     assert lowest == pytest.approx(-0.4008e-3, rel=1e-3)
     assert found.state.assembly.track.dead_point - found.state.assembly.track.start == pytest.approx(lowest, rel=1e-4)
-    assert "go down before the rollers move out, by 0.4008 mm" in message(found, "dead_point")
+    assert "must first go down by 0.4008 mm before the rollers move out" in message(found, "dead_point")
     np.testing.assert_allclose(found.state.up.slider, 50.0, rtol=1e-9)
 
 
@@ -182,7 +182,7 @@ def test_a_path_that_weights_help_is_not_designed_inside_the_roller():
     asked = {"force": "8.8936 N", "stroke": "31.8 mm", "gravity": True, "friction": 0.0504868, "choose": "stiffness"}
     found = design(wide.replace({"design": asked | {"force_constant": "2.977068 mm"}}))
     assert found.spec is None
-    assert "bent to a radius of 81.87 mm at x = 99.92 mm, inside a roller of 85 mm" in found.message
+    assert "radius of curvature of 81.87 mm at x = 99.92 mm, less than the roller's 85 mm" in found.message
     assert found.nearest_feasible["mechanism.roller_radius"].startswith("81.87 mm")
 
 
