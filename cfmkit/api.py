@@ -197,7 +197,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     plain = getattr(asked, "yield", None) is None
     found = record.design(spec, run) if plain else _with_yield(spec, record.design, run)
     if getattr(asked, "verify", None) is not None:
-        from cfmkit.studies.correction_by_solid_model import verified
+        from cfmkit.studies.verify_design_by_solid_model import verified
 
         found = verified(spec, found, run)
     return found

@@ -16,7 +16,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.errors import DataError, UsageError
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.tables.lab_file import (
     ROLES,
     SEPARATORS,

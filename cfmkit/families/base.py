@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.elastica.input_deck import DrivenNetwork
+    from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.results import Design, Result
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec

@@ -29,7 +29,7 @@ from cfmkit import api
 from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
 from cfmkit.runs.html_report_of_run import ENDS, escaped_json, part, template
 from cfmkit.runs.specfile import bind, changed, read_spec
-from cfmkit.specs.units.number_reading import NUMBER
+from cfmkit.specs.units.strict_decimal_number import NUMBER
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -119,8 +119,8 @@ def _decks(spec: Spec) -> dict[str, bytes]:
     record = family(spec.family)
     if record.elastic_parts is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
-    from cfmkit.elastica.input_deck import beam_deck
-    from cfmkit.solid.input_deck import deck
+    from cfmkit.elastica.beam_deck_for_abaqus import beam_deck
+    from cfmkit.solid.mesh_deck_for_abaqus import deck
 
     parts = record.driven_parts(spec)
     found = {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in parts}

@@ -247,7 +247,7 @@ def number(text: str) -> Number:
     ('>', 0.53, 0.01)
     """
     from cfmkit.errors import QuantityError
-    from cfmkit.specs.units.number_reading import read_number
+    from cfmkit.specs.units.strict_decimal_number import read_number
     from cfmkit.specs.units.unit_size import unit_size
 
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)

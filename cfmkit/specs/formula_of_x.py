@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable

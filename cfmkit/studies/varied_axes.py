@@ -78,7 +78,7 @@ def wish(option: str) -> WantedVariation:
     cfmkit.errors.SpecError
         If its list holds what no specification may.
     """
-    from cfmkit.specs.units.number_reading import shown
+    from cfmkit.specs.units.strict_decimal_number import shown
     from cfmkit.specs.yamlio.tree_builder import read
 
     path, equals, content = (part.strip() for part in option.partition("="))

@@ -21,7 +21,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError, QuantityError, UsageError
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

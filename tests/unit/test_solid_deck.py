@@ -11,7 +11,7 @@ import pytest
 
 import cfmkit
 from cfmkit.elastica import Control, Displacement, trace
-from cfmkit.elastica.input_deck import beam_deck
+from cfmkit.elastica.beam_deck_for_abaqus import beam_deck
 from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of

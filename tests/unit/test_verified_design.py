@@ -10,7 +10,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
-from cfmkit.studies.correction_by_solid_model import verified
+from cfmkit.studies.verify_design_by_solid_model import verified
 
 QUICK = ("analysis.solid.poses=9", "analysis.solid.mesh=1 mm", "analysis.points=61", "design.verify=solid")
 

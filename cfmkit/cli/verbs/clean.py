@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import TextLine
-    from cfmkit.runs.cleaning import Remains
+    from cfmkit.runs.remove_files_that_runs_wrote import Remains
 
 PLACE = 80
 EXAMPLE = "cfmkit clean cfm-out"
@@ -36,7 +36,7 @@ def run(options: CleanOptions, terminal: Terminal) -> Answer:
 
     Only files that a manifest or a journal lists are removed. Files that were edited, and all others, stay.
     """
-    from cfmkit.runs.cleaning import remains_below
+    from cfmkit.runs.remove_files_that_runs_wrote import remains_below
 
     _refuse_what_is_no_folder(options.folder)
     found = list(remains_below(options.folder))
@@ -84,7 +84,7 @@ def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:
 
 def _removed(found: Sequence[Remains], top: str) -> tuple[list[Remains], list[FolderInUse]]:
     """Remove what was found, innermost folders first; return what has gone, and where live runs are at work."""
-    from cfmkit.runs.cleaning import remove
+    from cfmkit.runs.remove_files_that_runs_wrote import remove
 
     gone, busy = [], []
     for one in sorted(found, key=lambda one: len(one.folder.parts), reverse=True):
@@ -108,7 +108,7 @@ def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
 
 
 def _lines(found: Sequence[Remains], everything: bool) -> Iterator[TextLine]:
-    from cfmkit.runs.cleaning import EDITED
+    from cfmkit.runs.remove_files_that_runs_wrote import EDITED
     from cfmkit.store.safe_disk_changes import shown
 
     for one in found:

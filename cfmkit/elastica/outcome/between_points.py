@@ -25,7 +25,7 @@ from cfmkit.elastica.equilibrium.network_solver import Points
 from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.outcome.largest_stress_in_window import largest_stress
-from cfmkit.elastica.outcome.variable_in_which_branch_is_smooth import Corner, SmoothStretch
+from cfmkit.elastica.outcome.smooth_variable_beside_bifurcation import Corner, SmoothStretch
 from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
 if TYPE_CHECKING:

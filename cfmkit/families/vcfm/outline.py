@@ -31,8 +31,8 @@ from cfmkit.export.contours import (
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
+from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
 from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
-from cfmkit.families.vcfm.part_spec import VcfmPart
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import CutPart

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.vcfm.part_spec import VcfmPart
+from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import (
     Analysis,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import GeometryError
 from cfmkit.families.findings import mm
+from cfmkit.families.vcfm.cut_and_frame_spec import StandingFrame, VcfmPart
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
-from cfmkit.families.vcfm.part_spec import StandingFrame, VcfmPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

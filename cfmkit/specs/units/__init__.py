@@ -3,7 +3,7 @@
 Inside cfmkit every number is SI (m, N, rad, Pa, kg, s). Text with units exists in
 specifications, options, tables and messages only, and passes through here.
 
-`number_reading` reads decimals strictly, `table` lists dimensions and units, `unit_size`
+`strict_decimal_number` reads decimals strictly, `table` lists dimensions and units, `unit_size`
 knows the exact size of a unit (pint, loaded on first use), `quantities` reads and
 writes text, `fields` holds the annotated types for specifications.
 """
@@ -45,8 +45,8 @@ from cfmkit.specs.units.fields import (
     Volume,
     quantity,
 )
-from cfmkit.specs.units.number_reading import read_number
 from cfmkit.specs.units.quantities import decimal_text, format_quantity, format_short, read_one_of, read_quantity
+from cfmkit.specs.units.strict_decimal_number import read_number
 from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
 from cfmkit.specs.units.unit_size import unit_table
 from cfmkit.specs.units.windows import SHARE, Ends, Share, WindowEnd, between, dimension_of_end, ends_increase, place_of

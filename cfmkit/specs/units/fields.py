@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import shown
 from cfmkit.specs.units.quantities import check_quantity, decimal_text, example, format_quantity, needed, read_one_of
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.units.table import DIMENSIONS, UNITLESS, dimension_of
 
 if TYPE_CHECKING:

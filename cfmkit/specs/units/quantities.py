@@ -1,6 +1,6 @@
 """Text with a unit to an SI float and back, both to the last bit.
 
-The number is read by `cfmkit.specs.units.number_reading`, never by pint. Sizes of units are
+The number is read by `cfmkit.specs.units.strict_decimal_number`, never by pint. Sizes of units are
 exact fractions, so that the result is the correctly rounded float: "68 mm",
 "6.8 cm" and "0.068 m" are the same number.
 """
@@ -17,7 +17,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import NUMBER, number_complaint, odd_character, read_number, shown
+from cfmkit.specs.units.strict_decimal_number import NUMBER, number_complaint, odd_character, read_number, shown
 from cfmkit.specs.units.table import COMMON, DIMENSIONS, SYMBOLS, UNITLESS, UNITS, border_unit, dimension_of, to_border
 from cfmkit.specs.units.unit_size import Size, border_size, is_unit, unit_size
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.units.table import SYMBOLS, UNITS, dimension_of
 
 _FACTOR = re.compile(r" *([*/]?) *([A-Za-z%]+|1) *(?:(?:\^|\*\*) *(-?[1-9])(?![0-9]))? *")

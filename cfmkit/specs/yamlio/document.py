@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from cfmkit.errors import Problem, SpecError, UsageError
 from cfmkit.specs.units.fields import BareFloat, BareInt
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.yamlio.explain_validation_errors import explain, not_among
 from cfmkit.specs.yamlio.path_notation import Path, dotted, typed
 from cfmkit.specs.yamlio.text_decoding import Fault

@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import odd_character
 from cfmkit.specs.units.quantities import decimal_text
+from cfmkit.specs.units.strict_decimal_number import odd_character
 from cfmkit.specs.yamlio.allowed_at_path import Slot
 from cfmkit.specs.yamlio.scalars import read_plain
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import described
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.yamlio.allowed_at_path import Trace, expected, trace
 from cfmkit.specs.yamlio.path_notation import Path, dotted
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 
 Path = tuple[str | int, ...]
 

@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import LONGEST, NUMBER, number_complaint, read_number
+from cfmkit.specs.units.strict_decimal_number import LONGEST, NUMBER, number_complaint, read_number
 
 _WORDS: dict[str, bool | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cfmkit.specs.units.number_reading import odd_character
+from cfmkit.specs.units.strict_decimal_number import odd_character
 
 LARGEST = 1_000_000
 MOST_KINDS = 20

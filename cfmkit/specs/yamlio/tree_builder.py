@@ -23,7 +23,7 @@ from yaml.events import (
 )
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.number_reading import shown
+from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.yamlio.scalars import check_text, read_plain
 from cfmkit.specs.yamlio.text_decoding import Fault, Unreadable, decode, without_odd_characters
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cfmkit.errors import FolderInUse
-from cfmkit.runs.cleaning import remains_below, remains_in, remove
+from cfmkit.runs.remove_files_that_runs_wrote import remains_below, remains_in, remove
 from cfmkit.store import RunFolder
 from cfmkit.store.file_names_and_overwrite_checks import JOURNAL
 from cfmkit.store.lock import LOCK
