@@ -219,18 +219,21 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     parts = [curve.on(branch) for curve in source.raw]
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
-    motion = np.concatenate([part.motion[inside] for part, inside in zip(parts, keep, strict=True)])
-    effort = np.concatenate([part.effort[inside] for part, inside in zip(parts, keep, strict=True)])
-    passed = elapsed(source, branch)[np.concatenate(keep)]
-    motion, effort, passed = _grouped([np.clip(motion, window.lo, window.hi), effort, passed])
+    times = np.split(elapsed(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])
+    size = max(-(-sum(int(inside.sum()) for inside in keep) // MOST), 1)
+    # Cycle by cycle: the end of one and the start of the next have nothing to do with each other.
+    grouped = [
+        _grouped((np.clip(part.motion[inside], window.lo, window.hi), part.effort[inside], passed[inside]), size)
+        for part, inside, passed in zip(parts, keep, times, strict=True)
+    ]
+    motion, effort, passed = (np.concatenate(columns) for columns in zip(*grouped, strict=True))
     return Samples(branch, mine, motion, effort, passed)
 
 
-def _grouped(columns: Sequence[FloatArray]) -> Sequence[FloatArray]:
-    """Return averages over groups of neighbours, where there are more points than it takes."""
+def _grouped(columns: Sequence[FloatArray], size: int) -> Sequence[FloatArray]:
+    """Return averages over groups of so many neighbours."""
     count = len(columns[0])
-    size = -(-count // MOST) if count else 1
-    if size == 1:
+    if size == 1 or not count:
         return columns
     edges = np.arange(0, count, size)
     lengths = np.diff(np.append(edges, count))

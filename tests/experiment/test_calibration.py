@@ -70,6 +70,16 @@ def test_a_measurement_elsewhere_or_of_another_kind_is_refused():
         compare(analyze(spec), turned)
 
 
+def test_points_that_are_averaged_are_neighbours_of_one_cycle():
+    """The end of a cycle and the start of the next averaged would be a place never passed with that force."""
+    motion = triangle(3, 1503, 240.0) / 1e3
+    hollow = 50.0 + 0.2e3 * np.abs(motion - 0.1175)
+    found = compare(analyze(built()), measured(Recording("hollow.csv", motion, hollow), None))
+    for item in found.samples:
+        assert len(item.motion) < 2000
+        assert item.effort == pytest.approx(50.0 + 0.2e3 * np.abs(item.motion - 0.1175), abs=0.03)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_friction_and_rest_length_are_found_within_their_intervals(seed):
     source = recording(built(0.00225, rest_half_width="68.25 mm"), 0.1, seed)
