@@ -15,6 +15,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import table
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
+from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.specs.units import format_short
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Curve
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.comparison import Comparison
+    from cfmkit.experiment.comparison import Comparison, Zeros
+    from cfmkit.experiment.reading import Recording
     from cfmkit.metrics import MeasuringFrame, Window
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.results import Finding, Quantity
@@ -247,20 +249,34 @@ def _unit(calibration: Calibration) -> str:
     return border_unit(calibration.after.curve.kind)
 
 
-def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    """Return the paragraphs that a page shows: each value with its interval."""
+def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: each value with its interval, and how to take fitted zeros out."""
     half = calibration.fit.half_widths()
     lines = []
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
         reported = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
         lines.append(("fitted", f"{item.path} = {reported} (95 %), from {_exact(item.start, item.dimension)}"))
-    zeros, kind = calibration.zeros, calibration.after.curve.kind
-    known = {"--tare": (zeros.effort, kind), "--zero": (zeros.motion, calibration.after.curve.motion_dimension)}
-    options = " ".join(f'{name} "{_exact(value, unit, 6)}"' for name, (value, unit) in known.items() if value)
-    if options:
+    zeros = calibration.zeros
+    if zeros.effort or zeros.motion:
+        options = _options(recording, zeros)
         lines.append(("data", f"{options} gives the recording the zeros of the fitted model (analyze --data, measure)"))
+    if zeros.drift:
+        lines.append(("data", "no option subtracts the fitted drift from a recording (analyze --data, measure)"))
     return tuple(lines)
+
+
+def _options(recording: Recording, zeros: Zeros) -> str:
+    """Return the options that replace those with which a recording was read, and take fitted zeros out as well."""
+    raw, fitted = raw_zeros(recording, zeros.effort, zeros.motion), (zeros.effort, zeros.motion)
+    dimensions = (recording.kind, "length" if recording.kind == "force" else "angle")
+    options = [
+        f'{name} "{_exact(value, dimension, 6)}"'
+        for name, value, more, dimension in zip(("--tare", "--zero"), raw, fitted, dimensions, strict=True)
+        if value or more
+    ]
+    turned = [word for word, sign in zip(words_of(recording.kind), recording.signs, strict=True) if sign < 0]
+    return " ".join([*options, *([f"--flip {','.join(turned)}"] if turned else [])])
 
 
 def _exact(value: float, dimension: str, digits: int = 5) -> str:

@@ -181,6 +181,9 @@ class Recording(ShortRepr):
         How the file was read.
     notes : tuple of str
         What was changed since.
+    zeros, signs : (float, float)
+        Of effort and motion: what was subtracted from the readings since [N, m] or [N m, rad], and -1 where the sign
+        was then reversed.
     """
 
     name: str
@@ -190,6 +193,8 @@ class Recording(ShortRepr):
     kind: Kind = "force"
     decisions: Decisions | None = field(default=None, compare=False)
     notes: tuple[str, ...] = field(default=(), compare=False)
+    zeros: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
+    signs: tuple[float, float] = field(default=(1.0, 1.0), compare=False)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse what no curve can be."""

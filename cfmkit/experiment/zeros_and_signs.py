@@ -64,7 +64,15 @@ def corrected(
         effort=signs[0] * (recording.effort - shown[0]),
         motion=signs[1] * (recording.motion - shown[1]),
         notes=(*recording.notes, *notes),
+        zeros=raw_zeros(recording, *shown),
+        signs=(recording.signs[0] * signs[0], recording.signs[1] * signs[1]),
     )
+
+
+def raw_zeros(recording: Recording, effort: float, motion: float) -> tuple[float, float]:
+    """Return the readings, before anything was subtracted or turned, of an effort and a motion of a recording."""
+    (tare, zero), (sign_of_effort, sign_of_motion) = recording.zeros, recording.signs
+    return tare + sign_of_effort * effort, zero + sign_of_motion * motion
 
 
 def _resting(motion: FloatArray) -> int:

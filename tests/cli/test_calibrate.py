@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 
 import numpy as np
 import pytest
@@ -103,6 +104,21 @@ def test_a_tare_is_fitted_and_the_page_says_how_to_take_it_off(cli, cam, rig):
                 "--no-plots", "--json")  # fmt: skip
     value = again.document["metrics"]["data_rmse"]["value"]
     assert value == pytest.approx(metrics(cli, "two")["metrics"]["data_rmse"]["value"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("sign", "options"), [(1.0, ("--tare", "1 N")), (-1.0, ("--tare", "1 N", "--flip", "force"))])
+def test_the_tare_on_the_page_replaces_the_one_that_was_given(cli, cam, rig, sign, options):
+    """The sensor shows 1.4 N without load, 1 N of which was known, and its sign may be turned."""
+    head, *lines = (cli.folder / rig).read_text().splitlines()
+    moved = [f"{s};{sign * float(f) + 1.4:.4f}" for s, f in (line.split(";") for line in lines)]
+    (cli.folder / "tare.csv").write_text("\n".join([head, *moved]) + "\n")
+    fitted = cli("calibrate", cam, "tare.csv", "--fit", f"{FIT[1]},data.force_offset,data.drift", *options, "-o", "fit",
+                 "--no-plots")  # fmt: skip
+    page = " ".join(fitted.out.split())
+    tare, rest = re.search(r'data --tare "(\S+) N"( --flip force)? gives the recording the zeros', page).groups()
+    assert float(tare) == pytest.approx(1.4, abs=0.05)
+    assert (rest is not None) == (sign < 0)
+    assert "no option subtracts the fitted drift" in page
 
 
 @pytest.mark.parametrize(

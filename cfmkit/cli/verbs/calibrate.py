@@ -95,7 +95,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
         supplement=Supplement(
             add.comparison_data(after, source) | add.calibration_data(calibration),
             files,
-            (*add.comparison_lines(after, source), *add.calibration_lines(calibration)),
+            (*add.comparison_lines(after, source), *add.calibration_lines(calibration, source.recording)),
             (*source.warnings, *calibration.warnings),
             figures=add.comparison_figures(after, name, calibration.before),
         ),
