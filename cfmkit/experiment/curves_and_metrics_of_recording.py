@@ -263,7 +263,7 @@ def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, .
 
 
 def _default(recording: Recording) -> LowPass:
-    cutoff = CYCLES_PER_STROKE / float(np.ptp(recording.motion))
+    cutoff = CYCLES_PER_STROKE / recording.travel
     return LowPass(cutoff, "length" if recording.kind == "force" else "angle", DEFAULT_ORDER)
 
 

@@ -101,9 +101,8 @@ def parameters(
 def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
     """Return a zero of the recording to fit; it starts from none."""
     dimension = _zero(path, "--fit", recording)
-    values = recording.motion if recording and path.endswith(("displacement_offset", "angle_offset")) else None
-    if values is not None:
-        size = 0.5 * SHIFT * float(np.ptp(values))
+    if recording and path.endswith(("displacement_offset", "angle_offset")):
+        size = 0.5 * SHIFT * recording.travel
         low, high = bounds or (-2.0 * size, 2.0 * size)
     else:
         size = 0.01 * float(np.abs(recording.effort).max()) if recording else 1.0

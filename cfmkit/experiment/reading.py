@@ -8,6 +8,7 @@ free of gaps.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.errors import DataError, UsageError
+from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.tables.lab_file import (
     ROLES,
@@ -207,6 +209,12 @@ class Recording(ShortRepr):
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.motion)
+
+    @cached_property
+    def travel(self) -> float:
+        """From the least to the largest motion [m or rad], samples far off their neighbours not counted."""
+        near = self.motion[spikes(self.motion) == 0]
+        return float(np.ptp(near)) or float(np.ptp(self.motion))
 
     @property
     def lines(self) -> list[str]:

@@ -52,7 +52,7 @@ def corrected(
     effort, motion = words_of(recording.kind)
     if strange := next((word for word in flip if word not in (effort, motion)), None):
         raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
-    resting = _resting(recording.motion)
+    resting = _resting(recording)
     shown = [_shown(tare, recording.effort[:resting], "--tare", recording.kind)]
     shown.append(_shown(zero, recording.motion[:1], "--zero", "length" if recording.kind == "force" else "angle"))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
@@ -75,9 +75,9 @@ def raw_zeros(recording: Recording, effort: float, motion: float) -> tuple[float
     return tare + sign_of_effort * effort, zero + sign_of_motion * motion
 
 
-def _resting(motion: FloatArray) -> int:
+def _resting(recording: Recording) -> int:
     """Return how many points there are before the machine moves; at least one."""
-    moved = np.abs(motion - motion[0]) > _STANDS * float(np.ptp(motion))
+    moved = np.abs(recording.motion - recording.motion[0]) > _STANDS * recording.travel
     return max(int(np.argmax(moved)), 1)
 
 

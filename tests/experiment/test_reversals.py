@@ -10,7 +10,9 @@ from experiment_support import lossy_loop, reference_case, rows, triangle
 
 import cfmkit
 from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, numbers_of
+from cfmkit.experiment.parameters_to_fit import parameters
 from cfmkit.experiment.reading import Recording
+from cfmkit.experiment.zeros_and_signs import corrected
 from cfmkit.metrics import Window
 from cfmkit.numerics.robust_statistics import spikes
 
@@ -143,6 +145,21 @@ def test_spikes_of_the_displacement_make_no_strokes():
     source = measured(replace(case, motion=motion), leave_out=LEFT_OUT)
     assert [stroke.branch for stroke in source.strokes.strokes] == ["load", "unload"]
     assert ripples(numbers_of(source)) == pytest.approx(np.ones(4), abs=3e-3)
+
+
+def test_one_glitch_of_the_displacement_changes_neither_filter_nor_tare_nor_bounds():
+    """One sample of 10 m in a travel of 100 mm had made everything that goes by the travel a hundred times too long."""
+    case = lossy_loop(triangle(1, 400))
+    motion = np.array(case.motion)
+    motion[300] = 10.0
+    glitch = replace(case, motion=motion)
+    assert glitch.travel == case.travel == np.ptp(case.motion)
+    assert measured(glitch, leave_out=LEFT_OUT).low_pass == measured(case).low_pass
+    assert ripples(numbers_of(measured(glitch, leave_out=LEFT_OUT))) == pytest.approx(np.ones(4), abs=3e-3)
+    assert corrected(glitch, tare="start").zeros == corrected(case, tare="start").zeros
+    spec = cfmkit.load("configs/cam.yaml")
+    zeros = [parameters(spec, ["data.displacement_offset"], recording=one)[0] for one in (glitch, case)]
+    assert zeros[0] == zeros[1]
 
 
 @pytest.mark.parametrize("gap", [0.0, 1.0])
