@@ -31,6 +31,9 @@ REVERSAL = 0.02
 WHOLE = 0.9
 """The second stroke of a cycle is complete when it covers this part of the first."""
 
+SHORT = 0.1
+"""Two strokes of which one covers less than this part of the other are no loop: the machine approached or let go."""
+
 LOAD, UNLOAD = "load", "unload"
 
 _PAUSE = 0.02
@@ -52,7 +55,7 @@ class Stroke:
     branch : str
         ``load`` where the motion increases, ``unload`` where it decreases.
     cycle : int
-        From 1; a cycle is one way up and one way down.
+        From 1; a cycle is one way up and one way down. 0 for a short first stroke on the way to where cycles start.
     points : (n,) array of int
         Indices into the recording, in its order, pauses left out.
     way : float
@@ -76,9 +79,13 @@ class Strokes:
     def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
         found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
-        pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2]
-        whole = [pair for pair in pairs if covered(pair) >= WHOLE]
-        return tuple(whole or pairs)
+        pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2 and covered((pair[0], pair[1])) >= SHORT]
+        return tuple([pair for pair in pairs if covered(pair) >= WHOLE] or pairs)
+
+    @property
+    def measured(self) -> tuple[tuple[Stroke, ...], ...]:
+        """The strokes that are measured, cycle by cycle; the longest one alone where there is no cycle."""
+        return self.cycles or ((max(self.strokes, key=lambda stroke: stroke.way),),)
 
     @property
     def _numbers(self) -> list[int]:
@@ -166,16 +173,28 @@ def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
 
 
 def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[Stroke, ...]:
-    """Return strokes with branch and cycle: a cycle starts with every stroke of the first one's direction."""
-    found: list[Stroke] = []
-    first = bool(motion[pieces[0][-1]] > motion[pieces[0][0]])
-    cycle = 0
-    for piece in pieces:
-        up = bool(motion[piece[-1]] > motion[piece[0]])
-        if up == first:
-            cycle += 1
-        found.append(Stroke(LOAD if up else UNLOAD, max(cycle, 1), piece, float(np.ptp(motion[piece]))))
-    return tuple(found)
+    """Return strokes with branch and cycle: a cycle starts with every stroke of the first one's direction.
+
+    Where the first stroke is shorter than the next it may be a mere approach: then cycles start with
+    the second one's direction if more of them are complete so.
+    """
+    ups = [bool(motion[piece[-1]] > motion[piece[0]]) for piece in pieces]
+    ways = [float(np.ptp(motion[piece])) for piece in pieces]
+    found = [
+        tuple(
+            Stroke(LOAD if up else UNLOAD, cycle, piece, way)
+            for up, cycle, piece, way in zip(ups, np.cumsum(np.equal(ups, first)).tolist(), pieces, ways, strict=True)
+        )
+        for first in ups[:2]
+    ]
+    if len(ways) < 3 or ways[0] >= WHOLE * ways[1]:
+        return found[0]
+    return max(found, key=_whole_cycles)
+
+
+def _whole_cycles(strokes: tuple[Stroke, ...]) -> int:
+    """Return how many complete cycles some strokes hold."""
+    return sum(covered(cycle) >= WHOLE for cycle in Strokes(strokes, 0).cycles)
 
 
 def jitter_of(motion: FloatArray) -> float:

@@ -125,7 +125,7 @@ def measured(
     """
     _check_words(low_pass, leave_out)
     strokes, reached, left_out = _strokes(recording, leave_out)
-    cycles = _cycles(strokes)
+    cycles = strokes.measured
     warnings = (*_warnings(recording, strokes), *left_out)
     chosen = _default(recording) if low_pass == "default" else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
@@ -179,11 +179,6 @@ def read_measured(
     return measured(recording, None, LEFT_OUT)
 
 
-def _cycles(strokes: Strokes) -> tuple[tuple[Stroke, ...], ...]:
-    """Return the strokes that are measured, cycle by cycle; the first one alone where there is no cycle."""
-    return strokes.cycles or ((*strokes.strokes[:1],),)
-
-
 def _strokes(recording: Recording, leave_out: Collection[str]) -> tuple[Strokes, Window, tuple[Finding, ...]]:
     """Return what counts of each stroke, what all branches reached, and what is said of the points left out."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
@@ -233,7 +228,7 @@ def _without(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
 
 def _reached(recording: Recording, strokes: Strokes) -> Window:
     """Return what all measured strokes reached; the point at a reversal counts for both of its strokes."""
-    measured_ones = {id(stroke) for cycle in _cycles(strokes) for stroke in cycle}
+    measured_ones = {id(stroke) for cycle in strokes.measured for stroke in cycle}
     ends, before = [], None
     for stroke in strokes.strokes:
         points = recording.motion[stroke.points]
@@ -308,7 +303,7 @@ def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
     recording = source.recording
     clock = np.arange(len(recording), dtype=float) if recording.time is None else recording.time
     clock = (clock - clock[0]) / (float(np.ptp(clock)) or 1.0)
-    strokes = [stroke for cycle in _cycles(source.strokes) for stroke in cycle if stroke.branch == branch]
+    strokes = [stroke for cycle in source.strokes.measured for stroke in cycle if stroke.branch == branch]
     passed: FloatArray = np.concatenate([clock[stroke.points[_by_motion(recording, stroke)]] for stroke in strokes])
     return passed
 
@@ -317,13 +312,13 @@ def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
     found = []
     cycles = strokes.cycles
     if not cycles:
-        only = strokes.strokes[0].branch
+        only = strokes.measured[0][0].branch
         found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
-    left = len(strokes.strokes) - 2 * len(cycles)
+    left = len(strokes.strokes) - sum(map(len, strokes.measured))
     if cycles and covered(cycles[0]) < WHOLE:
         reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
         found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
-    if cycles and left:
+    if left:
         found.append(
             Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
         )
@@ -435,7 +430,7 @@ def require_loop(source: MeasuredCurves) -> None:
         Naming the branch that there is.
     """
     if not source.strokes.cycles:
-        only = source.strokes.strokes[0].branch
+        only = source.strokes.measured[0][0].branch
         raise DataError(
             f"{source.recording.name}: holds only the branch {only!r}: without the return stroke there is no loop and "
             "no hysteresis; if only one stroke was measured, add --one-branch"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from experiment_support import triangle
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import split, turning_points
-from cfmkit.experiment.curves_and_metrics_of_recording import measured, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import measured, numbers_of, require_loop
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.experiment.low_pass import LowPass, low_passed, read_filter
 from cfmkit.experiment.reading import Recording
@@ -203,6 +205,47 @@ def test_a_single_cycle_that_was_broken_off_is_measured_with_a_warning():
     assert len(source.raw) == 1
     assert source.warnings[0].name == "unfinished_cycle"
     assert "covers only 49 % of the longer one" in source.warnings[0].message
+
+
+def to_and_fro(*ends, step=0.5):
+    """A displacement that passes some places in turn [mm]."""
+    parts = [np.linspace(a, b, round(abs(b - a) / step) + 1)[1:] for a, b in pairwise(ends)]
+    return np.concatenate([[ends[0]], *parts])
+
+
+@pytest.mark.parametrize(
+    ("ends", "cycles", "left"),
+    [
+        ((0, -3, 100, 0), [("load", 1)], "1 of 3"),
+        ((0, -3, 100, 0, 100, 0), [("load", 1), ("load", 2)], "1 of 5"),
+        ((50, 100, 0, 100), [("unload", 1)], "1 of 3"),
+        ((100, 103, 0, 100), [("unload", 1)], "1 of 3"),
+        ((0, -3, 100, 0, 100), [("unload", 2)], "2 of 4"),
+        ((0, 100, 0, 100), [("load", 1)], "1 of 3"),
+    ],
+)
+def test_a_short_first_stroke_is_no_part_of_a_cycle(ends, cycles, left):
+    """A machine that retracts 3 mm first had been measured over these 3 mm alone."""
+    source = measured(looped(to_and_fro(*ends)), None)
+    assert [(first.branch, first.cycle) for first, _ in source.strokes.cycles] == cycles
+    assert f"{left} strokes complete no cycle: left out" in [item.message for item in source.warnings]
+    numbers = numbers_of(source)
+    assert (numbers.window.lo, numbers.window.hi) == pytest.approx((0.0, 0.1), abs=1.1e-3)
+    assert numbers.raw["hysteresis_area"].value == pytest.approx(0.1, rel=0.02)
+
+
+@pytest.mark.parametrize("ends", [(0, -3, 100), (0, 100, 95), (100, 103, 0)])
+def test_one_stroke_and_a_few_millimetres_are_no_loop(ends):
+    """The area over 3 mm had been given as the hysteresis of a recording without a way back."""
+    source = measured(looped(to_and_fro(*ends)), None)
+    branch = "load" if ends[0] == 0 else "unload"
+    assert source.raw[0].branches == (branch,)
+    assert [item.name for item in source.warnings] == ["one_branch", "unfinished_cycle"]
+    with pytest.raises(DataError, match=f"holds only the branch '{branch}'"):
+        require_loop(source)
+    numbers = numbers_of(source)
+    assert numbers.window.hi - numbers.window.lo > 0.099
+    assert numbers.raw["hysteresis_area"].value is None
 
 
 @pytest.mark.parametrize(("gap", "found"), [(1.0, []), (-1.0, ["negative_loop"]), (0.01, []), (-0.01, [])])
