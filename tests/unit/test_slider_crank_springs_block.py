@@ -104,6 +104,20 @@ def test_a_sweep_with_every_column_is_done_in_blocks_and_has_the_rows_of_single_
                 assert got == wanted, (metric.name, plan.point(index))
 
 
+def test_a_sweep_of_a_mechanism_with_a_screwed_anchor_has_the_force_per_travel_of_it():
+    """A design with `anchor_travel` states `anchor: 0 mm`: its studies are done in blocks, as without an anchor."""
+    spec = config("bilancia2019", mechanism__springs__anchor="0 mm", mechanism__springs__slider="0.1 N/mm")
+    values = {PATHS[3]: np.array([50.0, 80.0]), "mechanism.legs": np.array([1, 2])}
+    asked = Block(values, (Measure("force_per_anchor"),), 2)
+    found = analyze_block(spec, asked).values[0]["load"]
+    for index in range(2):
+        single = cfmkit.analyze(spec.replace({path: row[index].item() for path, row in values.items()}))
+        assert found[index] == pytest.approx(single.values["force_per_anchor"].value)
+    assert found == pytest.approx([50.0, 160.0])
+    without = analyze_block(spec.replace({"mechanism.springs.anchor": None}), asked)
+    assert np.isnan(without.values[0]["load"]).all()
+
+
 def test_there_is_no_band_about_a_place_without_effort():
     """With the slider's spring alone the torque in the stretched position is zero; interpolation would hide it."""
     springs = {"mechanism.springs.slider_pin": 0.0, "mechanism.springs.slider": "1 N/cm"}

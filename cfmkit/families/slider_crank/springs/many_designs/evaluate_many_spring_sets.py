@@ -154,6 +154,8 @@ class Base:
         others = OTHER_DRIVE[self.assembly.drive]
         if name in WIRE_DEFINITIONS and not self.spec.mechanism.springs.bought:
             return True
+        if name == "force_per_anchor":
+            return self.assembly.drive != "force" or self.spec.mechanism.springs.anchor is None
         return name in NO_LOOP or (name in OF_PARTS and name not in DEFINITIONS) or name.startswith(others)
 
     def inside(self, window: tuple[float, float] | None) -> FloatArray:
@@ -436,7 +438,6 @@ RMS = "rms_to_target"
 NO_LOOP = frozenset(
     {
         "hysteresis_area",
-        "force_per_anchor",
         *(f"loop_{what}_{kind}" for what in ("energy", "share") for kind in ("pins", "guide")),
     }
 )
@@ -470,6 +471,7 @@ VALUES: dict[str, Callable[[Slab], Any]] = {
     "guide_force_max": lambda slab: np.abs(slab.base.extremes.guide(slab.rates)).max(axis=0) / slab.legs,
     "start_force": lambda slab: slab.start_effort,
     "force_per_degree": lambda slab: np.where(slab.rates > 0.0, slab.rates * slab.base.per_degree, 0.0).sum(axis=1),
+    "force_per_anchor": lambda slab: slab.rates[:, 3],
     "bistable_factor": lambda slab: slab.factors[:, 0],
     "positive_factor": lambda slab: slab.factors[:, 1],
     "small_angle_number": lambda slab: np.array([small_angle_number(one) for one in slab.assemblies], dtype=float),
