@@ -125,3 +125,19 @@ def test_rates_at_joints_follow_from_the_wires_and_each_spring_bears_its_own_cou
     assert found.values["spring_life"].value == 3e4
     with pytest.raises(SpecError, match="wires of 'bought' give"):
         cfmkit.load(path).replace({"mechanism.springs.pivot": "1 N*mm/rad"})
+
+
+BARE = {"at": "pivot", "name": "bare", "count": 2}
+WITH_WIRE = {"at": "pivot", "name": "wound", "wound": {"wire": "0.8 mm", "coil": "4.8 mm", "turns": 5}}
+
+
+@pytest.mark.parametrize("bought", [(BARE,), (BARE, WITH_WIRE)])
+def test_a_bought_spring_of_unknown_rate_is_refused_at_a_joint_without_a_rate(tmp_path, bought):
+    """It counted as no spring, and took one beside it whose wire is known with it."""
+    path = tmp_path / "crank.yaml"
+    path.write_text(CRANK)
+    given = cfmkit.load(path)
+    with pytest.raises(SpecError, match=r"springs\.pivot: missing: give it, or 'wound' of every spring bought"):
+        given.replace({"mechanism.springs.bought": bought})
+    stated = given.replace({"mechanism.springs.pivot": "50 N*mm/rad", "mechanism.springs.bought": bought})
+    assert stated.mechanism.springs.pivot == pytest.approx(0.05)

@@ -68,6 +68,8 @@ class Springs(Model):
         for joint in dict.fromkeys(one.at for one in self.bought):
             parts = [one.rate for one in self.bought if one.at == joint]
             if None in parts:
+                if joint not in self.model_fields_set:
+                    refuse("Springs", {(joint,): "missing: give it, or 'wound' of every spring bought for this joint"})
                 continue
             total = sum(rate for rate in parts if rate is not None)
             if joint not in self.model_fields_set:
