@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from cam_support import analyze, cam, design
@@ -10,6 +11,7 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.families.slider_crank.springs.bought_springs import _why_not as why_not
 from cfmkit.stock.springs.helical_spring_formulas import Wound
 from cfmkit.stock.springs.spec import CatalogueSpring
 
@@ -141,3 +143,41 @@ def test_a_bought_spring_of_unknown_rate_is_refused_at_a_joint_without_a_rate(tm
         given.replace({"mechanism.springs.bought": bought})
     stated = given.replace({"mechanism.springs.pivot": "50 N*mm/rad", "mechanism.springs.bought": bought})
     assert stated.mechanism.springs.pivot == pytest.approx(0.05)
+
+
+FATIGUE = {"coefficient": "2000 MPa", "exponent": -0.1, "ultimate_strength": "2000 MPa"}
+TURNED = {
+    "mechanism.coupler_length": "200 mm",
+    "mechanism.unloaded_angle": "0 deg",
+    "analysis": {"drive": "torque", "angle": ["-60 deg", "60 deg"]},
+    "mechanism.springs.bought": (WITH_WIRE | {"wound": WITH_WIRE["wound"] | {"fatigue": FATIGUE}},),
+}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "least"), [(-60, 60, -1.0), (-60, 30, -0.5), (-30, 60, -0.5), (0, 60, 0.0), (-60, 0, 0.0)]
+)
+def test_a_torsion_spring_that_is_turned_both_ways_is_stressed_both_ways(tmp_path, low, high, least):
+    """From -60 to 60 deg its stress reverses; the life was that between 0 and 60 deg, 28 times as long."""
+    path = tmp_path / "crank.yaml"
+    path.write_text(CRANK)
+    given = cfmkit.load(path).replace(TURNED | {"analysis.angle": (f"{low} deg", f"{high} deg")})
+    wound = Wound("torsion", 0.8e-3, 4.8e-3, 5.0)
+    most = wound.stress(wound.rate * math.radians(60.0))
+    amplitude, mean = 0.5 * most * (1 - least), 0.5 * most * (1 + least)
+    cycles = 0.5 * (amplitude / (1 - mean / 2000e6) / 2000e6) ** (1 / -0.1)
+    found = cfmkit.analyze(given).values
+    assert found["wire_stress_max"].value == pytest.approx(most, rel=1e-9)
+    assert found["spring_life"].value == pytest.approx(cycles, rel=1e-6)
+
+
+def test_a_spring_that_does_not_last_its_reversals_is_not_chosen():
+    """Its life in a design is that between both ends of its motion, as in the analysis."""
+    offer = {"name": "T", "kind": "torsion", "wire": "0.8 mm", "coil": "4.8 mm", "turns": 5, "fatigue": FATIGUE}
+    offer = CatalogueSpring.model_validate(offer | {"max_angle": "120 deg"}).offer
+    wanted = SimpleNamespace(spring_room=None, spring_life=1000.0)
+    third = math.radians(60.0)
+    assert why_not(offer, (0.0, third), wanted) is None
+    share, reported = why_not(offer, (-third, third), wanted)
+    assert share == pytest.approx(1 - 79 / 1000, abs=0.01)
+    assert "cycles" in reported

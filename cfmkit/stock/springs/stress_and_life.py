@@ -46,7 +46,8 @@ class SpringInUse:
     wound : Wound or None
         Its wire, coil and turns; None where they are not known.
     least, largest : float
-        Load of one spring, over the travel [N or N m].
+        Load of one spring, over the travel [N or N m], in the sense of the larger one: the least is negative where the
+        load reverses.
     fatigue : FatigueLaw or None
         Of the wire.
     stated_life : float or None
@@ -93,6 +94,11 @@ class SpringInUse:
         if self.wound is None or self.fatigue is None:
             return self.stated_life
         return self.fatigue.life(self.wound.stress(self.largest), self.wound.stress(self.least))
+
+
+def in_the_sense_of_the_larger(high: float, low: float) -> tuple[float, float]:
+    """Return the least and the largest of what a spring goes through between two ends, the larger of these positive."""
+    return (low, high) if abs(high) >= abs(low) else (-high, -low)
 
 
 def wire_quantities(springs: Sequence[SpringInUse]) -> dict[str, Quantity]:

@@ -26,7 +26,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, nearest
 from cfmkit.stock.springs.spec import offers, wire_of
-from cfmkit.stock.springs.stress_and_life import SpringInUse
+from cfmkit.stock.springs.stress_and_life import SpringInUse, in_the_sense_of_the_larger
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -190,7 +190,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
     """Return what can be used at each joint, and what is refused because it does not fit or is moved too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])
-    moved = MotionExtremes(assembly, *ends).largest_turns
+    high, low = MotionExtremes(assembly, *ends).turns
     usable: list[SpringOption] = []
     refused: list[Miss] = []
     for joint, name in enumerate(JOINTS):
@@ -200,7 +200,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         for offer in offers(wanted.catalogue or (), *kinds):
             label = f"{offer.name} at the {name.replace('_', ' ')}"
-            reason = _why_not(offer, float(moved[joint]), wanted)
+            reason = _why_not(offer, in_the_sense_of_the_larger(float(high[joint]), float(low[joint])), wanted)
             if reason is not None:
                 refused.append(Miss(label, *reason))
                 continue
@@ -213,11 +213,12 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
     return usable, refused
 
 
-def _why_not(offer: Offer, moved: float, wanted: CrankDesign) -> tuple[float, str] | None:
+def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tuple[float, str] | None:
     """Return by what share a spring misses, and why; None where it can be used.
 
-    `moved`: how far its joint is moved from the unloaded position at most, over the travel [rad or m].
+    `ends`: how far its joint is moved from the unloaded position at least and at most, over the travel [rad or m].
     """
+    moved = ends[1]
     kind: Literal["angle", "length"] = "angle" if offer.kind == "torsion" else "length"
     if offer.initial_tension:
         return 1.0, "its initial tension would load it in the unloaded position"
@@ -228,7 +229,7 @@ def _why_not(offer: Offer, moved: float, wanted: CrankDesign) -> tuple[float, st
     if offer.largest is not None and offer.largest < moved * (1 - 1e-9):
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
-    return SpringInUse.of(offer, 0.0, moved).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
+    return SpringInUse.of(offer, *ends).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
 
 
 @dataclass

@@ -10,7 +10,12 @@ from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, scal
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
-from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
+from cfmkit.stock.springs.stress_and_life import (
+    WIRE_DEFINITIONS,
+    SpringInUse,
+    in_the_sense_of_the_larger,
+    wire_quantities,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -113,8 +118,7 @@ def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
     for one in springs.bought:
         joint = JOINTS.index(one.at)
         high, low = (float(ends[joint]) for ends in solution.extremes.turns)
-        largest = max(abs(high), abs(low))
-        least = 0.0 if low < 0 < high else min(abs(high), abs(low))
+        least, largest = in_the_sense_of_the_larger(high, low)
         # springs of a joint turn alike: each bears its rate's share
         wound = None if one.wound is None else one.wound.wound(one.kind)
         each = wound.rate if wound is not None else 0.0
