@@ -171,6 +171,23 @@ def test_a_torsion_spring_that_is_turned_both_ways_is_stressed_both_ways(tmp_pat
     assert found["spring_life"].value == pytest.approx(cycles, rel=1e-6)
 
 
+def test_a_wire_bears_its_share_of_the_rate_that_is_stated(tmp_path):
+    """As its torque, and as in a catalogue: a stated rate, which may differ from the wire's by 10 %, holds."""
+    path = tmp_path / "crank.yaml"
+    path.write_text(CRANK)
+    given = cfmkit.load(path).replace(TURNED | {"analysis.angle": ("0 deg", "60 deg")})
+    wound = Wound("torsion", 0.8e-3, 4.8e-3, 5.0)
+    found = cfmkit.analyze(given.replace({"mechanism.springs.pivot": 1.09 * wound.rate})).values
+    most = wound.stress(1.09 * wound.rate * math.radians(60.0))
+    assert found["wire_stress_max"].value == pytest.approx(most, rel=1e-9)
+    amplitude = 0.5 * most / (1 - 0.5 * most / 2000e6)
+    assert found["spring_life"].value == pytest.approx(0.5 * (amplitude / 2000e6) ** -10.0, rel=1e-6)
+    assert cfmkit.analyze(given).values["wire_stress_max"].value == pytest.approx(most / 1.09, rel=1e-9)
+    three = (*given.mechanism.springs.bought, {**WITH_WIRE, "count": 2})
+    shared = given.replace({"mechanism.springs.bought": three, "mechanism.springs.pivot": 3 * 1.09 * wound.rate})
+    assert cfmkit.analyze(shared).values["wire_stress_max"].value == pytest.approx(most, rel=1e-9)
+
+
 def test_a_spring_that_does_not_last_its_reversals_is_not_chosen():
     """Its life in a design is that between both ends of its motion, as in the analysis."""
     offer = {"name": "T", "kind": "torsion", "wire": "0.8 mm", "coil": "4.8 mm", "turns": 5, "fatigue": FATIGUE}

@@ -119,9 +119,9 @@ def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
         joint = JOINTS.index(one.at)
         high, low = (float(ends[joint]) for ends in solution.extremes.turns)
         least, largest = in_the_sense_of_the_larger(high, low)
-        # springs of a joint turn alike: each bears its rate's share
+        # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
         wound = None if one.wound is None else one.wound.wound(one.kind)
-        each = wound.rate if wound is not None else 0.0
+        each = wound.rate * springs.stated_over_wires(one.at) if wound is not None else 0.0
         fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
         yield SpringInUse(wound, each * least, each * largest, fatigue, one.life)
 

@@ -85,6 +85,12 @@ class Springs(Model):
                 )
         return self
 
+    def stated_over_wires(self, joint: JointName) -> float:
+        """Return the rate at a joint over that of its springs' wires; 1 where one of these is not known."""
+        rates = [one.rate for one in self.bought if one.at == joint]
+        known = [rate for rate in rates if rate is not None]
+        return float(getattr(self, joint) / sum(known)) if len(known) == len(rates) else 1.0
+
     def coils_at(self, joint: str) -> list[Wound]:
         """Return the springs at a joint whose wire is known."""
         return [one.wound.wound(one.kind) for one in self.bought if one.at == joint and one.wound is not None]
