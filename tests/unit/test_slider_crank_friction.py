@@ -108,11 +108,25 @@ def test_near_the_stretched_position_thick_pins_hold_the_mechanism():
     assert "friction" in found.message
 
 
+SLIDER, ANCHOR = {"mechanism.springs.slider": "0.05 N/mm"}, "mechanism.springs.anchor"
+
+
 def test_an_anchor_adds_a_force_that_is_the_same_everywhere():
     given = spec("bilancia2019").replace({"mechanism.springs.slider": "0.05 N/mm", "mechanism.springs.anchor": "0 mm"})
     plain, tight = analyze(given), analyze(given.replace({"mechanism.springs.anchor": "4 mm"}))
     np.testing.assert_allclose(tight.curve.force - plain.curve.force, 0.2, rtol=1e-9)
     assert plain.values["force_per_anchor"].value == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("anchor", ["5 mm", "-5 mm"])
+@pytest.mark.parametrize("name", ["bilancia2019", "li2019"])
+def test_the_travel_of_the_slider_is_counted_without_the_anchor(name, anchor):
+    plain, tight = (analyze(spec(name).replace(dict(SLIDER, **more))) for more in ({}, {ANCHOR: anchor}))
+    travels = [one.curve.extra["slider_travel"].values for one in (plain, tight)]
+    np.testing.assert_allclose(travels[1], travels[0], rtol=0.0, atol=1e-14)
+    most = [one.values["slider_travel_max"].value for one in (plain, tight)]
+    assert most[1] == pytest.approx(most[0], rel=1e-9)
+    assert most[0] == pytest.approx(np.abs(travels[0]).max(), rel=1e-3)
 
 
 def test_a_torque_with_a_tight_spring_is_the_change_of_its_energy():

@@ -243,7 +243,7 @@ def _curve(solution: Solution) -> Curve:
         **shares,
         **place,
         **turns,
-        "slider_travel": Column(units.turn[3], "length"),
+        "slider_travel": Column(units.turn[3] - solution.assembly.tight, "length"),
         "coupler_force": Column(solution.reactions[0], "force"),
         "guide_force": Column(solution.reactions[1], "force"),
     }

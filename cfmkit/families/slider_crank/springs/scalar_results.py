@@ -243,15 +243,15 @@ def _pose(solution: Solution) -> Pairs:
 
 def _extremes(solution: Solution) -> Pairs:
     """Return the largest loads and motions, wherever they are."""
-    found = solution.extremes
+    found, assembly = solution.extremes, solution.assembly
     turn = found.largest_turns
     coupler, guide = solution.reaction_extremes
     return (
-        ("energy_max", float(found.energy(solution.assembly.rates[None, :])[0])),
+        ("energy_max", float(found.energy(assembly.rates[None, :])[0])),
         ("pivot_rotation_max", float(turn[0])),
         ("crank_pin_rotation_max", float(turn[1])),
         ("slider_pin_rotation_max", float(turn[2])),
-        ("slider_travel_max", float(turn[3])),
+        ("slider_travel_max", max(abs(float(ends[3]) - assembly.tight) for ends in found.turns)),
         ("coupler_compression_max", _known(-coupler[1])),
         ("guide_force_max", _known(max(abs(guide[0]), abs(guide[1])))),
     )

@@ -109,12 +109,17 @@ class Assembly(ShortRepr):
     def _anchored(self, plain: UnitCurves, motion: FloatArray) -> UnitCurves:
         """Return unit curves whose spring at the slider is tight by the anchor's way."""
         turn, effort, stiffness = plain.turn.copy(), plain.effort.copy(), plain.stiffness.copy()
-        tight = -self.linkage.branch * self.anchor
+        tight = self.tight
         turn[3] += tight
         first, second = self._slider_rates(motion)
         effort[3] += tight * first
         stiffness[3] += tight * second
         return replace(plain, turn=turn, effort=effort, stiffness=stiffness)
+
+    @property
+    def tight(self) -> float:
+        """What the anchor adds to the deflection of the slider's spring, along the slider's way [m]."""
+        return -self.linkage.branch * self.anchor if self.anchor else 0.0
 
     def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return dx/d(motion) and its derivative, of the slider's place x."""
