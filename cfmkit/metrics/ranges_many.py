@@ -234,7 +234,11 @@ def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
 
 
 def usable_interval(
-    branches: Sequence[ManyBranches], target: FloatArray, band: float, valid: FloatArray
+    branches: Sequence[ManyBranches],
+    target: FloatArray,
+    band: float,
+    valid: FloatArray,
+    until: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return start and end of the largest usable interval of each row, (d,) each; NaN where there is none.
 
@@ -246,12 +250,17 @@ def usable_interval(
         What the efforts are compared with, not zero.
     band : float
         Half width of the band, as a fraction.
-    valid : (d,) array
-        Where the mechanism starts to work as intended.
+    valid, until : (d,) array
+        Where the mechanism starts to work as intended, and where it ceases to, by default nowhere.
     """
     motion = branches[0].motion
+    last = motion[:, -1]
+    if until is None:
+        until = np.full(len(motion), np.inf)
+    else:  # the last place itself, but for rounding, is no limit
+        until = np.where(until < last - 1e-9 * (last - motion[:, 0]), until, np.inf)
     if all(branch.exact is not None for branch in branches):
-        return _solved_interval(branches, target, band * (1 + ROUNDING), valid)
+        return _solved_interval(branches, target, band * (1 + ROUNDING), (valid, until))
     # What is usable of each step between two samples, and whether a new interval begins there.
     steps = _Steps(motion[:, :-1].copy(), motion[:, 1:].copy(), np.zeros(motion[:, 1:].shape, dtype=bool))
     steps.begins[:, 0] = True
@@ -262,10 +271,11 @@ def usable_interval(
             _narrow(motion, height, steps)
     since = np.maximum.accumulate(np.where(steps.begins, np.arange(steps.begins.shape[1]), 0), axis=1)
     start = np.maximum(np.take_along_axis(steps.low, since, axis=1), valid[:, None])
-    length, rows = steps.high - start, np.arange(len(motion))
+    stop = np.minimum(steps.high, until[:, None])
+    length, rows = stop - start, np.arange(len(motion))
     best = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
     some = length[rows, best] > 0
-    return np.where(some, start[rows, best], np.nan), np.where(some, steps.high[rows, best], np.nan)
+    return np.where(some, start[rows, best], np.nan), np.where(some, stop[rows, best], np.nan)
 
 
 def usable_stroke(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -274,7 +284,7 @@ def usable_stroke(start: FloatArray, end: FloatArray) -> FloatArray:
 
 
 def _solved_interval(
-    branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: FloatArray
+    branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return `usable_interval` of branches that are known at every place: its ends are solved for."""
     motion, every = branches[0].motion, np.arange(len(branches[0].motion))
@@ -283,7 +293,8 @@ def _solved_interval(
 
     def excess(at: FloatArray, rows: NDArray[np.intp], known: bool = False) -> FloatArray:
         """Return by what share that exceeds its limit which does so most; NaN where one is not a number."""
-        worst = (valid[rows, None] - at) / reach[rows, None]
+        start, stop = (one[rows, None] for one in valid)
+        worst = np.maximum(start - at, at - stop) / reach[rows, None]
         for branch in branches:
             if branch.exact is not None:
                 effort = branch.effort if known else branch.exact(at, rows)

@@ -58,12 +58,12 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
     if cycle.frame.winding is not None:
         travel = winding_branches.reach(cycle.frame.winding)
-    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:  # known at every place: its ends are solved for
-        valid = np.array([(cycle.frame.valid or (travel,))[0][0]])
-        start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, valid)
+    allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
+    if cycle.closed and len(allowed) == 1:  # known at every place: its ends are solved for
+        valid, until = np.array(allowed).T
+        start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, valid, until)
         return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
     bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference, curve))
-    allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
     gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
     longest = max((high - low for low, high in gaps), default=0.0)
     # the first of those that are equally long but for rounding
@@ -81,9 +81,7 @@ def _levelled(cycle: Cycle) -> Cycle:
         raise Undefined("the target curve is not defined for this travel")
     valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
     model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
-    frame = replace(
-        cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b) or None
-    )
+    frame = replace(cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b))
     branches = (
         replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.at(b.trace.motion) + size))
         for b in cycle.branches

@@ -27,12 +27,12 @@ def curves(seed):
     return motion, effort
 
 
-def alone(motion, efforts, window, name):
+def alone(motion, efforts, window, name, until=np.inf):
     """Return a metric of one curve whose branches have one motion, unloading stored backwards."""
     path = np.concatenate([motion, *(motion[::-1] for _ in efforts[1:])])
     effort = np.concatenate([efforts[0], *(one[::-1] for one in efforts[1:])])
     branch = np.repeat(["load", "unload"][: len(efforts)], len(motion))
-    frame = MeasuringFrame(target=10.0, valid=((0.05, float(motion[-1])),))
+    frame = MeasuringFrame(target=10.0, valid=((0.05, min(float(motion[-1]), until)),))
     view = survey(Curve(path, effort, branch, np.ones(len(path), bool)), frame, window)
     definition = DEFINED[name]
     value = view.worst(definition, view.each(definition)).value
@@ -53,16 +53,17 @@ def test_a_range_of_many_curves_is_that_of_each(name, window):
     assert np.ptp(found[np.isfinite(found)]) > 0.01
 
 
-@pytest.mark.parametrize("seed", [2, 3])
-def test_the_usable_interval_of_many_loops_is_that_of_each(seed):
+@pytest.mark.parametrize(("seed", "until"), [(2, None), (3, None), (3, 0.7)])
+def test_the_usable_interval_of_many_loops_is_that_of_each(seed, until):
     motion, load = curves(seed)
     _, unload = curves(seed + 10)
     unload[::40] = 20.0
     branches = [ManyBranches(motion, one, motion[:, 0], motion[:, -1]) for one in (load, unload)]
-    start, end = usable_interval(branches, np.full(COUNT, 10.0), 0.05, np.full(COUNT, 0.05))
+    limit = None if until is None else np.full(COUNT, until)
+    start, end = usable_interval(branches, np.full(COUNT, 10.0), 0.05, np.full(COUNT, 0.05), limit)
     found = {"usable_start": start, "usable_end": end, "usable_stroke": np.nan_to_num(end - start)}
     for name, values in found.items():
-        wanted = [alone(motion[k], [load[k], unload[k]], None, name) for k in range(COUNT)]
+        wanted = [alone(motion[k], [load[k], unload[k]], None, name, until or np.inf) for k in range(COUNT)]
         assert np.allclose(values, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
     assert 20 < np.isfinite(start).sum() < COUNT
 

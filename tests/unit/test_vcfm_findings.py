@@ -300,6 +300,28 @@ def test_a_usable_stroke_keeps_the_allowable_stress_at_every_preload():
     assert ends[0] > ends[1] + MM
 
 
+def test_a_usable_stroke_ends_with_the_linear_interval_however_wide_the_band():
+    found = analyzed(FLAT, "analysis.band=20 %", "analysis.travel=6 mm")
+    ends = api.evaluate(found, ["usable_start", "usable_end"])
+    for name in ("start", "end"):
+        assert ends[f"usable_{name}"].value == pytest.approx(found.values[f"linear_{name}"].value, rel=1e-9)
+
+
+@pytest.mark.parametrize(("curve", "stroke"), [((0.0, 4.0), (0.91, 4.0)), ((0.0, 0.5), None), ((4.9, 6.0), None)])
+def test_a_usable_stroke_ends_with_the_target_curve(curve, stroke):
+    """Beyond its points a curve keeps its value; the linear interval is 0.91 to 4.77 mm."""
+    points = tuple((f"{place} mm", "11.6 N") for place in curve)
+    given = analyzed(FLAT, "analysis.band=20 %", "analysis.travel=6 mm").spec
+    found = api.evaluate(api.analyze(given.replace({"analysis.target": {"points": points}})))
+    if stroke is None:
+        assert found["usable_stroke"].value == 0.0
+        assert found["usable_end"].reason == "no part of the travel is usable"
+    else:
+        ends = [found[f"usable_{name}"].value for name in ("start", "end")]
+        assert ends == pytest.approx([place * MM for place in stroke], rel=1e-3)
+        assert ends[1] == pytest.approx(stroke[1] * MM, rel=1e-9)
+
+
 def test_travel_beyond_the_closed_forms_is_told():
     reported = message(analyzed("analysis.travel=7.2 mm"), "theory_range")
     assert "beyond 1.6 times the rise (6.825 mm)" in reported
