@@ -184,6 +184,15 @@ class LargestStress(Protocol):
         ...
 
 
+@runtime_checkable
+class OwnStress(Protocol):
+    """A model of several load cases, whose `stress` is the largest of all of them: it knows that of the curve, too."""
+
+    def own_stress(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress [Pa] at places of any shape in the load case of the curve."""
+        ...
+
+
 class WindingPath(Protocol):
     """A path whose motion turns back, at every place of its way: what `ClosedForm` is of others."""
 

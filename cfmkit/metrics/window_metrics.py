@@ -17,7 +17,7 @@ from cfmkit.metrics import ranges_many, spread, winding_branches
 from cfmkit.metrics.branches_cut_to_window import BranchTrace, Undefined, Window
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.metrics.ranges_many import UNIFORM_POINTS
-from cfmkit.results import LargestStress
+from cfmkit.results import LargestStress, OwnStress
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -152,19 +152,26 @@ def stress_max(branch: Branch) -> float:
     if branch.inside.stress is None and isinstance(model, LargestStress):
         own = model.largest_stress(branch.name, *branch.ends)
     else:
-        own = stress_range(branch)[1]
+        own = _stress_range(branch)[1]
     return max([own, *(float(one.max()) for one in beside)])
 
 
-def stress_range(branch: Branch) -> tuple[float, float]:
-    """Return the least and the largest stress of a branch in the window, its own load case only [Pa]."""
+def _stress_range(branch: Branch, alone: bool = False) -> tuple[float, float]:
+    """Return the least and the largest stress of a branch in the window [Pa].
+
+    `alone`: its own load case only, where a model knows the largest stress of all of them.
+    """
     own, model = _stress(branch.inside), branch.frame.closed
     if (path := branch.frame.winding) is not None:
         top, bottom = winding_branches.stress_extremes(path, *branch.ends_on_way)
         return bottom, top
     if model is None:
         return float(own.min()), float(own.max())
-    tops, bottoms = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
+    law, motion = partial(model.stress, branch.name), branch.inside.motion
+    if alone and branch.frame.load_cases and isinstance(model, OwnStress):
+        law = partial(model.own_stress, branch.name)
+        own = law(motion)  # ends of the window between two points have the stress of all load cases
+    tops, bottoms = extremes(law, motion[None, :], own[None, :])
     return float(bottoms[0]), float(tops[0])
 
 
@@ -192,7 +199,7 @@ def fatigue_life(branch: Branch) -> float:
     known = branch.frame.durability
     if known is None or known.fatigue is None:
         raise Undefined("the material has no fatigue data: add 'fatigue' to it")
-    ranges = [stress_range(branch)]
+    ranges = [_stress_range(branch, alone=True)]
     for part in branch.inside_beside:
         if part.stress is None or np.isnan(part.stress).any():
             raise Undefined("the stress of another load case is not known everywhere in the window")

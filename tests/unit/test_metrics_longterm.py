@@ -166,3 +166,17 @@ def test_a_life_is_that_of_the_stress_that_the_page_states(points):
     found = cfmkit.analyze(spec).metrics
     law = FatigueLaw(POINTS, None, 45e6)
     assert found["fatigue_life"].value == pytest.approx(law.life(found["stress_max"].value), rel=1e-6)
+
+
+@pytest.mark.parametrize("preloads", [("0 mm", "7.5 mm"), ("7.5 mm", "0 mm")])
+def test_the_life_of_several_load_cases_is_the_shortest_of_any_one(preloads):
+    """No cycle goes from the least stress without a preload to the largest with one."""
+    law = {"coefficient": "150 MPa", "exponent": -0.1, "ultimate_strength": "100 MPa"}
+    given = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml").replace(
+        {"mechanism.material.fatigue": law, "analysis.window": ("0.92 mm", "4.75 mm"), "analysis.measured": None}
+    )
+
+    def life(*asked):
+        return cfmkit.analyze(given.replace({"analysis.preloads": asked})).metrics["fatigue_life"].value
+
+    assert life(*preloads) == pytest.approx(min(life(one) for one in preloads), rel=1e-6)

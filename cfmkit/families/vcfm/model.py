@@ -315,6 +315,12 @@ class DenseCurve(ShortRepr):
         found = np.max([np.maximum(leaves, self._spring(push, travel)) for push in self.solution.pushes], axis=0)
         return np.asarray(found.reshape(np.shape(places)))
 
+    def own_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of leaves and spring at travels of any shape, of the nominal preload [Pa]."""
+        travel, one = np.ravel(places), self.solution
+        found = np.maximum(one.sampler.leaves(travel).stress, self._spring(one.nominal, travel))
+        return np.asarray(found.reshape(np.shape(places)))
+
     def _spring(self, push: Push, travel: FloatArray) -> FloatArray:
         """Return the stress of the spring at a preload, none beyond its curve [Pa]."""
         beyond = (travel < push.travel[0]) | (travel > push.travel[-1])
