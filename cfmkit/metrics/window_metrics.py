@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
+UNKNOWN_BESIDE = "the stress of another load case is not known everywhere in the window"
+"""Why there is no largest stress, and no life."""
+
+
 def mean(branch: Branch) -> float:
     """Return the mean effort over the points in the window."""
     return float(spread.level(branch.spread))
@@ -149,6 +153,8 @@ def _area(branch: Branch, window: Window) -> float:
 def stress_max(branch: Branch) -> float:
     """Return the largest stress in the window, in whatever load case it is; of a model, next to the points, too."""
     model, beside = branch.frame.closed, [one.stress for one in branch.inside_beside if one.stress is not None]
+    if any(np.isnan(one).any() for one in beside):
+        raise Undefined(UNKNOWN_BESIDE)
     if branch.inside.stress is None and isinstance(model, LargestStress):
         own = model.largest_stress(branch.name, *branch.ends)
     else:
@@ -202,7 +208,7 @@ def fatigue_life(branch: Branch) -> float:
     ranges = [_stress_range(branch, alone=True)]
     for part in branch.inside_beside:
         if part.stress is None or np.isnan(part.stress).any():
-            raise Undefined("the stress of another load case is not known everywhere in the window")
+            raise Undefined(UNKNOWN_BESIDE)
         ranges.append((float(part.stress.min()), float(part.stress.max())))
     return min(known.fatigue.life(largest, least) for least, largest in ranges)
 

@@ -32,6 +32,16 @@ def test_metrics_of_five_points_by_hand(metric):
     )
 
 
+@pytest.mark.parametrize("stress", [[0, 80, np.nan, 80, 0], [np.nan, 80, 80, 80, 0]])
+def test_the_largest_stress_is_not_known_where_that_of_a_load_case_is_not(stress):
+    """It was that of the other load cases, without the 80 Pa that are known of this one."""
+    saw, other = (curve(([0, 1, 2, 3, 4], [8, 10, 9, 11, 12]), stress=one) for one in ([0, 10, 20, 50, 40], stress))
+    frame = MeasuringFrame(allowable_stress=100.0, load_cases=(other,))
+    for name in ("stress_max", "safety_factor"):
+        assert reason(name, saw, frame) == "the stress of another load case is not known everywhere in the window"
+    assert value("stress_max", saw, frame, (3, 4)) == 80.0
+
+
 def test_every_metric_of_the_table_has_a_value_on_a_complete_loop():
     loop = curve(([0, 1, 2], [10, 12, 14]), ([2, 1, 0], [13, 11, 9]), stress=[0, 1, 2, 2, 1, 0])
     found = measure(loop, MeasuringFrame(target=12.0, allowable_stress=9.0))
