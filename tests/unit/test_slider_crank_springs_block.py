@@ -57,6 +57,16 @@ def test_a_block_has_the_numbers_of_single_runs(name):
     assert len(kinds) >= 3
 
 
+def test_a_sweep_measures_the_usable_stroke_about_a_target_curve():
+    """Blocks know bands about a level only; they had 6.1 mm."""
+    spec = cfmkit.load("configs/slider_crank_rising.yaml").replace({"requirements": ()})
+    rates = ["21.67859 N*mm/rad", "21.7 N*mm/rad"]
+    found = cfmkit.sweep(spec, vary={"mechanism.springs.pivot": rates}, metrics=["usable_stroke"])
+    single = api.evaluate(cfmkit.analyze(spec), ["usable_stroke"])["usable_stroke"].value
+    assert single > 20e-3
+    assert found.table["usable_stroke"][0] == pytest.approx(1e3 * single, rel=1e-12)
+
+
 def test_a_sweep_knows_the_metrics_of_the_branch_by_its_name():
     """A single run has the branch `load`; requirements and trims of parts ask for it."""
     spec = cfmkit.load("configs/slider_crank_bought.yaml")

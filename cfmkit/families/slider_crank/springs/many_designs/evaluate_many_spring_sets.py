@@ -142,6 +142,8 @@ class Base:
             return True
         if name in EACH:
             return self.bounded
+        if name.startswith("usable_") and self.spec.target_curve is not None:
+            return False  # the band lies about the curve: the model of one mechanism knows it
         known = self.spreads(name) or name in BAND_RANGES or name == RMS or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
