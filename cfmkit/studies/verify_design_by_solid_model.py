@@ -10,6 +10,7 @@ moves as far under its load as the beams do.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -34,9 +35,12 @@ FIDELITY = "analysis.fidelity"
 DIGITS = 7
 """Significant ones of a corrected width: a tenth of a micrometre in a metre."""
 
+AT_END = {"design.rescale.force": "nominal_force"}
+"""Levels that are no mean over the window, but the force at its end; and the metric that is compared."""
+
 
 def verified(given: Spec, design: Design, run: Run) -> Design:
-    """Return a design that ends with its part as a solid, whose mean force is the wanted one.
+    """Return a design that ends with its part as a solid, whose force is the wanted one: the mean, or that at the end.
 
     Parameters
     ----------
@@ -63,19 +67,21 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
         return Design(None, Status.INVALID, f"design.verify: this design cannot be analysed as a solid: {reported}")
     beams = record.analyze(design.spec, run)
     solid = record.analyze(as_solid, run)
-    own, mean, where = _means(beams, solid)
-    wanted = next((level for path in record.levels if (level := _level(given, path))), None) or own
-    if solid.status is not Status.COMPLETE or not wanted or not mean or not own or wanted / mean <= 0:
+    path = next((path for path in record.levels if _level(given, path)), None)
+    own, found, where = _values(beams, solid, AT_END[path]) if path in AT_END else _means(beams, solid)
+    wanted = own if path is None else math.copysign(_level(given, path), own or 0.0)
+    if solid.status is not Status.COMPLETE or not wanted or not found or not own or wanted / found <= 0:
         reported = f"the part as a solid has no force that could be corrected: {solid.message}"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
-    factor = wanted / mean
+    factor = wanted / found
     kind = solid.curve.kind
+    mean, which = ("", f"force{where}") if path in AT_END else ("mean ", "mean force")
     begun = (
-        f"{design.spec.fidelity} has a mean {kind} of {format_short(own, kind)}, the part as a solid of "
-        f"{format_short(mean, kind)} ({100 * (mean / own - 1):+.2g} %){where}"
+        f"{design.spec.fidelity} has a {mean}{kind} of {format_short(own, kind)}, the part as a solid of "
+        f"{format_short(found, kind)} ({100 * (found / own - 1):+.2g} %){where}"
     )
     if _sheet(as_solid):
-        return _relevelled(given, design, as_solid, factor, begun, run)
+        return _relevelled(given, design, as_solid, path, factor, begun, run)
     corrected = {path: float(f"{factor * width:.{DIGITS}g}") for path, width in _widths(as_solid).items()}
     outside = _outside(given, design.spec, corrected)
     if outside is not None:
@@ -88,18 +94,19 @@ def verified(given: Spec, design: Design, run: Run) -> Design:
     aim = format_short(wanted, kind)
     note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {reported}"
     numbers = {
-        "verified_target": (wanted, kind, "requested mean force of the part as a solid"),
-        "verified_before": (own, kind, "mean force of the design by its own model"),
-        "verified_solid_before": (mean, kind, "mean force of the part as a solid, before its correction"),
+        "verified_target": (wanted, kind, f"requested {which} of the part as a solid"),
+        "verified_before": (own, kind, f"{which} of the design by its own model"),
+        "verified_solid_before": (found, kind, f"{which} of the part as a solid, before its correction"),
         "verified_width_factor": (factor, "ratio", "factor by which all widths were multiplied"),
     }
     about = searched(numbers, "solid", solid.travel or (0.0, 0.0), made.motion or "length")
     return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))
 
 
-def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begun: str, run: Run) -> Design:
+def _relevelled(
+    given: Spec, design: Design, as_solid: Spec, path: str | None, factor: float, begun: str, run: Run
+) -> Design:
     """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
-    path = next((path for path in family(given.family).levels if _level(given, path)), None)
     if path is None:
         reported = f"{begun}; the sheet fixes the widths and the design states no force: no correction is made"
         return replace(design, spec=as_solid, notes=(*design.notes, ("verify", reported)))
@@ -114,6 +121,12 @@ def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begu
     other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
     note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
+
+
+def _values(beams: Result, solid: Result, name: str) -> tuple[float | None, float | None, str]:
+    """Return the forces of both at the end of the window, and that they are those there."""
+    own, found = (evaluate(one, [name])[name].value if one.curves else None for one in (beams, solid))
+    return own, found, " at the end of the window"
 
 
 def _means(beams: Result, solid: Result) -> tuple[float | None, float | None, str]:

@@ -99,3 +99,44 @@ def test_a_design_under_a_load_may_end_with_its_solid(tmp_path):
     judged = "requirements: [{metric: travel_end, min: 1 mm}]\n"
     path.write_text(PUSHED + moves + "yield: 90 %, verify: solid}\n" + judged)
     assert cfmkit.load(str(path)).design.verify == "solid"
+
+
+RESCALED = """
+cfmkit: 1
+family: beam
+name: rescaled
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  axial: true
+  thickness: 1 mm
+  width: 10 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, top: {at: [50 mm, 5 mm], support: guided, direction: 90 deg}}
+  beams: {beam: {start: root, end: top, shape: {kind: polynomial, coefficients: [0 rad, 0.6 rad, -0.6 rad]}}}
+  drive: {kind: displacement, node: top, direction: -90 deg}
+  copies: {mirror: [50 mm, 0 mm]}
+design: {rescale: {force: 20 N}}
+analysis: {travel: 10 mm, points: 11, window: [1 mm, 4 mm]}
+"""
+"""A toggle: its force falls from 3 mm on and is negative from 7 to 9 mm."""
+
+
+@pytest.mark.parametrize("window", ["[1 mm, 4 mm]", "[7 mm, 8 mm]"], ids=["pushes", "pulls"])
+def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_window(monkeypatch, window):
+    """Before, the mean was corrected, and a force that pulls was not. The solid is a wider beam of another form here."""
+    spec = cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", window))
+    from cfmkit.families.beam.design import design
+    from cfmkit.families.beam.model import analyze
+
+    def other(given, run):
+        stiffer = {"analysis.fidelity": "extensible", "mechanism.thickness": 1.02 * given.mechanism.thickness}
+        return analyze(given.replace(stiffer), run)
+
+    monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", other)
+    made = verified(spec, design(spec, Run()), Run())
+    sense = 1.0 if "4 mm" in window else -1.0
+    solid = api.evaluate(cfmkit.analyze(made.spec), ["nominal_force"])["nominal_force"].value
+    assert solid == pytest.approx(sense * 20.0, rel=1e-6)
+    (reported,) = (text for word, text in made.notes if word == "verify")
+    assert "at the end of the window" in reported
+    assert "mean" not in reported
+    assert made.search["verified_target"].quantity.value == pytest.approx(sense * 20.0)
