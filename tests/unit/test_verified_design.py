@@ -122,7 +122,7 @@ analysis: {travel: 10 mm, points: 11, window: [1 mm, 4 mm]}
 
 @pytest.mark.parametrize("window", ["[1 mm, 4 mm]", "[7 mm, 8 mm]"], ids=["pushes", "pulls"])
 def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_window(monkeypatch, window):
-    """Before, the mean was corrected, and a force that pulls was not. The solid is a wider beam of another form here."""
+    """Before, the mean was corrected, and not if the force pulls. The solid is a thicker beam here."""
     spec = cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", window))
     from cfmkit.families.beam.design import design
     from cfmkit.families.beam.model import analyze
@@ -140,3 +140,23 @@ def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_windo
     assert "at the end of the window" in reported
     assert "mean" not in reported
     assert made.search["verified_target"].quantity.value == pytest.approx(sense * 20.0)
+
+
+def test_a_design_whose_force_pulls_keeps_its_target():
+    """Before, +20 N were compared with -20 N: a deviation of 200 %."""
+    from cfmkit.families.beam.design import design
+
+    made = design(cfmkit.loads(RESCALED.replace("[1 mm, 4 mm]", "[7.99 mm, 8 mm]")), Run())
+    result = cfmkit.analyze(made.spec)
+    assert result.target == pytest.approx(-20.0)
+    assert api.evaluate(result, ["deviation_from_target"])["deviation_from_target"].value < 0.01
+
+
+def test_the_solid_has_the_target_of_the_beams():
+    """Before, requirements on the deviation from it had no value."""
+    coarse = "analysis: {fidelity: solid, solid: {poses: 3, mesh: 2 mm}, travel: 2 mm, points: 5}"
+    solid = cfmkit.analyze(cfmkit.loads(RESCALED.split("analysis:")[0] + coarse))
+    assert solid.target == pytest.approx(20.0)
+    found = api.evaluate(solid, ["nominal_force", "deviation_from_target"])
+    assert found["nominal_force"].value > 0
+    assert found["deviation_from_target"].value is not None

@@ -26,7 +26,7 @@ from cfmkit.errors import InputError
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, travel_of, values_of
+from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, target_of, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along
@@ -86,7 +86,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         values=values,
         warnings=warnings,
         travel=travel_of(solution),
-        target=spec.design.rescale.force if spec.design and spec.design.rescale else None,
+        target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
         closed=solution.everywhere,

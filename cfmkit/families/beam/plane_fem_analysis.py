@@ -29,7 +29,7 @@ from cfmkit.families.beam.network_from_spec import (
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
 from cfmkit.families.beam.tip_on_uneven_surface import LOOKED_AT, curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.travel_that_reaches_load import driven_by_load, load_of_one, moved_far_enough
@@ -219,6 +219,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         values=values,
         warnings=warnings,
         travel=(0.0, solution.end),
+        target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
         tables={"fillets": partial(_fillet_table, solution)},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -115,6 +116,16 @@ def within(solution: OnCurve, low: float, high: float) -> Any:
     x = solution.motion
     slack = 1e-12 * float(np.abs(x).max())
     return (x >= low - slack) & (x <= high + slack) & solution.accurate
+
+
+def target_of(solution: OnCurve) -> float | None:
+    """Return the force that `design.rescale` asks for [N], of the sign that the force at the end of the window has."""
+    design, x = solution.spec.design, solution.motion
+    if design is None or design.rescale is None or design.rescale.force is None:
+        return None
+    end = window_of(solution)[1]
+    known = (np.diff(x) > 0).all() and x[0] <= end <= x[-1] * (1 + 1e-12)
+    return math.copysign(design.rescale.force, value_at(x, solution.effort, end) if known else 1.0)
 
 
 def ranges(solution: OnCurve) -> dict[str, float | None]:
