@@ -240,7 +240,7 @@ def _across(solution: Solution) -> dict[str, float | None]:
 
     Of drives that turn it, only the stress.
     """
-    drive, window = solution.spec.mechanism.drive, window_of(solution)
+    drive, window, node = solution.spec.mechanism.drive, window_of(solution), solution.assembly.driven
     names = list(solution.path.layout.network.beams)
 
     def stresses(path: Path) -> FloatArray:
@@ -251,12 +251,12 @@ def _across(solution: Solution) -> dict[str, float | None]:
         return total
 
     def across(path: Path) -> FloatArray:
-        x, y, _ = path.motion(drive.node).T
+        x, y, _ = path.motion(node).T
         away = np.cos(drive.direction) * y - np.sin(drive.direction) * x
         return np.array([away, -away])
 
     def turned(path: Path) -> FloatArray:
-        turn = path.motion(drive.node)[:, 2]
+        turn = path.motion(node)[:, 2]
         return np.array([turn, -turn])
 
     def gives(path: Path) -> FloatArray:
@@ -278,11 +278,11 @@ def _passes_pole(solution: Solution, direction: float, window: tuple[float, floa
     """
     from cfmkit.elastica.outcome.crosswise_stiffness import poles
 
-    path = solution.path
-    x, y, _ = path.motion(solution.spec.mechanism.drive.node).T
+    path, node = solution.path, solution.assembly.driven
+    x, y, _ = path.motion(node).T
     along = np.cos(direction) * x + np.sin(direction) * y
     inside = (along >= window[0]) & (along <= window[1])
-    found = poles(path, solution.assembly.driven, solution.assembly.direction)
+    found = poles(path, node, solution.assembly.direction)
     return bool((found & inside[1:] & inside[:-1]).any())
 
 
