@@ -127,8 +127,8 @@ def _made(result: Result, run: Run) -> tuple[DesignTolerances | None, str]:
 def _places(result: Result) -> FloatArray:
     """Return the two ends of the window, or the middle and the end of the travel."""
     found = window_of(result)
-    motion = result.curve.motion
-    low, high = (found.lo, found.hi) if found else (0.5 * float(motion.max() + motion.min()), float(motion.max()))
+    least, most = float(result.curve.motion.min()), float(result.curve.motion.max())
+    low, high = (found.lo, found.hi) if found else (0.5 * (most + least), most if most > 0.0 else least)
     return np.array([low, high])
 
 

@@ -37,6 +37,17 @@ def test_of_a_mechanism_whose_errors_nobody_knows_nothing_is_said():
     assert bench(cfmkit.analyze(spec), Run()) == ""
 
 
+def test_a_travel_to_the_other_side_is_measured_at_its_end_not_at_rest():
+    """Before, the places of a negative travel were its middle and 0, where the force is 0."""
+    changes = {"analysis.travel": "-2 mm", "analysis.window": None, "analysis.points": 11, "requirements": ()}
+    spec = cfmkit.load("configs/beam_lan2010.yaml").replace(changes)
+    spec = spec.replace({"design": {"rescale": {"width": "10 mm"}, "tolerances": {MODULUS: {"normal": "3 %"}}}})
+    result = cfmkit.analyze(spec)
+    reported = bench(result, Run())
+    force = float(re.search(r"press it to -1 mm and -2 mm, and expect .* and (-?[\d.]+) N \(.*at -2 mm", reported)[1])
+    assert force == pytest.approx(result.curve.effort[-1], rel=5e-3)
+
+
 def measured(name, **changes):
     """Return what the sentence says to measure and to determine."""
     spec = cfmkit.load(f"configs/{name}.yaml").replace(changes)
