@@ -226,10 +226,16 @@ def moving_nodes(assembly: Assembly) -> set[str]:
 
 
 def allowable_stress(spec: BeamSpec) -> float | None:
-    """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
+    """Return yield strength over safety factor [Pa], of the weakest beam; None where that of a beam is not known."""
+    known = known_allowable_stresses(spec)
+    return min(known.values()) if len(known) == len(spec.mechanism.beams) else None
+
+
+def known_allowable_stresses(spec: BeamSpec) -> dict[str, float]:
+    """Return yield strength over safety factor of the beams whose strength is known, by name [Pa]."""
     mechanism = spec.mechanism
-    limits = [one.allowable(mechanism.safety_factor) for one in mechanism.of_beams("material").values()]
-    return min((limit for limit in limits if limit is not None), default=None)
+    limits = {name: one.allowable(mechanism.safety_factor) for name, one in mechanism.of_beams("material").items()}
+    return {name: limit for name, limit in limits.items() if limit is not None}
 
 
 def thickest(thickness: Thickness) -> float:

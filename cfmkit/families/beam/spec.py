@@ -446,9 +446,9 @@ def _no_density(spec: BeamSpec) -> str:
 
 
 def _has_strength(spec: BeamSpec, other: BeamMaterial | None) -> bool:
-    """Tell whether the allowable stress is known, of another material if there is one, else of the beams."""
+    """Tell whether the allowable stress is known of all beams, or of another material if there is one."""
     of = [other] if other else spec.mechanism.of_beams("material").values()
-    return any(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
+    return all(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
 
 
 def _rescale_faults(spec: BeamSpec) -> Iterator[str]:

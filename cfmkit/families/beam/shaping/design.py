@@ -14,7 +14,7 @@ from cfmkit.designing import objective_and_constraints as design_limits
 from cfmkit.designing.bounds_and_rounding import at_bounds
 from cfmkit.designing.run_many_starts import Clock, identity_of
 from cfmkit.families.beam.findings import finding, percent
-from cfmkit.families.beam.network_from_spec import assemble, thickest_of
+from cfmkit.families.beam.network_from_spec import assemble, known_allowable_stresses, thickest_of
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, StartBudget, finished, met, widened
@@ -93,7 +93,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
     mean = 0.0 if curve is None else mean_of(curve, wanted.window)
-    limits = _limits(wanted, assembly.allowable_stress)
+    limits = _limits(wanted, min(known_allowable_stresses(spec).values(), default=None))
     if curve is not None:
         limits = replace(limits, force_target=mean)
     return Task(
