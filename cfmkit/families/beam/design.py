@@ -336,7 +336,9 @@ def _stress(spec: BeamSpec) -> list[Finding]:
     solution = solve(spec)
     values, allowable = ranges(solution), solution.assembly.allowable_stress
     stress, place = values["stress_at_end"], values["stress_limit_displacement"]
-    if stress is None or allowable is None or place is None or stress <= allowable:
+    if stress is None or allowable is None or place is None:
+        return []
+    if stress <= allowable and place >= window_of(solution)[1]:
         return []
     return [
         finding(

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
-from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
+from cfmkit.families.beam.largest_in_window import largest
+from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
 from cfmkit.families.beam.scalar_results import window_of, within
 from cfmkit.families.beam.taut_beams import taut_beams
 from cfmkit.families.findings import finder, too_soft
@@ -22,6 +23,8 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Path
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import BeamSpec
@@ -319,18 +322,30 @@ def _imperfection(solution: Solution) -> Iterator[Finding]:
 
 
 def _stress(solution: Solution) -> Iterator[Finding]:
-    allowable = solution.assembly.allowable_stress
-    if allowable is None or len(solution.keep) < 2:
+    """Say where the stress in the window is too large, between points, too; of the beams whose strength is known."""
+    known = known_allowable_stresses(solution.spec)
+    names = [name for name in solution.path.layout.network.beams if name.split(".")[0] in known]
+    if not names or len(solution.keep) < 2:
         return
-    inside = within(solution, *window_of(solution))
-    if not inside.any() or (worst := float(solution.stress[inside].max())) <= allowable:
+    allowable, axial, window = min(known.values()), solution.spec.stress == "total", window_of(solution)
+
+    def stresses(path: Path) -> FloatArray:
+        return np.array([path.beam_stress(name, axial)[0] for name in names])
+
+    worst = largest(solution, stresses, window)
+    if worst is None or worst <= allowable:
         return
-    index = int(np.flatnonzero(inside)[solution.stress[inside].argmax()])
-    beam, place = solution.stress_at[0][index], solution.stress_at[1][index]
+    shown = solution.with_ends
+    inside = np.flatnonzero(within(shown, *window))
+    values = np.array([shown.stresses[name][0] for name in names])
+    if not len(inside):
+        inside = np.abs(shown.motion - 0.5 * sum(window)).argmin()[None]
+    best, index = np.unravel_index(int(values[:, inside].argmax()), (len(names), len(inside)))
+    place = float(shown.stresses[names[best]][1][inside[index]])
     yield finding(
         "overstressed",
         f"the largest stress in the window is {format_short(worst, 'stress')}, at {place:.3f} of beam "
-        f"{beam}; the allowable stress is {format_short(allowable, 'stress')}",
+        f"{names[best]}; the allowable stress is {format_short(allowable, 'stress')}",
     )
 
 
