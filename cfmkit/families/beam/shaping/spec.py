@@ -130,7 +130,7 @@ class Optimise(Model):
                 moved = [axis for axis, ends in enumerate((node.x, node.y)) if both or ends is not None]
                 found |= {f"mechanism.nodes.{name}.at.{axis}": nodes for axis in moved}
         if self.tolerances.coefficients:
-            for name in self.beams or mechanism.beams:
+            for name in self.beams if self.beams is not None else mechanism.beams:
                 count = len(getattr(mechanism.beams[name].shape, "coefficients", ()))
                 found |= {f"mechanism.beams.{name}.shape.coefficients.{k}": turns for k in range(1, count)}
         return found
