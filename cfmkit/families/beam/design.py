@@ -220,10 +220,15 @@ def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
     copies = mechanism.copies and _lengths(mechanism.copies, ("mirror", "layer_pitch"), factor)
     part = mechanism.part and _resized_part(mechanism.part, factor)
     update = {"nodes": nodes, "beams": beams, "copies": copies, "part": part}
+    analysis = _lengths(analysis, ("travel", "window", "reference"), factor)
+    if analysis.surface is not None:  # what is followed stays as it is
+        analysis = analysis.model_copy(update={"surface": _lengths(analysis.surface, ("preload",), factor)})
+    if analysis.solid.mesh is not None:
+        analysis = analysis.model_copy(update={"solid": _lengths(analysis.solid, ("mesh",), factor)})
     return spec.model_copy(
         update={
             "mechanism": mechanism.model_copy(update=update),
-            "analysis": _lengths(analysis, ("travel", "window", "reference"), factor),
+            "analysis": analysis,
             "requirements": tuple(_lengths(one, ("over",), factor) for one in spec.requirements),
         }
     )
