@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import InputError
+from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.findings import ending_of, finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.network_from_spec import thickest
-from cfmkit.families.beam.scalar_results import ranges, window_of
-from cfmkit.numerics.cubic_interpolation import value_at
+from cfmkit.families.beam.scalar_results import force_at_end, ranges
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, Share, format_short
 from cfmkit.stock.material_and_part_spec import sheet_of
@@ -114,14 +114,8 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
 def _force(spec: BeamSpec) -> float | None:
     """Return the force at the end of the window [N]."""
     solution = solve(spec)
-    x = solution.motion
-    if len(x) < 2:
-        return None
-    end = window_of(solution)[1]
-    if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12):
-        return None
-    force = value_at(x, solution.effort, end)
-    return force if np.isfinite(force) and force != 0 else None
+    force = force_at_end(solution) if len(solution.motion) > 1 else None
+    return force if force is not None and np.isfinite(force) and force != 0 else None
 
 
 def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
@@ -265,7 +259,7 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
     end = _down(place)
     ended = _windowed(spec, 0.0, end)
     start = ranges(solve(ended))["range_start"]
-    return (ended if start is None else _windowed(ended, -_down(-start), end)), ""
+    return (ended if start is None else _windowed(ended, _up(start), end)), ""
 
 
 def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
@@ -285,9 +279,9 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
             break
         if (place := ranges(solution)["stress_limit_displacement"]) is not None:
             return place, ""
-        if len(solution.keep) < 2 or travel < 0:
+        if len(solution.keep) < 2:
             return None, ""
-        if solution.motion[-1] < travel * (1 - 1e-9):
+        if abs(solution.motion[-1]) < abs(travel) * (1 - 1e-9):
             why = ending_of(solution).message
             return None, f"the stress does not reach the allowable one before the path ends: {why}"
         looked_at, travel = travel, 1.25 * travel
@@ -297,12 +291,18 @@ def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:
 
 
 def _down(value: float) -> float:
-    """Return a length rounded down to a hundredth of a millimetre, as a short decimal."""
-    return round(math.floor(value / STEP + 1e-6) * STEP, 9)
+    """Return a place rounded to a hundredth of a millimetre towards rest, as a short decimal."""
+    return math.copysign(round(math.floor(abs(value) / STEP + 1e-6) * STEP, 9), value)
+
+
+def _up(value: float) -> float:
+    """Return the same rounded away from rest."""
+    return math.copysign(round(math.ceil(abs(value) / STEP - 1e-6) * STEP, 9), value)
 
 
 def _windowed(spec: BeamSpec, start: float, end: float) -> BeamSpec:
-    return _with_analysis(spec, travel=Place(end), window=(Place(start), Place(end)))
+    low, high = sorted((start, end))
+    return _with_analysis(spec, travel=Place(end), window=(Place(low), Place(high)))
 
 
 def _with_analysis(spec: BeamSpec, **update: Any) -> BeamSpec:
@@ -343,7 +343,8 @@ def _stress(spec: BeamSpec) -> list[Finding]:
     stress, place = values["stress_at_end"], values["stress_limit_displacement"]
     if stress is None or allowable is None or place is None:
         return []
-    if stress <= allowable and place >= window_of(solution)[1]:
+    along = AlongMotion(solution)
+    if stress <= allowable and along.sense * place >= along.end:
         return []
     return [
         finding(

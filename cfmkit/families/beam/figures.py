@@ -10,8 +10,9 @@ import numpy as np
 
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.outcome.sections import TURN
+from cfmkit.families.beam.curve_along_its_motion import AlongMotion
 from cfmkit.families.beam.network_from_spec import mirror_axis
-from cfmkit.families.beam.scalar_results import natural, window_of
+from cfmkit.families.beam.scalar_results import natural
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.beam.tip_on_uneven_surface import ride
 from cfmkit.families.fem_results import numbered
@@ -81,10 +82,14 @@ def curve(result: Result) -> Figure:
     solution: Solution = result.state
     regions, levels = [], []
     limit, start = (result.values[name].value for name in ("stress_limit_displacement", "range_start"))
-    end = window_of(solution)[1]
-    reached = float(solution.motion.max())
-    if limit is not None and limit < reached:
-        regions.append(MarkedRange(limit, reached, f"allowable stress reached at {value_text(limit, 'length')}"))
+    along = AlongMotion(solution)
+    end, reached = along.sense * along.end, along.sense * float(along.motion.max())
+    if limit is not None and along.sense * limit < along.sense * reached:
+        regions.append(
+            MarkedRange(
+                min(limit, reached), max(limit, reached), f"allowable stress reached at {value_text(limit, 'length')}"
+            )
+        )
     nominal = result.values["nominal_force"].value
     if nominal is not None and start is not None and result.spec.analysis.window is not None:  # type: ignore[attr-defined]
         levels.append(Limit(0.95 * nominal, f"0.95 F_d: from {value_text(start, 'length')}"))

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
+from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
-from cfmkit.families.beam.scalar_results import window_of, within
+from cfmkit.families.beam.scalar_results import within
 from cfmkit.families.beam.taut_beams import taut_beams
 from cfmkit.families.findings import finder, too_soft
 from cfmkit.specs.units import format_short
@@ -339,7 +340,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
     inside = np.flatnonzero(within(shown, *window))
     values = np.array([shown.stresses[name][0] for name in names])
     if not len(inside):
-        inside = np.abs(shown.motion - 0.5 * sum(window)).argmin()[None]
+        inside = np.array([np.abs(shown.motion - 0.5 * sum(window)).argmin()])
     best, index = np.unravel_index(int(values[:, inside].argmax()), (len(names), len(inside)))
     place = float(shown.stresses[names[best]][1][inside[index]])
     yield finding(

@@ -23,10 +23,11 @@ from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
+from cfmkit.families.beam.curve_along_its_motion import travel_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
 from cfmkit.families.beam.network_from_spec import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.requested_node_columns import output_columns
-from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, target_of, travel_of, values_of
+from cfmkit.families.beam.scalar_results import DEFINITIONS, natural, target_of, values_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.taut_beams import distance, ways_to_supports
 from cfmkit.families.beam.tip_on_uneven_surface import curve_of, findings_along, ride, values_along

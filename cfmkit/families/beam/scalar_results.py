@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.curve_along_its_motion import AlongMotion, window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
 from cfmkit.families.fem_results import unknown_to_beams
 from cfmkit.numerics.cubic_interpolation import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity, quantities
-from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.elastica.outcome.between_points import BetweenPoints
     from cfmkit.families.beam.solution import OnCurve, Solution
     from cfmkit.families.run_control import Run
 
@@ -97,20 +96,6 @@ def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
     return quantities(DEFINITIONS, numbers) | unknown_to_beams()
 
 
-def window_of(solution: OnCurve) -> tuple[float, float]:
-    """Return the window of the analysis in places, or the whole travel."""
-    window = solution.spec.analysis.window
-    if window is not None:
-        return between(window, travel_of(solution))
-    return float(solution.motion.min()), float(solution.motion.max())
-
-
-def travel_of(solution: OnCurve) -> tuple[float, float]:
-    """Return where the motion was to start and to end; of a drive by a load, where it did [m or rad]."""
-    start, end = float(solution.motion[0]), float(solution.motion[-1])
-    return start, solution.spec.extent if solution.spec.analysis.travel is not None else end
-
-
 def within(solution: OnCurve, low: float, high: float) -> Any:
     """Tell which accurate points of the curve are in a window."""
     x = solution.motion
@@ -118,63 +103,66 @@ def within(solution: OnCurve, low: float, high: float) -> Any:
     return (x >= low - slack) & (x <= high + slack) & solution.accurate
 
 
+def force_at_end(solution: OnCurve) -> float | None:
+    """Return the force at the end of the window [N]; None on a curve that turns back or ends before it."""
+    if not len(solution.motion) or not (along := AlongMotion(solution)).reaches_end:
+        return None
+    return along.back(value_at(along.motion, along.effort, along.end))
+
+
 def target_of(solution: OnCurve) -> float | None:
     """Return the force that `design.rescale` asks for [N], of the sign that the force at the end of the window has."""
-    design, x = solution.spec.design, solution.motion
+    design = solution.spec.design
     if design is None or design.rescale is None or design.rescale.force is None:
         return None
-    end = window_of(solution)[1]
-    known = (np.diff(x) > 0).all() and x[0] <= end <= x[-1] * (1 + 1e-12)
-    return math.copysign(design.rescale.force, value_at(x, solution.effort, end) if known else 1.0)
+    return math.copysign(design.rescale.force, force_at_end(solution) or 1.0)
 
 
 def ranges(solution: OnCurve) -> dict[str, float | None]:
     """Return what Lan says about the range that ends at d; nothing on a curve that turns back or has no point."""
-    x, force = solution.motion, solution.effort
     numbers: dict[str, float | None] = dict.fromkeys(
         ("nominal_force", "range_start", "range_fraction", "strict_range_start", "strict_range_fraction"),
     )
     numbers |= dict.fromkeys(("stress_at_end", "stress_limit_displacement"))
-    if not len(x):
+    if not len(solution.motion):
         return numbers
-    end = window_of(solution)[1]
-    if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12) or not np.isfinite(force).all():
+    along = AlongMotion(solution)
+    if not along.reaches_end or not np.isfinite(along.effort).all():
         return numbers
-    law = solution.everywhere
-    if law is not None:
-        x, force = law.knots
+    end, (x, force) = along.end, along.knots
     nominal = value_at(x, force, end)
-    numbers |= {"nominal_force": nominal, "stress_at_end": _stress_at(solution, end)}
+    numbers |= {"nominal_force": along.back(nominal), "stress_at_end": _stress_at(along, end)}
     if solution.assembly.allowable_stress is not None:
-        numbers["stress_limit_displacement"] = _stress_reaches(solution, solution.assembly.allowable_stress)
-    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), x, force, law) if nominal else None
+        numbers["stress_limit_displacement"] = along.back(_stress_reaches(along, solution.assembly.allowable_stress))
+    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), along) if nominal else None
     if start is not None and start <= end and end > 0:
-        numbers |= {"range_start": start, "range_fraction": (end - start) / end}
+        numbers |= {"range_start": along.back(start), "range_fraction": (end - start) / end}
         if nominal > 0:  # else no band lies around the force there
-            strict = _settled(lambda x, force: strict_start(x, force, end), x, force, law) or 0.0
-            numbers |= {"strict_range_start": strict, "strict_range_fraction": (end - strict) / end}
+            strict = _settled(lambda x, force: strict_start(x, force, end), along) or 0.0
+            numbers |= {"strict_range_start": along.back(strict), "strict_range_fraction": (end - strict) / end}
     return numbers
 
 
-def _stress_at(solution: OnCurve, place: float) -> float:
+def _stress_at(along: AlongMotion, place: float) -> float:
     """Return the largest stress at a place [Pa], beam by beam: the largest of all has kinks."""
-    if solution.everywhere is not None:
-        return float(solution.everywhere.stress("", np.array([place]))[0])
-    return max(value_at(solution.motion, value, place) for value, _ in solution.stresses.values())
+    if along.solution.everywhere is not None:
+        return float(along.stress_at(np.array([place]))[0])
+    return max(value_at(along.motion, value, place) for value, _ in along.solution.stresses.values())
 
 
-def _stress_reaches(solution: OnCurve, allowable: float) -> float | None:
+def _stress_reaches(along: AlongMotion, allowable: float) -> float | None:
     """Return where the largest stress first reaches the allowable one, beam by beam."""
-    law = solution.everywhere
-    if law is None:
-        found = [crossing(solution.motion, value, allowable) for value, _ in solution.stresses.values()]
+    if along.solution.everywhere is None:
+        found = [crossing(along.motion, value, allowable) for value, _ in along.solution.stresses.values()]
         return min((place for place in found if place is not None), default=None)
-    x = law.places
-    reached = np.flatnonzero(law.stress("", x) >= allowable)
+    x = along.knots[0]
+    reached = np.flatnonzero(along.stress_at(x) >= allowable)
     if not len(reached) or reached[0] == 0:
         return float(x[0]) if len(reached) else None
     first = int(reached[0])
-    return bisect(lambda place: law.stress("", np.array([place]))[0] >= allowable, float(x[first - 1]), float(x[first]))
+    return bisect(
+        lambda place: along.stress_at(np.array([place]))[0] >= allowable, float(x[first - 1]), float(x[first])
+    )
 
 
 _ROUNDS = 4
@@ -183,16 +171,15 @@ _ROUNDS = 4
 _SETTLED = 1e-11  # of the travel: a place that moves by less is known
 
 
-def _settled(
-    find: Callable[[FloatArray, FloatArray], float | None], x: FloatArray, force: FloatArray, law: BetweenPoints | None
-) -> float | None:
+def _settled(find: Callable[[FloatArray, FloatArray], float | None], along: AlongMotion) -> float | None:
     """Return a place that cubics tell, put right by the equilibrium that is solved there, if the model can do so."""
+    x, force = along.knots
     place = find(x, force)
     for _ in range(_ROUNDS):
-        if law is None or place is None or np.abs(x - place).min() <= _SETTLED * (x[-1] - x[0]):
+        if along.corners is None or place is None or np.abs(x - place).min() <= _SETTLED * (x[-1] - x[0]):
             break
         at = int(np.searchsorted(x, place))
-        x, force = np.insert(x, at, place), np.insert(force, at, law.effort("", np.array([place])))
+        x, force = np.insert(x, at, place), np.insert(force, at, along.effort_at(np.array([place])))
         place = find(x, force)
     return place
 
@@ -337,18 +324,18 @@ def _significant(values: FloatArray, error: float) -> float:
 def extremes(solution: OnCurve) -> dict[str, float | None]:
     """Return the first local maximum of the force and the minimum after it, on a curve that does not turn back."""
     names = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
-    x, force, corners = solution.motion, solution.effort, None
     numbers: dict[str, float | None] = dict.fromkeys(names)
-    if not (np.diff(x) > 0).all() or not np.isfinite(force).all():
+    if not len(solution.motion):
         return numbers
-    if solution.everywhere is not None:
-        x, force = solution.everywhere.knots
-        corners = solution.everywhere.corners
-    peak = _turn(solution, first_extreme(x, force, corners=corners))
+    along = AlongMotion(solution)
+    if not (np.diff(along.motion) > 0).all() or not np.isfinite(along.effort).all():
+        return numbers
+    x, force = along.knots
+    peak = _turn(along, first_extreme(x, force, corners=along.corners))
     if peak is None:
         return numbers
-    valley = _turn(solution, first_extreme(x, force, -1, after=peak[0], corners=corners))
-    return dict(zip(names, (*peak, *(valley or (None, None))), strict=True))
+    valley = _turn(along, first_extreme(x, force, -1, after=peak[0], corners=along.corners))
+    return dict(zip(names, map(along.back, (*peak, *(valley or (None, None)))), strict=True))
 
 
 _BESIDE = 0.1 * np.arange(-2.0, 3.0)
@@ -356,16 +343,15 @@ _BESIDE = 0.1 * np.arange(-2.0, 3.0)
 solver leaves does not move the place, close enough that a polynomial of degree four does not either."""
 
 
-def _turn(solution: OnCurve, found: tuple[float, float] | None) -> tuple[float, float] | None:
+def _turn(along: AlongMotion, found: tuple[float, float] | None) -> tuple[float, float] | None:
     """Return place and value of an extreme from equilibria around it, where the model can be asked; else as found."""
-    law = solution.everywhere
-    if law is None or found is None or found[0] in law.corners:
+    if along.corners is None or found is None or found[0] in along.corners:
         return found
     place, value = found
-    clear = np.concatenate([solution.motion[[0, -1]], law.corners])
-    step = min(float(np.abs(np.diff(solution.motion)).max()), float(np.abs(clear - place).min()) / _BESIDE[-1])
+    clear = np.concatenate([along.motion[[0, -1]], along.corners])
+    step = min(float(np.abs(np.diff(along.motion)).max()), float(np.abs(clear - place).min()) / _BESIDE[-1])
     for _ in range(2):
-        powers = np.polynomial.polynomial.polyfit(_BESIDE, law.effort("", place + step * _BESIDE), 4)
+        powers = np.polynomial.polynomial.polyfit(_BESIDE, along.effort_at(place + step * _BESIDE), 4)
         rates = np.polynomial.polynomial.polyder(powers)
         turns = np.roots(rates[::-1])
         real = turns.real[np.isreal(turns)]
