@@ -322,12 +322,13 @@ def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Rep
 
 def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, where their tolerances are given."""
-    from cfmkit.studies.yield_of_drawn_parts import yields_of
+    from cfmkit.studies.yield_of_drawn_parts import no_yields, yields_of
 
     yields = yields_of(nominal, given, run)
     if yields is None:
         from cfmkit.studies.yield_by_assumed_tolerances import expected
 
+        found = found.beside(no_yields(given), run_outcome.Supplement()).of_many_parts()
         reported = expected(nominal, run)
         return found.beside({}, run_outcome.Supplement(lines=(("made", reported),))) if reported else found
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))

@@ -223,17 +223,17 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
-    said = False
+    lacking = "is a share of manufactured parts: state their tolerances in 'design.tolerances'"
     if isinstance(design, DesignKeys):
-        from cfmkit.studies.stated_or_assumed_tolerances import faults, is_made
+        from cfmkit.studies.stated_or_assumed_tolerances import NO_TOLERANCE, errs_nowhere, faults, is_made
 
-        said = is_made(spec, design)
+        if is_made(spec, design):
+            lacking = f"is a share of manufactured parts: {NO_TOLERANCE}" if errs_nowhere(spec, design) else ""
         for path, message in faults(spec, design):
             yield document.problem(path, message)
     asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
-    for index, one in asked if not said else ():
-        message = f"{one.metric!r} is a share of manufactured parts: state their tolerances in 'design.tolerances'"
-        yield document.problem(("requirements", index, "metric"), message)
+    for index, one in asked if lacking else ():
+        yield document.problem(("requirements", index, "metric"), f"{one.metric!r} {lacking}")
 
 
 def placed(document: Document, path: str, message: str) -> Problem:

@@ -43,7 +43,7 @@ from cfmkit.studies.requirement_constraints import (
 )
 from cfmkit.studies.sensitivity.inverse import LimitsAlong
 from cfmkit.studies.sensitivity.probability_confidence_intervals import clopper_pearson
-from cfmkit.studies.stated_or_assumed_tolerances import tolerances_of
+from cfmkit.studies.stated_or_assumed_tolerances import NO_TOLERANCE, tolerances_of
 from cfmkit.studies.variable_paths import CannotVary, leaf
 
 if TYPE_CHECKING:
@@ -293,7 +293,9 @@ def _moved(given: Spec, design: Design, run: Run, clock: Clock, largest: bool) -
     free = free_of(given, design.spec)
     nominal = family(given.family).analyze(design.spec, run)
     made = tolerances_of(design.spec, block, run.seed)
-    if made is None or nominal.status is not Status.COMPLETE:
+    if made is None:
+        return 0, replace(design, notes=(*design.notes, ("margins", f"none: {NO_TOLERANCE}")))
+    if nominal.status is not Status.COMPLETE:
         return 0, design
     places = places_of(nominal)
     first = sampled_of(design.spec, places, run)

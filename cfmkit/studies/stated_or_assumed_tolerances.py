@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.parameters import Parameter
 
 
+NO_TOLERANCE = "no value of this part is known to err by its process: state 'design.tolerances'"
+
+
 @dataclass(frozen=True)
 class DesignTolerances:
     """The tolerances of a `design` block on one specification.
@@ -115,6 +118,11 @@ def is_made(spec: Spec, design: DesignBlock) -> bool:
     return asked and process_of_part(spec) is not None
 
 
+def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
+    """Tell whether a process is said, and no value of the part errs by it; of a solid that is seen once it is drawn."""
+    return spec.fidelity != "solid" and is_made(spec, design) and not stated_tolerances(spec, design)
+
+
 def _renamed(path: str) -> str:
     """Return where a fault of a block `sensitivity` stands in a block `design`."""
     head, _, rest = path.partition(".parameters.")
@@ -145,6 +153,8 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
             ("design", "yield"),
             "a yield is a share of manufactured parts: state their tolerances in 'design.tolerances'",
         )
+    elif getattr(design, "yield") is not None and errs_nowhere(spec, design):
+        yield ("design", "yield"), NO_TOLERANCE
     if design.tolerances and not spec.part_requirements:
         reported = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
         yield ("design", "tolerances"), reported

@@ -31,7 +31,7 @@ from cfmkit.studies.parts_scaled_by_a_factor import EXACTLY, SHARES, goes_with, 
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.evaluation import plan_of
 from cfmkit.studies.sensitivity.probability_confidence_intervals import LEVEL, clopper_pearson, wilson
-from cfmkit.studies.stated_or_assumed_tolerances import DesignTolerances, tolerances_of
+from cfmkit.studies.stated_or_assumed_tolerances import NO_TOLERANCE, DesignTolerances, tolerances_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -401,6 +401,12 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why, judged.lacking)
 
 
+def no_yields(given: Spec) -> dict[str, Quantity]:
+    """Return the metrics of many parts that requirements are on, without values: no tolerance is known."""
+    asked = dict.fromkeys(one.metric for one in given.requirements if one.metric in OF_MANY_PARTS)
+    return {name: Quantity(None, "ratio", OF_MANY_PARTS[name], NO_TOLERANCE) for name in asked}
+
+
 def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShare | None, str]:
     """Return the yield of the specification as given, or why there is none."""
     if given is None:
@@ -417,4 +423,14 @@ def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShar
         return None, str(error)
 
 
-__all__ = ["DesignTolerances", "JudgedParts", "YieldShare", "Yields", "common", "judge", "tolerances_of", "yields_of"]
+__all__ = [
+    "DesignTolerances",
+    "JudgedParts",
+    "YieldShare",
+    "Yields",
+    "common",
+    "judge",
+    "no_yields",
+    "tolerances_of",
+    "yields_of",
+]

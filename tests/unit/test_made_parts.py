@@ -191,3 +191,35 @@ def test_a_trim_by_the_force_of_one_branch_leaves_the_perfect_part_as_it_is():
     judged = judge(made, np.array([made.nominal] * 2), nominal, Run())
     assert judged.met.all()
     assert judged.trimmed.all()
+
+
+TAPERED = """
+cfmkit: 1
+family: beam
+name: tapered
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 90 MPa}
+  thickness: [[0, 1 mm], [1, 0.6 mm]]
+  width: 6 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, tip: {at: [40 mm, 0 mm], support: guided, direction: 180 deg}}
+  beams: {arch: {start: root, end: tip, shape: {kind: polynomial, coefficients: [0.5 rad, -1 rad]}}}
+  drive: {kind: displacement, node: tip, direction: 180 deg}
+analysis: {travel: 3 mm, points: 11}
+design: {rescale: {force: 2 N}, process: wire-edm}
+requirements: [{metric: force_max, max: 3 N}]
+"""
+
+
+def test_a_yield_of_a_part_that_errs_nowhere_is_refused_and_never_met():
+    """Nothing is assumed of tapered beams between held nodes: a requirement on their yield was left out, exit 0."""
+    spec = cfmkit.loads(TAPERED)
+    asked = {"requirements": (*spec.requirements, {"metric": "yield", "min": "95 %"})}
+    for changes, path in ((asked, "requirements.1.metric"), ({"design.yield": "95 %"}, "design.yield")):
+        with pytest.raises(SpecError) as error:
+            cfmkit.loads(cfmkit.dumps(spec.replace(changes)))
+        assert [(one.path, "err by its process" in one.message) for one in error.value.problems] == [(path, True)]
+    found = designed(spec.replace({**asked, "design.yield": "95 %"}), Run())
+    assert [(one.metric, one.ok, one.value) for one in found.requirements][1] == ("yield", False, None)
+    assert "err by its process" in found.requirements[1].sentence
+    assert int(found.exit_code) == 5
+    assert "err by its process" in dict(found.design.notes)["margins"]
