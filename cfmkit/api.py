@@ -6,7 +6,6 @@ Everything is a value: nothing here prints or plots, and a disk is written to on
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import Named
@@ -193,24 +192,9 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
-    run, asked = run or Run(), getattr(spec, "design", None)
-    plain = getattr(asked, "yield", None) is None
-    found = record.design(spec, run) if plain else _with_yield(spec, record.design, run)
-    if getattr(asked, "verify", None) is not None:
-        from cfmkit.studies.verify_design_by_solid_model import verified
+    from cfmkit.studies.design_with_margins_and_verification import delivered
 
-        found = verified(spec, found, run)
-    return found
-
-
-def _with_yield(spec: Spec, designer: Callable[[Any, Run], Design], run: Run) -> Design:
-    """Return a design of perfect parts, in half of the time, with margins for the yield, in the time that is left."""
-    from cfmkit.designing.run_many_starts import Clock
-    from cfmkit.studies.redesign_for_yield import with_design_margins
-
-    clock, half = Clock.of(run.time_budget), None if run.time_budget is None else 0.5 * run.time_budget
-    found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
-    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.left()))
+    return delivered(spec, record.design, run or Run())
 
 
 def evaluate(

@@ -201,7 +201,9 @@ class Study:
         record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
         if not self.design or record.design is None:
             return windows_judged(record.analyze(spec, run))
-        design = record.design(spec, run)
+        from cfmkit.studies.design_with_margins_and_verification import delivered
+
+        design = delivered(spec, record.design, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
         result = windows_judged(record.analyze(design.spec, run))

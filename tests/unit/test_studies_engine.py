@@ -93,6 +93,25 @@ def test_designing_at_each_point_gives_the_designed_mechanism():
     assert values(records)[:, 1] == pytest.approx([40 / (4 * 1380), 60 / (4 * 1380)], rel=1e-12)
 
 
+def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
+    """Points had neither the widths of `design.verify` nor the margins of `design.yield`, and no word of it."""
+    spec = cfmkit.load("configs/slider_crank_bought.yaml").replace({"design.yield": "90 %", "analysis.points": 21})
+
+    def margins(given, design, _run):
+        assert getattr(given.design, "yield") == 0.9
+        return dataclasses.replace(design, spec=design.spec.replace({"mechanism.crank_length": 0.0401}))
+
+    def as_solid(_given, design, _run):
+        return dataclasses.replace(design, spec=design.spec.replace({"mechanism.offset": 0.0003}))
+
+    monkeypatch.setattr("cfmkit.studies.redesign_for_yield.with_design_margins", margins)
+    monkeypatch.setattr("cfmkit.studies.verify_design_by_solid_model.verified", as_solid)
+    spec = spec.replace({"design.verify": "solid"})
+    made = cfmkit.design(spec).spec
+    assert (made.mechanism.crank_length, made.mechanism.offset) == (0.0401, 0.0003)
+    assert Study(spec, (), (), design=True).solve(spec).spec.mechanism == made.mechanism
+
+
 def test_a_design_that_fails_is_a_row():
     records = run(work("design.stroke=[240 mm, 2 m]", design=True))
     assert statuses(records) == [Status.COMPLETE, Status.INFEASIBLE]

@@ -1,0 +1,54 @@
+"""A design as it is delivered: what the family makes of a specification, moved for its yield, verified as a solid.
+
+`cfmkit design` and the points of a study that designs take the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.families.run_control import Run
+    from cfmkit.results import Design
+    from cfmkit.specs.spec import Spec
+
+    Designer = Callable[[Any, Run], Design]
+
+
+def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return the design of a specification, with all that its block `design` asks for, or why there is none.
+
+    Parameters
+    ----------
+    spec : Spec
+        With a `design` block.
+    designer : callable
+        What designs perfect parts of the family.
+    run : Run
+        Seed, progress, time budget. If a yield is requested, the search for the perfect part has half of the time, and
+        that for its margins what is left.
+    """
+    asked = getattr(spec, "design", None)
+    plain = getattr(asked, "yield", None) is None
+    found = designer(spec, run) if plain else _with_yield(spec, designer, run)
+    if getattr(asked, "verify", None) is not None:
+        from cfmkit.studies.verify_design_by_solid_model import verified
+
+        found = verified(spec, found, run)
+    return found
+
+
+def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return a design of perfect parts, in half of the time, with margins for the yield, in the time that is left."""
+    from cfmkit.designing.run_many_starts import Clock
+    from cfmkit.studies.redesign_for_yield import with_design_margins
+
+    clock, half = Clock.of(run.time_budget), None if run.time_budget is None else 0.5 * run.time_budget
+    found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
+    return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.left()))
+
+
+__all__ = ["delivered"]
