@@ -91,6 +91,29 @@ def test_a_study_never_states_a_zero_for_a_parameter_whose_samples_failed(method
         assert (line.value is None) if policy == "fail" else (line.value != 0.0)
 
 
+@pytest.mark.parametrize(
+    ("method", "policy"),
+    [("tolerance", "fail"), ("tolerance", "resample"), ("tolerance", "bound"), ("inverse", "resample")],
+)
+def test_a_part_that_is_judged_counts_in_the_yield_whatever_metric_has_no_value(monkeypatch, method, policy):
+    """One part without a value of a metric left the yield open, was drawn again, or widened its interval."""
+    whole = study(method, samples=5)
+    evaluate = Evaluator.outputs
+
+    def one_missing(self, points, roles):
+        outputs = evaluate(self, points, roles)
+        outputs[3, 0, 0] = np.nan
+        return outputs
+
+    monkeypatch.setattr(Evaluator, "outputs", one_missing)
+    found = study(method, samples=5, on_failure=policy)
+    assert (found.all_met, found.each_met, found.replaced) == (whole.all_met, whole.each_met, 0)
+    if method == "tolerance":
+        first = [line.value for line in found.lines if line.metric == found.setup.study.metrics[0].label]
+        assert first
+        assert all((value is None) == (policy == "fail") for value in first)
+
+
 def test_the_engine_gives_the_values_of_a_single_analysis():
     found = study("oat", samples=3)
     setup = found.setup

@@ -102,7 +102,11 @@ class Blocks:
 
 
 def evaluated(
-    draw: Callable[[int, int], FloatArray], evaluate: Callable[[FloatArray], FloatArray], count: int, policy: Policy
+    draw: Callable[[int, int], FloatArray],
+    evaluate: Callable[[FloatArray], FloatArray],
+    count: int,
+    policy: Policy,
+    deciding: int = 0,
 ) -> Blocks:
     """Return `count` blocks and what came of them; under ``resample`` complete ones, as far as they can be had.
 
@@ -116,6 +120,8 @@ def evaluated(
         Blocks wanted.
     policy : {"fail", "resample", "bound"}
         What to do about missing values.
+    deciding : int
+        Outputs before this one may be missing: their blocks are not drawn again.
     """
     points = draw(0, count)
     outputs = evaluate(points)
@@ -123,7 +129,7 @@ def evaluated(
     if policy != "resample":
         return Blocks(points, outputs, failed)
     drawn, replaced = count, 0
-    while (bad := np.asarray(np.isnan(outputs).any(axis=(1, 2)))).any() and drawn < MOST_DRAWN * count:
+    while (bad := np.asarray(np.isnan(outputs[..., deciding:]).any(axis=(1, 2)))).any() and drawn < MOST_DRAWN * count:
         wanted = int(bad.sum())
         fresh = draw(drawn, wanted)
         drawn, replaced = drawn + wanted, replaced + wanted

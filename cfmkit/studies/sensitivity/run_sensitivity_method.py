@@ -190,12 +190,14 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
 
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
     roles = [DRAWN, *(f"halved {name}" for name in names)]
-    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    blocks = evaluated(
+        drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy, _verdicts(setup)
+    )
     found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         analysis = _stated(
             setup,
-            blocks.outputs[..., m],
+            _known(blocks.outputs[..., m], setup),
             lambda one: monte_carlo_yield.variance_drops(one, setup.seed),
             (monte_carlo_yield.VARIANCE_DROP,),
             len(names),
@@ -205,6 +207,17 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
         setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
     )
     return _with_yield(plain, names) if setup.study.spec.part_requirements else plain
+
+
+def _verdicts(setup: Setup) -> int:
+    """Return from which output on parts are judged: none is drawn again for a mere metric without value."""
+    return len(setup.study.metrics) if setup.study.spec.part_requirements else 0
+
+
+def _known(outputs: FloatArray, setup: Setup) -> FloatArray:
+    """Return the blocks with all values of a metric, where those that lack one may be left out as if drawn again."""
+    known = ~np.isnan(outputs).any(axis=1)
+    return outputs[known] if setup.policy == "resample" and known.any() else outputs
 
 
 def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
@@ -223,12 +236,14 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
         again = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
         return values_at(tight, again)[:, None, :]
 
-    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, [DRAWN]), setup.samples, setup.policy)
+    blocks = evaluated(
+        drawn, lambda points: evaluator.outputs(points, [DRAWN]), setup.samples, setup.policy, _verdicts(setup)
+    )
     plain = Findings(
         setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
     )
     met = blocks.outputs[..., len(setup.study.metrics) :]
-    failed: NDArray[np.bool_] = np.asarray(np.isnan(blocks.outputs).any(axis=-1))[:, 0]
+    failed: NDArray[np.bool_] = np.asarray(np.isnan(met).any(axis=-1))[:, 0]
     good: NDArray[np.bool_] = (~np.isnan(met) & (met > 0.5))[:, 0]
     each = (monte_carlo_yield.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
     whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
@@ -271,7 +286,7 @@ def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     if outputs is None:
         return found
     met = outputs[..., len(setup.study.metrics) :]
-    failed: NDArray[np.bool_] = np.asarray(np.isnan(outputs).any(axis=-1))
+    failed: NDArray[np.bool_] = np.asarray(np.isnan(met).any(axis=-1))
     good: NDArray[np.bool_] = ~np.isnan(met) & (met > 0.5)
     whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
     gains = monte_carlo_yield.yield_gains(whole, failed, setup.policy)
