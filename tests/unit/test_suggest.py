@@ -205,6 +205,19 @@ def test_what_misses_a_wish_says_which():
     assert any("across the travel" in reported for reported in one.missed)
 
 
+def test_the_ripple_of_an_adjustable_force_is_that_of_each_direction():
+    """With friction the loop counted as ripple: 1 % in each direction and 3.5 % between them were refused at 3 %."""
+    motion = np.array([0.0, 1.5e-3, 3e-3, 3e-3, 1.5e-3, 0.0])
+    effort = np.array([1.01, 1.0, 1.01, 0.975, 0.965, 0.965])
+    branch = np.repeat(["load", "unload"], 3)
+    ends = tuple(Curve(motion, force * effort, branch) for force in (8.0, 12.2))
+    result = SimpleNamespace(spec=SimpleNamespace(at=lambda _path: (0.0, 3e-3)), curves=ends)
+    asked = wish(adjustable="[8 N, 12 N]")
+    assert not list(proposal_making_and_judging._badly_adjusted(asked, result))
+    reported = tuple(proposal_making_and_judging._badly_adjusted(replace(asked, ripple=0.005), result))
+    assert [one[:17] for one in reported] == ["changes by 1.03 %"] * 2
+
+
 PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
 """Of which the first proposals have yields between nothing and two thirds."""
 

@@ -361,12 +361,12 @@ def _badly_adjusted(wish: Wish, result: Result) -> Iterator[str]:
     means = []
     for curve in result.curves:
         inside = (curve.motion >= float(window[0])) & (curve.motion <= float(window[1]))
-        effort = curve.effort[inside]
-        if not len(effort) or not np.isfinite(effort).all():
+        efforts = [curve.effort[inside & (curve.branch == name)] for name in curve.branches]
+        if not efforts or not all(len(effort) and np.isfinite(effort).all() for effort in efforts):
             yield "has no force at one end of the adjustment"
             return
-        means.append(float(effort.mean()))
-        if (ripple := 1.0 - float(effort.min() / effort.max())) > wish.ripple:
+        means.append(float(np.mean([effort.mean() for effort in efforts])))
+        if (ripple := max(1.0 - float(effort.min() / effort.max()) for effort in efforts)) > wish.ripple:
             at = format_short(means[-1], "force")
             yield f"changes by {100 * ripple:.3g} % at {at}: {100 * wish.ripple:.3g} % wished"
     low, high = wish.adjustable
