@@ -175,15 +175,15 @@ class Summary:
         """Number of points that were solved, wholly or in part."""
         return sum(count for status, count in self.counts.items() if status.usable)
 
-    def exit_code(self, bugs: int = 0) -> ExitCode:
+    def exit_code(self) -> ExitCode:
         """Return the exit code of the process.
 
-        0 if every point is complete; 6 if some are not; with none that was solved 70 if all
-        of them hit a bug, 3 if all are invalid, 6 if one ran out of time and may have a solution,
+        0 if every point is complete; 6 if some are not; with none that was solved 70 if all of them hit a bug or lost
+        their processes, 3 if all are invalid, 6 if one ran out of time and may have a solution,
         else 4; 5 if all is well but the requirements, which no point meets together.
         """
         if not self.usable:
-            if bugs and bugs == self.total:
+            if self.total and self.counts[Status.CRASHED] == self.total:
                 return ExitCode.BUG
             if self.counts[Status.TIMEOUT]:
                 return ExitCode.PARTIAL

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.plots.sensitivity import figures, short
 from cfmkit.plots.style import MM, png
+from cfmkit.results import Status
 from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.output import as_json, exit_code, message, outputs
 from cfmkit.studies.sensitivity.run_sensitivity_method import METHODS, carry_out
 from cfmkit.studies.sensitivity.setup import points_of, prepare
+from cfmkit.studies.summary import Summary
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
 PARAMETERS = {
@@ -112,6 +115,22 @@ def test_a_part_that_is_judged_counts_in_the_yield_whatever_metric_has_no_value(
         first = [line.value for line in found.lines if line.metric == found.setup.study.metrics[0].label]
         assert first
         assert all((value is None) == (policy == "fail") for value in first)
+
+
+@pytest.mark.parametrize(
+    ("end", "code"),
+    [(Status.CRASHED, ExitCode.BUG), (Status.INVALID, ExitCode.INVALID), (Status.NO_EQUILIBRIUM, ExitCode.NO_SOLUTION)],
+)
+def test_a_study_of_which_nothing_was_solved_ends_with_the_code_of_what_all_have_in_common(end, code):
+    """Where every worker was killed, the codes were those of a mechanism without a solution."""
+    found = study("oat", samples=2)
+    count = found.evaluator.count
+    found.evaluator.ends = Counter({end: count})
+    summary = Summary(found.setup.study, counts=Counter({end: count}))
+    assert (exit_code(found), summary.exit_code(), as_json(found)["status"]) == (code, code, "no_result")
+    mixed = Counter({end: count - 1, Status.INFEASIBLE: 1})
+    found.evaluator.ends, summary.counts = mixed, mixed
+    assert (exit_code(found), summary.exit_code()) == (ExitCode.NO_SOLUTION,) * 2
 
 
 def test_the_engine_gives_the_values_of_a_single_analysis():

@@ -174,7 +174,7 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     """Return the exit code of the process; points that were not computed count first."""
     if records.finished < len(records):
         return ExitCode.INTERRUPTED
-    return summary.exit_code(records.bugs)
+    return summary.exit_code()
 
 
 def _complaints(records: Records, code: ExitCode, options: SweepOptions, document: Document) -> Iterator[str]:

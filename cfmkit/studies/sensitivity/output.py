@@ -81,7 +81,10 @@ def exit_code(found: Findings) -> ExitCode:
         return ExitCode.INTERRUPTED
     evaluator = found.evaluator
     if evaluator.count and evaluator.failed == evaluator.count and not evaluator.ends[Status.TIMEOUT]:
-        return ExitCode.NO_SOLUTION
+        ends = {Status.CRASHED: ExitCode.BUG, Status.INVALID: ExitCode.INVALID}
+        return next(
+            (code for end, code in ends.items() if evaluator.ends[end] == evaluator.count), ExitCode.NO_SOLUTION
+        )
     stated = found.setup.method == "local" and not found.lacking
     # a tolerance that does not exist is an answer
     if (evaluator.failed and not stated) or (found.lacking and found.setup.method != "inverse"):
@@ -167,7 +170,7 @@ def as_json(found: Findings) -> dict[str, Any]:
 
 _STATUS = {
     ExitCode.INTERRUPTED: "interrupted",
-    ExitCode.NO_SOLUTION: "no_result",
+    **dict.fromkeys((ExitCode.BUG, ExitCode.INVALID, ExitCode.NO_SOLUTION), "no_result"),
     ExitCode.PARTIAL: "partial",
 }
 
