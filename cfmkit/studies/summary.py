@@ -2,7 +2,8 @@
 
 The best point is the one with the best value of one metric, among those that meet every
 requirement, else among all that were solved. The metric is that of the first
-requirement, and better means farther inside its bound; without requirements it is the
+requirement, over its window where the study notes it there, and better means farther inside
+its bound, or from the nearer of two; without requirements it is the
 ripple of the force or torque, and smaller is better.
 """
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from cfmkit.errors import ExitCode
 from cfmkit.metrics import other_name
+from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.varied_axes import written
@@ -39,18 +41,51 @@ TIE = 1e-9
 
 @dataclass(frozen=True)
 class Objective:
-    """What makes a point better than another: the column of a metric, and whether more is better."""
+    """What makes a point better than another: the column of a metric, and which of its values are better.
+
+    Attributes
+    ----------
+    column : int
+        Of the study.
+    largest : bool
+        Whether more is better.
+    middle : float or None
+        Of two bounds [SI]: the nearer, the better, whatever `largest` says.
+    """
 
     column: int
     largest: bool
+    middle: float | None = None
+
+    @property
+    def sense(self) -> str:
+        """Which value of the metric is the best, in words before its name."""
+        return "most central" if self.middle is not None else "largest" if self.largest else "smallest"
+
+    def scores(self, values: FloatArray) -> FloatArray:
+        """Return numbers that are smaller for better values of the metric."""
+        if self.middle is not None:
+            return np.abs(values - self.middle)
+        return values * (-1.0 if self.largest else 1.0)
+
+    def slack(self, score: float) -> float:
+        """Return by how much scores may differ that count as equally good."""
+        return TIE * max(abs(score), abs(self.middle or 0.0))
 
 
 def objective(study: Study) -> Objective | None:
     """Return by what the best point is chosen; None where the study notes nothing of the kind."""
     for one in study.spec.part_requirements:
-        for name in (one.metric, other_name(one.metric)):
-            if name in study.names:
-                return Objective(study.names.index(name), one.max is None)
+        names = one.metric, other_name(one.metric)
+        noted = [column for column, item in enumerate(study.metrics) if item.name in names]
+        # over another window is the next best that is known: points that meet the requirement come first anyway
+        noted.sort(
+            key=lambda column: (study.metrics[column].over != one.over, study.metrics[column].name != one.metric)
+        )
+        if noted:
+            limits = Bounds.of(one, study.metrics[noted[0]].dimension)
+            middle = None if limits.min is None or limits.max is None else 0.5 * (limits.min + limits.max)
+            return Objective(noted[0], one.max is None, middle)
     for name in DEFAULT_OBJECTIVES:
         if name in study.names:
             return Objective(study.names.index(name), False)
@@ -136,34 +171,36 @@ class Summary:
     def _look_for_the_best(self, indices: NDArray[np.int64], rows: ResultRows, meets: NDArray[np.bool_]) -> None:
         if self._goal is None:
             return
-        score = rows.values[:, self._goal.column] * (-1.0 if self._goal.largest else 1.0)
+        score = self._goal.scores(rows.values[:, self._goal.column])
         for group, meeting in ((meets, True), (~meets, False)):
             inside = np.where(group, score, np.nan)
             if np.isnan(inside).all() or (self.best_meets and not meeting):
                 continue
             least = float(np.nanmin(inside))
-            as_good = np.flatnonzero(np.abs(inside - least) <= TIE * abs(least))
+            as_good = np.flatnonzero(np.abs(inside - least) <= self._goal.slack(least))
             before = self._best_score()
-            same = self.best is not None and self.best_meets == meeting and abs(least - before) <= TIE * abs(before)
+            same = (
+                self.best is not None and self.best_meets == meeting and abs(least - before) <= self._goal.slack(before)
+            )
             # of points that only rounding tells apart the first is the best
             if self.best is None or meeting > self.best_meets or (least < before and not same):
                 self.best, self.best_meets = int(indices[as_good[0]]), meeting
                 self.best_values = rows.values[as_good[0]].copy()
                 self.ties = 0
             score_now = self._best_score()
-            self.ties += int((np.abs(inside - score_now) <= TIE * abs(score_now)).sum())
+            self.ties += int((np.abs(inside - score_now) <= self._goal.slack(score_now)).sum())
 
     @property
     def best_by(self) -> tuple[str, str] | None:
         """Name of the metric that the best point is chosen by, and which of its values is the best."""
         if self._goal is None or self.best is None:
             return None
-        return self.study.names[self._goal.column], "largest" if self._goal.largest else "smallest"
+        return self.study.names[self._goal.column], self._goal.sense
 
     def _best_score(self) -> float:
         if self._goal is None or self.best_values is None:
             return np.inf
-        return float(self.best_values[self._goal.column]) * (-1.0 if self._goal.largest else 1.0)
+        return float(self._goal.scores(self.best_values)[self._goal.column])
 
     @property
     def total(self) -> int:
@@ -226,7 +263,7 @@ class Summary:
             "point": self.best + 1,
             "values": {item.path: written(value, item.dimension) for item, value in values},
             "by": self.study.names[self._goal.column],
-            "sense": "largest" if self._goal.largest else "smallest",
+            "sense": self._goal.sense,
             "ties": self.ties,
             "requirements_met": self.best_meets if len(self.met) else None,
         }

@@ -18,7 +18,8 @@ from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.row_blocks_for_journal import squeezed, unsqueezed
+from cfmkit.studies.row_blocks_for_journal import ResultRows, squeezed, unsqueezed
+from cfmkit.studies.summary import Objective, Summary
 from cfmkit.studies.tables import results_csv
 from cfmkit.studies.varied_axes import axes, wish
 from cfmkit.tables import read_csv
@@ -85,6 +86,22 @@ def test_requirements_are_checked_at_every_point():
     assert met.shape == (2, len(spec.requirements))
     expected = [cfmkit.check(cfmkit.analyze(spec.replace({"mechanism.springs.count": k}))) for k in (1, 2)]
     assert met.tolist() == [[outcome.ok for outcome in outcomes] for outcomes in expected]
+
+
+def test_the_best_point_is_the_farthest_from_both_bounds_over_the_window_of_the_requirement():
+    """Of a band the point on its lower bound was the best; of a metric noted twice the first, whatever its window."""
+    band = {"metric": "force_mean", "min": "40 N", "max": "60 N", "over": ("10 mm", "100 mm")}
+    spec = SPEC.replace({"requirements": (band,)})
+    plan = work("mechanism.springs.count=[1, 2]").plan
+    metrics = metrics_of(spec, ("force_mean", "force_mean[load]"))
+    study = Study(spec, plan.paths, (*metrics, dataclasses.replace(metrics[0], over=spec.requirements[0].over)))
+    found = Summary(study)
+    numbers = np.array([[50.0, 50.0, 40.0], [40.0, 50.0, 53.0], [41.0, 50.0, 52.0], [50.0, 50.0, 70.0]])
+    found.add(np.arange(3), ResultRows(numbers[:3], np.ones((3, 1), dtype=bool), {}))
+    found.add(np.arange(3, 4), ResultRows(numbers[3:], np.zeros((1, 1), dtype=bool), {}))
+    assert (found.best, found.ties, found.best_by) == (2, 1, ("force_mean", "most central"))
+    one_sided = spec.replace({"requirements": (band | {"max": None},)})
+    assert Summary(dataclasses.replace(study, spec=one_sided))._goal == Objective(2, True)
 
 
 def test_designing_at_each_point_gives_the_designed_mechanism():
