@@ -19,7 +19,8 @@ from cfmkit.plots.style import MM, png
 from cfmkit.results import Status
 from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
-from cfmkit.studies.sensitivity.output import as_json, exit_code, message, outputs
+from cfmkit.studies.sensitivity.monte_carlo_yield import yield_of
+from cfmkit.studies.sensitivity.output import as_json, by_interval, exit_code, message, outputs, yield_ok
 from cfmkit.studies.sensitivity.run_sensitivity_method import METHODS, carry_out
 from cfmkit.studies.sensitivity.setup import points_of, prepare
 from cfmkit.studies.summary import Summary
@@ -131,6 +132,18 @@ def test_a_study_of_which_nothing_was_solved_ends_with_the_code_of_what_all_have
     mixed = Counter({end: count - 1, Status.INFEASIBLE: 1})
     found.evaluator.ends, summary.counts = mixed, mixed
     assert (exit_code(found), summary.exit_code()) == (ExitCode.NO_SOLUTION,) * 2
+
+
+@pytest.mark.parametrize(("good", "met"), [(93, False), (95, True)])
+def test_a_yield_with_failed_samples_is_kept_only_if_it_is_with_all_of_them_bad(good, met):
+    """Under `bound` the middle of the interval decided: 93 to 98 % were 95.5 %, and ok."""
+    found = study("tolerance", samples=4, on_failure="bound", min_yield="95 %")
+    parts = np.arange(100)
+    share = yield_of(parts < good, (parts >= good) & (parts < good + 5), "bound")
+    found = dataclasses.replace(found, all_met=share)
+    assert (yield_ok(found), by_interval(found)) == (met, False)
+    sentence = as_json(found)["requirements"][-1]["sentence"]
+    assert sentence == f"yield {good} % to {good + 5} % (samples failed), required >= 95 %: {'ok' if met else 'missed'}"
 
 
 def test_the_engine_gives_the_values_of_a_single_analysis():

@@ -311,7 +311,9 @@ def _share(one: Yield) -> str:
     if one.value != one.value:
         return f"not stated: {one.failed} of {one.count} parts have no result"
     low, high = (f"{100 * end:.1f}" for end in one.wilson)
-    return f"{100 * one.value:.1f} %   95 %: {low} ... {high} %"
+    least, most = (100 * (one.good + more) / one.count for more in (0, one.failed))
+    value = f"{least:.1f} to {most:.1f} %" if one.failed else f"{100 * one.value:.1f} %"
+    return f"{value}   95 %: {low} ... {high} %"
 
 
 def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
