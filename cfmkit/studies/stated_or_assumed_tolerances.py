@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.specs.spec import DesignBlock, Spec
+    from cfmkit.stock.material_and_part_spec import MaterialSpec
     from cfmkit.stock.processes import ProcessAccuracy
     from cfmkit.studies.sensitivity.parameters import Parameter
 
@@ -177,12 +178,15 @@ class Assumed:
     kinds : mapping of str to str
         Path -> in what it errs, "thickness" or "position".
     modulus : (float, float) or None
-        From where to where the modulus is found [Pa]; None where no source says it.
+        From where to where the modulus at `MODULUS` is found [Pa]; None where no source says it.
+    as_stated : bool
+        Whether beams have materials of their own whose moduli are found in a range, too: they are taken as stated.
     """
 
     process: ProcessAccuracy
     kinds: Mapping[str, str]
     modulus: tuple[float, float] | None
+    as_stated: bool = False
 
     @property
     def deviations(self) -> dict[str, float]:
@@ -201,18 +205,34 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     kinds: Mapping[str, str] = function_named(errors)(spec)
     if not kinds:
         return None
-    material = getattr(getattr(spec, "mechanism", None), "material", None)
     named = process or getattr(getattr(spec, "design", None), "process", None)
-    accuracy = PROCESSES[OF_PLATES] if material is None else usual(material.name, material.modulus)
+    shared, owned = _materials(spec)
+    usually = [usual(one.name, one.modulus) for one in (*shared, *owned)]
+    # one process makes the whole part: that of the material that is made least exactly
+    accuracy = max(usually, key=lambda one: one.thickness, default=PROCESSES[OF_PLATES])
     own = process_of_part(spec)
     if named:
         accuracy = PROCESSES[named]
     elif own is not None:
         accuracy = own.accuracy(accuracy)
-    band = None
-    if material is not None and (known := MATERIALS.get(material.name)) and material.modulus == known.youngs_modulus:
-        band = known.scatter.youngs_modulus
-    return Assumed(accuracy, kinds, band)
+    band = next((found for one in shared if (found := _band(one))), None)
+    return Assumed(accuracy, kinds, band, any(map(_band, owned)))
+
+
+def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec, ...]]:
+    """Return the material of a mechanism, where something is made of it, and those that its beams have of their own."""
+    mechanism = getattr(spec, "mechanism", None)
+    material: MaterialSpec | None = getattr(mechanism, "material", None)
+    beams = getattr(mechanism, "beams", None)
+    own = [getattr(beam, "material", None) for beam in beams.values()] if isinstance(beams, dict) else []
+    shared = () if material is None or (own and None not in own) else (material,)
+    return shared, tuple(one for one in own if one is not None)
+
+
+def _band(material: MaterialSpec) -> tuple[float, float] | None:
+    """Return from where to where the modulus of a material is found [Pa], if it is that of its name."""
+    known = MATERIALS.get(material.name or "")
+    return known.scatter.youngs_modulus if known and material.modulus == known.youngs_modulus else None
 
 
 def process_of_part(spec: Spec) -> PartProcess | None:

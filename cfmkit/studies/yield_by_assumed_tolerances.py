@@ -109,6 +109,8 @@ def _reported(found: Assumed, shares: FirstOrderShares) -> str:
     if found.modulus is not None:
         low, high = (format_short(end, "stress") for end in found.modulus)
         reported.append(f"modulus {low} to {high}")
+    if found.as_stated:
+        reported.append("moduli of beams' own materials as stated")
     reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
     text = f"{_share(shares.good)} parts would meet the requirements if made by {process.name} "
     text += f"({', '.join(reported)}; assumed{reason}; to first order)"

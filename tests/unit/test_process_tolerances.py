@@ -9,9 +9,10 @@ from cfmkit.families import family
 from cfmkit.families.run_control import Run
 from cfmkit.runs.run import designed
 from cfmkit.specs.spec import Requirement
+from cfmkit.stock.materials import MATERIALS
 from cfmkit.stock.processes import PROCESSES
 from cfmkit.studies import requirement_constraints
-from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances_of
+from cfmkit.studies.stated_or_assumed_tolerances import assumed, tolerances, tolerances_of
 from cfmkit.studies.yield_by_assumed_tolerances import expected, first_order_shares
 from cfmkit.studies.yield_of_drawn_parts import judge
 
@@ -50,6 +51,28 @@ def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
     assert "assumed" in reported
     assert "once the modulus is measured" in reported
     assert "design.process=fdm" in reported
+
+
+def test_what_is_assumed_is_of_the_materials_that_beams_have():
+    """The process was that of a material no beam has, and its modulus was drawn, which changes nothing."""
+    spec = cfmkit.load("configs/beam_lan2010.yaml")
+    bands = {name: one.scatter.youngs_modulus for name, one in MATERIALS.items()}
+    paths = [f"mechanism.beams.{name}.material" for name in spec.mechanism.beams]
+
+    def found(top, *own):
+        changes = {path: {"name": name} for path, name in zip(paths, own, strict=False)}
+        return spec.replace({"mechanism.material": {"name": top}, **changes})
+
+    def reported(part):
+        made = assumed(part)
+        return made.process.name, made.modulus, made.as_stated
+
+    assert reported(found("pla")) == ("fdm", bands["pla"], False)
+    assert reported(found("pla", *["steel-304"] * 4)) == ("wire-edm", None, True)
+    assert reported(found("steel-304", *["pla"] * 4)) == ("fdm", None, True)
+    assert reported(found("steel-304", "pla")) == ("fdm", bands["steel-304"], True)
+    assert "mechanism.material.youngs_modulus" not in tolerances(found("pla", *["steel-304"] * 4))
+    assert "mechanism.material.youngs_modulus" in tolerances(found("pla"))
 
 
 def test_a_cam_whose_parts_end_in_its_window_gets_no_number_one_with_shares_does_and_a_design_with_tolerances_no_line():
