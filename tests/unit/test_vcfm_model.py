@@ -215,11 +215,14 @@ def test_a_block_has_the_numbers_of_its_points(model, window):
 
 
 @pytest.mark.parametrize("model", ["truss", "analytic"])
-@pytest.mark.parametrize("window", ["[2 mm, 4 mm]", "null"])
-def test_a_block_has_the_warnings_of_its_points(model, window):
+@pytest.mark.parametrize(
+    ("window", "preloads"), [("[2 mm, 4 mm]", "[0 mm]"), ("null", "[0 mm]"), ("[2 mm, 4 mm]", "[0 mm, 9 mm, 3 mm]")]
+)
+def test_a_block_has_the_warnings_of_its_points(model, window, preloads):
     spec = table_i(
         f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]",
         "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 30 MPa}", "analysis.flatness=5 %",
+        preloads=preloads,
     )  # fmt: skip
     ranges = RANGES | {"mechanism.bistable.angle": "4 deg:17 deg", "mechanism.bistable.thickness": "0.4 mm:4 mm"}
     plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
@@ -227,7 +230,9 @@ def test_a_block_has_the_warnings_of_its_points(model, window):
     assert many.vectorised
     together, seen = run(many), set()
     for k in range(0, 64, 2):
-        alone = many.study.evaluate(many.plan.point(k)).warnings
+        one = many.study.evaluate(many.plan.point(k))
+        assert together.row(k).status(0) == (one.status, one.message)
+        alone = one.warnings
         assert sorted({name for name, mask in together.row(k).warned.items() if mask[0]}) == sorted(set(alone)), k
         seen |= set(alone)
     assert len(seen) > (2 if model == "truss" else 6)
@@ -245,6 +250,7 @@ def test_every_size_that_a_block_varies_is_one_of_the_spec():
         ["analysis.fidelity=exact"],
         ["mechanism.bistable.structure=cosine"],
         ["analysis.preloads=[1 mm]"],
+        ["analysis.preloads=[0 mm, -1 mm]"],
         ["mechanism.bistable.flexure_length=16 mm"],
     ],
 )
@@ -252,6 +258,14 @@ def test_what_has_no_closed_form_over_arrays_is_left_to_the_model_of_one(changes
     block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)
     assert analyze_block(table_i(*changes), block) is None
     assert analyze_block(table_i(), block).done.all()
+
+
+def test_a_block_warns_of_the_stress_at_all_preloads_and_leaves_springs_that_close_to_the_model_of_one():
+    block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)
+    made_of = "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 50 MPa}"
+    assert analyze_block(table_i(made_of, preloads="[0 mm, 7.5 mm]"), block).warnings["overstressed"].all()
+    assert not analyze_block(table_i(made_of), block).warnings["overstressed"].any()
+    assert not analyze_block(table_i(preloads="[0 mm, 12 mm]"), block).done.any()
 
 
 # --- curves and tables -----------------------------------------------------------------------------------------

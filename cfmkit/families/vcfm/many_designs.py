@@ -1,7 +1,8 @@
-"""Many mechanisms at once: V-beams and a diamond without preload, by the analytic laws or the paper's.
+"""Many mechanisms at once: V-beams and a diamond that is not pulled, by the analytic laws or the paper's.
 
 The laws broadcast over designs and travels, so that a block is the same formulas on a (designs, points) array. What is
-not asked is not computed: where all measures have a window, only the samples in it are.
+not asked is not computed: where all measures have a window, only the samples in it are. The curve is the one without
+preload; what is warned of considers the largest preload, too.
 """
 
 from __future__ import annotations
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
 
 SLAB = 60_000
 """Samples that are worked on together: few enough to stay in a processor's cache."""
+
+HALVED = 30
+"""Times that the way to a rest position is halved: 1e-9 of the preload is left."""
 
 _SIZES = ("length", "angle", "thickness", "width")
 VARIED = {
@@ -96,7 +100,7 @@ def _applies(spec: VcfmSpec, block: Block) -> bool:
         analysis.fidelity in ("truss", "analytic")
         and mechanism.kinds == ("diamond", "v-beam")
         and mechanism.bistable.flexure_length is None  # which bounds the length
-        and analysis.preloads[0] == 0
+        and analysis.preloads[0] == min(analysis.preloads) == 0
     )
     ends = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
     inside = all(low >= 0 and high <= spec.travel for low, high in ends)
@@ -111,7 +115,8 @@ def _sound(spec: VcfmSpec, block: Block, names: set[str]) -> NDArray[np.bool_]:
         done &= (given >= 1) & (given <= 1000) if path.endswith("half_beams") else given > 0
         if path.endswith("angle"):
             done &= given <= np.radians(40)
-    done &= np.ravel(np.broadcast_to(_room(spec, block) >= spec.travel, (block.size, 1)))
+    farthest = spec.travel + max(spec.analysis.preloads)
+    done &= np.ravel(np.broadcast_to(_room(spec, block) >= farthest, (block.size, 1)))
     if names & {"negative_stiffness", "constant_force"} and spec.analysis.fidelity == "analytic":
         whole = Slab.of(spec, block.values, block.size)
         done &= np.ravel(whole.leaf.strip.slenderness > LINEAR_ABOVE)
@@ -133,7 +138,7 @@ def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
 class Slab:
     """Some designs over one grid of travels; every quantity is a column (k, 1) or an array (k, points).
 
-    `stated` is the window of the analysis [m], if there is one.
+    `stated` is the window of the analysis [m], if there is one, and `preload` the largest preload [m].
     """
 
     leaf: VBeam | TrussLeaf
@@ -143,6 +148,7 @@ class Slab:
     flatness: float
     target: float | None = None
     stated: tuple[float, float] | None = None
+    preload: float = 0.0
 
     @classmethod
     def of(cls, spec: VcfmSpec, values: Mapping[str, Any], size: int) -> Slab:
@@ -168,7 +174,8 @@ class Slab:
         leaves = column("half_beams", mechanism.bistable.half_beams)
         window = spec.analysis.window
         stated = None if window is None else between(window, (0.0, spec.travel))
-        return cls(leaf, spring, leaves, grid, spec.analysis.flatness, target, stated)
+        most = max(spec.analysis.preloads)
+        return cls(leaf, spring, leaves, grid, spec.analysis.flatness, target, stated, most)
 
     def force_at(self, travel: FloatArray) -> FloatArray:
         """Return the forces at some travels, (k, n) [N]."""
@@ -220,6 +227,23 @@ class Slab:
     def exact(self, places: FloatArray) -> FloatArray:
         """Return the forces at places of each design, (k, m) [N]."""
         return np.asarray(self.half_beams * self.leaf.force(places) + self.spring.force(places))
+
+    @cached_property
+    def rest(self) -> FloatArray:
+        """Where the shuttles rest at the largest preload, (k, 1) [m]: there its spring pulls the leaves hardest."""
+        low, high = np.full((len(self.half_beams), 1), -self.preload), np.zeros((len(self.half_beams), 1))
+        for _ in range(HALVED if self.preload else 0):
+            middle = 0.5 * (low + high)
+            force = self.half_beams * self.leaf.force(middle) + self.spring.force(middle + self.preload)
+            low, high = np.where(force > 0, low, middle), np.where(force > 0, middle, high)
+        return 0.5 * (low + high)
+
+    @cached_property
+    def stresses(self) -> tuple[FloatArray, FloatArray]:
+        """Largest stresses of leaves and spring at the samples of all preloads, (k, 1) each [Pa]."""
+        grid = self.grid[None, :]
+        shuttle = np.maximum(_largest(self.leaf.stress(grid)), _largest(self.leaf.stress(self.rest)))
+        return shuttle, _largest(self.spring.stress(np.hstack([grid, grid[:, -1:] + self.preload])))
 
     @cached_property
     def window(self) -> tuple[FloatArray, FloatArray]:
@@ -300,7 +324,7 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
             | (leaf.thickness > THICK * leaf.length)
             | goes_beyond(travel, RELIABLE * rise)
             | (spring.angle > STEEP)
-            | (travel / (2.0 * spring.length) > PRESSED)
+            | ((travel + slab.preload) / (2.0 * spring.length) > PRESSED)
         )
         & (not paper),
         "wide_beam": _too_wide(slab) & (not paper),
@@ -336,20 +360,22 @@ def _stays(slab: Slab) -> NDArray[np.bool_]:
 def _too_wide(slab: Slab) -> NDArray[np.bool_]:
     """Return of which designs leaves or spring are too wide for beams, (k, 1): as the finding `wide_beam` has it."""
     found = np.zeros((len(slab.force), 1), dtype=bool)
-    for part in (slab.leaf, slab.spring):
-        strip, stress = part.strip, np.asarray(part.stress(slab.grid[None, :])).max(axis=1, keepdims=True)
+    for part, stress in zip((slab.leaf, slab.spring), slab.stresses, strict=True):
+        strip = part.strip
         curvature = 2.0 * stress / (strip.youngs_modulus * strip.thickness)
         found = found | (hindered_share(strip.width, strip.thickness, strip.poisson_ratio, curvature) > TOO_SOFT)
     return found
+
+
+def _largest(stress: Any) -> FloatArray:
+    return np.asarray(np.asarray(stress).max(axis=1, keepdims=True))
 
 
 def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
     allowed = spec.mechanism.allowable_stress
     if allowed is None:
         return np.array(False)
-    leaves, spring = (
-        np.asarray(part.stress(slab.grid[None, :])).max(axis=1, keepdims=True) for part in (slab.leaf, slab.spring)
-    )
+    leaves, spring = slab.stresses
     slack = np.maximum(overrated(slab.leaf.strip.angle), EXACT_FORM) if isinstance(slab.leaf, VBeam) else EXACT_FORM
     return np.asarray((leaves > allowed * (1 + slack)) | (spring > allowed * (1 + EXACT_FORM)))
 
