@@ -94,6 +94,21 @@ def test_a_compression_spring_gets_no_shorter_than_its_turns_on_each_other(spec)
     assert cfmkit.analyze(cured).status is Status.COMPLETE
 
 
+def test_a_design_does_not_press_its_own_springs_until_their_turns_touch(spec):
+    wire = {"wire": "1 mm", "coil": "10 mm", "turns": 9}
+    springs = {"kind": "compression", "stiffness": "1 N/mm", "free_length": "19 mm", "wound": wire}
+    own = spec.replace({"mechanism.springs": springs, "design": None, "requirements": ()})
+    own = own.replace({"design": {"force": "5 N", "adjustment": "3 N", "stroke": "4 mm", "refine": False}})
+    refused = family("vcfm").design(own, Run())
+    assert refused.status is Status.INFEASIBLE
+    assert "deflected by 8.333 mm, their turns touch at 7 mm" in refused.message
+    longer = own.replace({"mechanism.springs.free_length": "21 mm", "analysis.travel": "7.2 mm"})
+    made = family("vcfm").design(longer, Run())  # the stated travel closes them: what is analysed says so
+    assert made.status is Status.COMPLETE
+    assert "spring_closed" in {item.name for item in cfmkit.analyze(made.spec).warnings}
+    assert made.spec.mechanism.frame == own.mechanism.frame
+
+
 def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(spec):
     rate = generic("compression")[0].rate
     offer = {"name": "pull", "kind": "extension", "stiffness": f"{rate / 1000} N/mm", "initial_tension": "1 N"}

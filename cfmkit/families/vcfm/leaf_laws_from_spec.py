@@ -92,14 +92,15 @@ def spring_room(spec: VcfmSpec) -> float:
     """Return how far the spring can be compressed until its blocks or its turns meet [m]; infinite where none do."""
     about, bought = spec.mechanism.positive, spec.mechanism.springs
     if about is None:
-        return inf if bought is None else _room_of_coils(bought)
+        return inf if bought is None else room_of_coils(bought)
     rims = 2.0 * RIM * about.thickness
     if about.structure == "diamond":
         return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
     return 2.0 * about.radius - rims if about.structure == "u-shape" and about.radius else inf
 
 
-def _room_of_coils(springs: BoughtSprings) -> float:
+def room_of_coils(springs: BoughtSprings) -> float:
+    """Return how far bought springs can be compressed until their turns meet [m]; infinite where they are pulled."""
     if springs.kind == "extension" or springs.free_length is None:
         return inf
     return max(springs.free_length - closed_length(springs), 0.0)

@@ -180,7 +180,7 @@ def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], a
         changes |= {"design.target": target.target.written_out(target.force), "design.force": None}
     made = spec.replace(changes)
     closing = made.travel + max(target.preload_stroke, *made.analysis.preloads) - spring_room(made)
-    if closing <= 0 or "corner" in spec.mechanism.frame.model_fields_set:
+    if closing <= 0 or made.mechanism.positive is None or "corner" in spec.mechanism.frame.model_fields_set:
         return made
     # higher corners, so that the spring stays open: a rigid part, which no force depends on
     return made.replace({"mechanism.frame.corner": at_least(made.mechanism.frame.corner + 1.1 * closing)})

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
     NEAR,
@@ -243,13 +243,16 @@ def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offe
     most = float(found.linear[1]) + own.preload_stroke
     limits = (
         ("deflected by", most, springs.max_elongation, "they allow"),
+        ("deflected by", most, room_of_coils(springs), "their turns touch at"),
         ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
         ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
         ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
     )
     for words, needed, limit, allowed in limits:
         if needed is not None and limit is not None and needed > limit * (1 + 1e-9):
-            return Miss(found.label, needed / limit - 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}")
+            return Miss(
+                found.label, needed / limit - 1.0 if limit else 1.0, f"{words} {mm(needed)}, {allowed} {mm(limit)}"
+            )
     if leaf.angle > STEEP * (1 + 1e-9):
         return Miss(found.label, float(leaf.angle) / STEEP - 1.0, "leaves steeper than 15 deg")
     if offer is not None and target.spring_life is not None:
