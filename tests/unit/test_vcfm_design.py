@@ -9,6 +9,10 @@ from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
 from cfmkit import api
+from cfmkit.families import family
+from cfmkit.families.run_control import Run
+from cfmkit.families.vcfm import proposals_for_wish
+from cfmkit.families.wishes import Wish
 from cfmkit.results import Status
 
 
@@ -137,3 +141,17 @@ def test_a_preload_without_what_it_is_to_give_is_refused(tmp_path):
     (tmp_path / "bare.yaml").write_text(yaml.safe_dump(BARE) + block)
     with pytest.raises(cfmkit.CfmError, match="'preload' needs the 'adjustment'"):
         cfmkit.load(tmp_path / "bare.yaml")
+
+
+@pytest.mark.parametrize("structure", ["cosine arches", "hybrid leaves", "folded spring"])
+def test_a_proposal_with_another_structure_is_adjusted_by_preloads_of_its_own_spring(structure):
+    wish = Wish("force", 10.0, 9.9, 10.1, False, 2e-3, 0.05, (0.2, 0.2), adjustable=(8.0, 12.0))
+    words = proposals_for_wish.STRUCTURE_WORDS[structure]
+    candidates = proposals_for_wish.propose(wish, Run()).candidates
+    chosen = next(one for one in candidates if one.variant.startswith(words))
+    made = family("vcfm").design(chosen.spec.replace({"design.refine": False}), Run()).spec
+    finished = getattr(proposals_for_wish, f"finish_{structure.replace(' ', '_')}")(made, wish)
+    found = cfmkit.analyze(finished)
+    change = next(one.values for one in found.tables["adjustability"]().columns if one.name == "force_change")
+    assert list(change) == pytest.approx([0.0, 2.0, -2.0], abs=0.025)
+    assert "overstressed" not in [one.name for one in found.warnings]

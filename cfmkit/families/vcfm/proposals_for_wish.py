@@ -24,7 +24,7 @@ from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.design import closed_form
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
@@ -282,8 +282,11 @@ def finish_hybrid_leaves(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
 
 def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
     strength = wish.strength_used * (spec.mechanism.material.allowable(SAFETY) or 0.0)
-    made, end = with_structure(spec, name, wish.target, wish.travel, strength)
-    return _over_flattest(made, wish, _preloads(spec, wish), end)
+    design = spec.design
+    raised = 0.0 if wish.adjustable is None or design is None or not design.adjustment else max(wish.adjustable)
+    forces = wish.target, max(raised, wish.target)
+    made, end, stiffness = with_structure(spec, name, forces, wish.travel, strength)
+    return _over_flattest(made, wish, _preloads(spec, wish, 1.0 / stiffness), end)
 
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
@@ -292,12 +295,16 @@ def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     return _over_flattest(spec, wish, _preloads(spec, wish), float(window[1]) if window else wish.travel)
 
 
-def _preloads(spec: VcfmSpec, wish: Wish) -> tuple[float, ...]:
-    """Return the preloads with which the force is that of the middle and both ends of the adjustment [m]."""
+def _preloads(spec: VcfmSpec, wish: Wish, per_force: float | None = None) -> tuple[float, ...]:
+    """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
+
+    `per_force` is the preload for a change of the force [m/N]; None: that of the design, or of its bought springs.
+    """
     design, bought = spec.design, spec.mechanism.springs
     if wish.adjustable is None or design is None or not design.adjustment:
         return (0.0,)
-    per_force = design.preload_stroke / design.adjustment if bought is None else 1.0 / coils(bought).stiffness
+    if per_force is None:
+        per_force = design.preload_stroke / design.adjustment if bought is None else 1.0 / coils(bought).stiffness
     low, high = wish.adjustable
     return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
 
@@ -345,16 +352,24 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class _Fit:
-    """The best window of a structure: what both widths are to be multiplied by, the stresses [Pa] and the end [m]."""
+    """The best window of a structure: what both widths are to be multiplied by, the stresses [Pa] and the end [m].
+
+    `stiffness` is that of the spring over the window, as wide as it is to be [N/m].
+    """
 
     wide: float
     stiff: float
     stresses: tuple[float, float]
     end: float
+    stiffness: float
 
 
-def with_structure(spec: VcfmSpec, name: str, force: float, travel: float, strength: float) -> tuple[VcfmSpec, float]:
-    """Return a designed mechanism with another structure for a force over a travel, and where its best window ends [m].
+def with_structure(
+    spec: VcfmSpec, name: str, forces: tuple[float, float], travel: float, strength: float
+) -> tuple[VcfmSpec, float, float]:
+    """Return a designed mechanism with another structure for a force over a travel.
+
+    With it come where its best window ends [m], and the stiffness of its spring there [N/m].
 
     Parameters
     ----------
@@ -362,8 +377,10 @@ def with_structure(spec: VcfmSpec, name: str, force: float, travel: float, stren
         With a diamond and straight leaves.
     name : str
         Of `STRUCTURES`.
-    force, travel, strength : float
-        [N], [m], [Pa].
+    forces : (float, float)
+        The one without preload, and the largest, for whose preload the spring is sized, too [N].
+    travel, strength : float
+        [m], [Pa].
 
     Raises
     ------
@@ -378,19 +395,22 @@ def with_structure(spec: VcfmSpec, name: str, force: float, travel: float, stren
         changes["mechanism.bistable.angle"] = asin(min(HIGHER * sin(leaf.angle), 0.25))
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
-    found = _fitted(made, force, travel)
+    found = _fitted(made, forces, travel)
     for _ in range(ROUNDS):
         over = [stress / strength for stress in found.stresses]
         if max(over) <= 1.0:
             break
         made = _longer(made, [max(1.0, sqrt(1.02 * one)) for one in over])
-        found = _fitted(made, force, travel)
+        found = _fitted(made, forces, travel)
     made = _wider(made, found)
-    return made, found.end
+    return made, found.end, found.stiffness
 
 
-def _fitted(spec: VcfmSpec, force: float, travel: float) -> _Fit:
-    """Return the window and the widths with which the force departs least from the wanted one."""
+def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
+    """Return the window and the widths with which the force departs least from the wanted one.
+
+    The stress of the spring is that at the end of the window with the preload that the largest force needs.
+    """
     from cfmkit.families.vcfm.exact_model import ExactSampler
 
     rise = spec.mechanism.bistable.length * sin(spec.mechanism.bistable.angle)
@@ -406,13 +426,18 @@ def _fitted(spec: VcfmSpec, force: float, travel: float) -> _Fit:
         sampler = ExactSampler(spec, end, 0.0)
     if sampler.problem:
         raise SolutionError(sampler.problem)
-    tried = [one for one in (_in_window(sampler, at, force, travel) for at in centres) if one is not None]
+    tried = [one for one in (_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
     if not tried:
         raise SolutionError("no widths of this structure give the force over the travel")
     _, at, wide, stiff = min(tried)
     last = at + 0.5 * travel
     leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
-    return _Fit(wide, stiff, (leaf, float(sampler.spring(np.array([last]))[1].max())), last)
+    at_ends, stresses = sampler.spring(np.array([last - travel, last]))
+    stiffness = stiff * float(at_ends[1] - at_ends[0]) / travel
+    # the exact path ends with the travel: from there on by the closed form
+    law, preload = parts(spec).spring, (forces[1] - forces[0]) / stiffness
+    more = float(law.stress(last + preload) / law.stress(last))
+    return _Fit(wide, stiff, (leaf, more * float(stresses[1])), last, stiffness)
 
 
 def _in_window(
