@@ -13,6 +13,7 @@ from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
+from cfmkit.families.vcfm.bounding_box import room
 from cfmkit.families.vcfm.findings import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -20,7 +21,7 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
-from cfmkit.families.vcfm.model import rest_of, rests_of
+from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of
 from cfmkit.families.vcfm.pose_outlines import centre_line
 from cfmkit.families.vcfm.scalar_results import forces, spread
 from cfmkit.families.vcfm.solution import force_of
@@ -509,3 +510,20 @@ def test_a_block_takes_windows_that_are_shares_of_the_travel():
     alone = [cfmkit.analyze(spec.replace({"mechanism.bistable.width": width})) for width in widths]
     expected = [evaluate(one, ["force_mean"])["force_mean"].value for one in alone]
     assert found.values[0]["load"].tolist() == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_walls_as_thick_as_stated():
+    plain, pushed = (room(analyzed("analysis.points=21", preloads=one)) for one in ("[0 mm]", "[0 mm, 7.5 mm]"))
+    (rest,) = rests_of(LawSampler(parts(table_i())), [7.5 * MM], np.array([0.0]))
+    assert rest == pytest.approx(-0.955 * MM, rel=1e-3)
+    assert pushed.along - plain.along == pytest.approx(-rest, rel=1e-9)
+    assert pushed.across == plain.across
+    framed = room(analyzed("analysis.points=21", "mechanism.part.frame={wall: 10 mm, ground: 6 mm, stop: 6 mm}"))
+    assert framed.across - plain.across == pytest.approx(8 * MM, rel=1e-9)  # the blocks are 6 mm
+    assert framed.along - plain.along == pytest.approx(6 * MM, rel=1e-9)  # the bar on the shuttle
+    # a spring that does not fit its seat cannot be cut: the box is that of the poses
+    longer = "analysis.points=21", "mechanism.positive.length=45 mm"
+    refused = analyzed(*longer, "mechanism.part.frame={wall: 10 mm, seat: 1 mm}")
+    with pytest.raises(GeometryError, match="does not fit between the walls"):
+        api.drawing(refused.spec)
+    assert room(refused) == room(analyzed(*longer))

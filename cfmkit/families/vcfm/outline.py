@@ -59,7 +59,7 @@ Item = Point | Arc | Smooth
 
 def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line."""
-    sizes = _sizes(spec)
+    sizes = sizes_of_frame(spec)
     leaves, low = leaves_contours(spec)
     bought = spec.mechanism.springs is not None
     places, heights, _ = _centre_line(spec)
@@ -130,7 +130,7 @@ def _dimensions(spec: VcfmSpec) -> Iterator[DrawnDimension]:
     yield DrawnDimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
     yield DrawnDimension("shuttle", (-half, 0.0), (half, 0.0), "x")
     yield DrawnDimension("across clamps", (-half - reach, -rise), (half + reach, -rise), "x")
-    sizes = _sizes(spec)
+    sizes = sizes_of_frame(spec)
     if sizes.stopped:
         yield DrawnDimension("stop", (sizes.out, sizes.wall_top), (sizes.out, sizes.under), "y")
     given = (spec.mechanism.part or VcfmPart()).frame
@@ -209,7 +209,7 @@ def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     """
     _check_levels(spec)
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    levels, sizes = -(-about.half_beams // 2), _sizes(spec)
+    levels, sizes = -(-about.half_beams // 2), sizes_of_frame(spec)
     half, bottom, wall, out = 0.5 * frame.shuttle_width, -frame.clearance, sizes.wall, sizes.out
     upper = [_edge(spec, 1.0, (half, level * frame.spacing)) for level in range(levels)]
     lower = [_edge(spec, -1.0, (half, level * frame.spacing)) for level in range(levels)]
@@ -234,7 +234,7 @@ def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
     return contours, min(bottom, low)
 
 
-def _sizes(spec: VcfmSpec) -> FrameSizes:
+def sizes_of_frame(spec: VcfmSpec) -> FrameSizes:
     """Return the sizes of what stands around leaves, and holds the spring."""
     frame = spec.mechanism.part.frame if spec.mechanism.part is not None else None
     seated = frame is not None and frame.seat is not None
