@@ -527,3 +527,29 @@ def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_wal
     with pytest.raises(GeometryError, match="does not fit between the walls"):
         api.drawing(refused.spec)
     assert room(refused) == room(analyzed(*longer))
+
+
+@pytest.mark.parametrize(
+    ("name", "preload", "target"),
+    [
+        ("vcfm_pla", "1.9126 mm", 16.15),
+        ("vcfm_bought_springs", "1.92 mm", 16.15),
+        ("vcfm_bought_springs", "-1 mm", 8.55),
+    ],
+)
+def test_a_curve_with_a_preload_is_compared_with_the_force_that_the_design_has_there(name, preload, target):
+    changes = [f"analysis.preloads=[{preload}, 0 mm]", "analysis.fidelity=analytic", "requirements=[]"]
+    found = cfmkit.analyze(cfmkit.load(CONFIGS / f"{name}.yaml", changes))
+    assert found.target == pytest.approx(target, abs=0.01)
+    assert evaluate(found, ["deviation_from_target"])["deviation_from_target"].value < 0.02
+
+
+def test_a_target_with_a_preload_is_known_where_the_rise_is_and_the_force_above_zero():
+    alone = table_i(preloads="[1 mm]").replace({"design": {"force": "12 N", "stroke": "3 mm", "rise": "4 mm"}})
+    assert cfmkit.analyze(alone).target == pytest.approx(15.0)
+    assert cfmkit.analyze(alone.replace({"analysis.preloads": ["-4 mm"]})).target is None
+    open_rise = alone.replace(
+        {"design": {"force": "12 N", "stroke": "3 mm", "adjustment": "3 N", "catalogue": "generic"}}
+    )
+    assert cfmkit.analyze(open_rise).target is None
+    assert cfmkit.analyze(open_rise.replace({"analysis.preloads": ["0 mm"]})).target == 12.0

@@ -17,7 +17,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.findings import findings_of, spring_closed
-from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, spring_room
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_of
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
@@ -86,7 +86,7 @@ def result_of(solution: Solution, run: Run) -> Result:
         warnings=findings_of(solution) if run.wanted is None else (),
         travel=solution.course,
         valid=_valid(solution),
-        target=spec.design.force if spec.design else None,
+        target=_target(spec),
         allowable_stress=spec.mechanism.allowable_stress,
         stress_overrated=solution.overrating,
         load_cases=curves[1:],
@@ -95,6 +95,22 @@ def result_of(solution: Solution, run: Run) -> Result:
         | listed(parts_of(spec)),
         state=solution,
     )
+
+
+def _target(spec: VcfmSpec) -> float | None:
+    """Return the force that the nominal curve is to have [N]: that of the design, more by K_p times its preload.
+
+    None without a design, and where its K_p or a force above zero at that preload is not known.
+    """
+    design, preload = spec.design, spec.analysis.preloads[0]
+    if design is None or design.force is None or not preload:
+        return None if design is None else design.force
+    if spec.mechanism.springs is not None:
+        stiffness = coils(spec.mechanism.springs).stiffness
+    else:
+        stiffness = design.level / design.height if design.height else 0.0
+    target = design.force + stiffness * preload
+    return target if stiffness and target > 0 else None
 
 
 def _shortfall(solution: Solution) -> str:
