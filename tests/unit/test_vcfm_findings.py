@@ -12,9 +12,12 @@ import cfmkit
 from cfmkit import api
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
+from cfmkit.families.base import Block, Measure
+from cfmkit.families.findings import mpa
 from cfmkit.families.vcfm import exact_model
 from cfmkit.families.vcfm.exact_model import ExactSampler
 from cfmkit.families.vcfm.findings import FINDINGS, finding
+from cfmkit.families.vcfm.many_designs import analyze_block
 from cfmkit.results import Status
 
 FLAT = "mechanism.positive.width=8.509 mm"
@@ -85,6 +88,25 @@ def test_a_stress_that_is_too_high_from_the_first_point_on_passes_no_limit_there
     found = analyzed("mechanism.material.yield_strength=30 MPa", "analysis.preloads=[0 mm]", "analysis.travel=6 mm")
     (reported,) = (one.message for one in found.warnings if one.name == "overstressed")
     assert "passes 30 MPa at" in reported
+
+
+@pytest.mark.parametrize(("model", "points"), [("analytic", 9), ("analytic", 17), ("analytic", 481), ("exact", 13)])
+def test_a_stress_that_is_too_high_between_two_points_is_found(model, points):
+    """The leaves bear most where they lie flat, which no point of a coarse curve is at."""
+    changes = [f"analysis.fidelity={model}", f"analysis.points={points}", "mechanism.positive.thickness=0.8 mm"]
+    free = analyzed(*changes)
+    top, overrated = free.values["travel_stress_max"].value, max(free.stress_overrated, 2e-4)
+    for share, found in ((1.0001, False), (0.9995, True)):
+        limit = share * top / (1.0 + overrated)
+        made_of = f"mechanism.material={{youngs_modulus: 1477 MPa, yield_strength: {limit * 1e-6!r} MPa}}"
+        spec = table_i(*changes, made_of)
+        one = cfmkit.analyze(spec)
+        assert ("overstressed" in names(one)) is found
+        if found:
+            assert f"reaches {mpa(top)}" in message(one, "overstressed")
+        if model == "analytic":
+            block = Block({"mechanism.bistable.width": np.array([6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 1)
+            assert analyze_block(spec, block).warnings["overstressed"].tolist() == [found]
 
 
 def test_a_safety_factor_below_one_is_a_finding_or_explained(tmp_path, capsys):

@@ -297,24 +297,22 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     if allowed is None:
         return
     parts = [
-        (push, name, stress, allowed * (1 + slack))
-        for push in solution.pushes
-        for name, stress, slack in (
-            ("spring", push.spring_stress, EXACT_FORM),
-            ("leaves", push.leaves.stress, max(solution.overrating, EXACT_FORM)),
+        (push, name, samples, top, allowed * (1 + slack))
+        for push, tops in zip(solution.pushes, solution.largest_stresses(solution.pushes, (np.inf,))[:, 0], strict=True)
+        for name, samples, top, slack in (
+            ("spring", push.spring_stress, float(tops[1]), EXACT_FORM),
+            ("leaves", push.leaves.stress, float(tops[0]), max(solution.overrating, EXACT_FORM)),
         )
     ]
-    push, name, stress, bound = max(parts, key=lambda part: float(part[2].max()) / part[3])
-    over = np.flatnonzero(stress > bound)
-    if len(over):
-        first, top = int(over[0]), int(stress.argmax())
-        place = mm(float(push.travel[first]))
-        passes = f"passes {mpa(allowed)} at {place}" if first else f"is above {mpa(allowed)} from {place} on"
+    push, name, stress, top, bound = max(parts, key=lambda part: part[3] / part[4])
+    if top > bound:
+        over = [*np.flatnonzero(stress > bound), int(stress.argmax())]  # none of them where it peaks between two
+        place = mm(float(push.travel[over[0]]))
+        passes = f"passes {mpa(allowed)} at {place}" if over[0] else f"is above {mpa(allowed)} from {place} on"
         yield finding(
             "overstressed",
-            f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches "
-            f"{mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
-            "use longer or thinner leaves, or less preload",
+            f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches {mpa(top)} at "
+            f"{mm(float(push.travel[over[-1]]))}; use longer or thinner leaves, or less preload",
         )
 
 
