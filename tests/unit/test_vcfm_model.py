@@ -313,6 +313,17 @@ def test_a_spring_that_is_drawn_straight_is_followed_on_as_it_stretches():
     assert high - middle == pytest.approx(middle - low, rel=0.02)
 
 
+@pytest.mark.parametrize("preload", [-4.0, -5.0])
+def test_a_spring_that_is_pulled_over_the_whole_travel_is_followed_to_its_end(preload):
+    changes = "analysis.travel=4 mm", "analysis.window=null", "analysis.points=41", "requirements=[]"
+    found, closed = (
+        analyzed(*changes, f"analysis.fidelity={model}", preloads=f"[{preload} mm]") for model in ("exact", "analytic")
+    )
+    assert found.status is Status.COMPLETE
+    assert found.curve.motion[-1] == pytest.approx(4 * MM)
+    assert found.curve.effort[-1] == pytest.approx(closed.curve.effort[-1], abs=0.06)
+
+
 def test_exact_forces_do_not_depend_on_the_number_of_points():
     few, many = (analyzed("analysis.fidelity=exact", f"analysis.points={n}") for n in (31, 481))
     at = np.interp(few.curve.motion, many.curve.motion, many.curve.force)

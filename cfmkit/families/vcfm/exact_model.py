@@ -182,7 +182,7 @@ class ExactSampler:
         if self.coils is not None:
             return
         self.chain = spring_chain(spec)
-        ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
+        ends = (max(max(preloads) + end, 0.02 * end), min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
         self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
 
