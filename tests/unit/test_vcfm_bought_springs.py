@@ -121,6 +121,36 @@ def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(sp
     assert cfmkit.analyze(found.spec).values["constant_force"].value == pytest.approx(11.15, rel=1e-9)
 
 
+@pytest.mark.parametrize("preloads", [None, ("1 mm", "3 mm")])
+@pytest.mark.parametrize("kind", ["extension", "compression"])
+def test_a_design_counts_the_life_of_a_spring_as_its_own_analysis_does(spec, kind, preloads):
+    """Relaxed springs have no load, whatever their initial tension; a cycle is one at one preload."""
+    wire = {"coefficient": "700 MPa", "exponent": -0.1, "ultimate_strength": "1500 MPa"}
+    offer = {
+        "name": "one",
+        "kind": kind,
+        "wire": "0.9 mm",
+        "coil": "8 mm",
+        "turns": 11,
+        "counts": (1,),
+        "fatigue": wire,
+    }
+    offer |= {"initial_tension": "4 N"} if kind == "extension" else {}
+    analysis = {} if preloads is None else {"preloads": preloads}
+    springs = {"kind": kind, "stiffness": "1 N/mm"}
+    start = spec.replace({"mechanism.springs": springs, "analysis": analysis, "requirements": ()})
+    wanted = {"force": "9 N", "adjustment": "3 N", "stroke": "4 mm", "refine": False, "catalogue": (offer,)}
+
+    def lasting(life):
+        return family("vcfm").design(start.replace({"design": wanted | {"spring_life": life}}), Run())
+
+    life = cfmkit.analyze(lasting(1e3).spec).values["spring_life"].value
+    assert lasting(0.98 * life).status is Status.COMPLETE
+    reported = re.search(r"lasts (\S+) of", lasting(1.02 * life).message)
+    assert reported is not None
+    assert float(reported[1]) == pytest.approx(life, rel=0.01)
+
+
 @pytest.mark.parametrize("rise", [4.5e-3, 6e-3])
 def test_of_generic_springs_the_one_nearest_to_the_largest_rise_is_taken(spec, rise):
     found = designed(spec, rise=rise)

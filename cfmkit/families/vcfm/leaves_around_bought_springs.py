@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, room_of_coils
+from cfmkit.families.vcfm.leaf_laws_from_spec import Parts, coils, room_of_coils
 from cfmkit.families.vcfm.leaf_sizing import (
     MIDDLE,
     NEAR,
@@ -32,7 +32,7 @@ from cfmkit.families.vcfm.leaf_sizing import (
     sized_leaf,
     thickness_for,
 )
-from cfmkit.families.vcfm.leaves.v_beam import STEEP, onset_and_exit
+from cfmkit.families.vcfm.leaves.v_beam import STEEP, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
@@ -256,10 +256,23 @@ def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offe
     if leaf.angle > STEEP * (1 + 1e-9):
         return Miss(found.label, float(leaf.angle) / STEEP - 1.0, "leaves steeper than 15 deg")
     if offer is not None and target.spring_life is not None:
-        first = own.preload_stroke if min(spec.analysis.preloads) > 0 else 0.0
-        short = SpringInUse.of(offer, first, most).misses_life(target.spring_life)
-        return None if short is None else Miss(found.label, *short)
+        wanted = target.spring_life
+        short = [miss for one in _in_use(spec, found, offer) if (miss := one.misses_life(wanted)) is not None]
+        return Miss(found.label, *max(short)) if short else None
     return None
+
+
+def _in_use(spec: VcfmSpec, found: LeavesAroundSprings, offer: Offer) -> Iterator[SpringInUse]:
+    """Yield a spring between rest and the end of the travel at each preload, by the closed form of the leaves."""
+    from cfmkit.families.vcfm.model import LawSampler, rest_of
+
+    springs, end = found.springs, max(float(found.linear[1]), spec.analysis.travel or 0.0)
+    sampler = LawSampler(Parts(VBeam(found.leaf), coils(springs), found.half_beams))
+    stated = "analysis" in spec.model_fields_set and "preloads" in spec.analysis.model_fields_set
+    for preload in {*(spec.analysis.preloads if stated else (0.0,)), found.target.preload_stroke}:
+        rest = rest_of(sampler, preload, np.linspace(0.0, end, 101)) or 0.0
+        least, most = (springs.load(place + preload) for place in (rest, end))
+        yield SpringInUse(offer.wound, least, most, offer.fatigue, offer.life)
 
 
 def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:

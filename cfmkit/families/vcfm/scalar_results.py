@@ -165,8 +165,7 @@ def _bought(solution: Solution) -> dict[str, Quantity]:
     fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
     used = []
     for push in solution.pushes:
-        ends = (max(float(place) + push.preload, 0.0) for place in (push.travel[0], push.travel[-1]))
-        least, most = (springs.initial_tension * (end > 0) + springs.rate * end for end in ends)
+        least, most = (springs.load(float(place) + push.preload) for place in (push.travel[0], push.travel[-1]))
         used.append(SpringInUse(wound, least, most, fatigue, springs.life))
     farthest = max(float(push.travel[-1]) + push.preload for push in solution.pushes)
     return {"spring_deflection_max": _quantity("spring_deflection_max", max(farthest, 0.0))} | wire_quantities(used)

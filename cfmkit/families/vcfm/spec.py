@@ -121,6 +121,10 @@ class BoughtSprings(Model):
         """Stiffness of one [N/m]."""
         return self.stiffness or 0.0
 
+    def load(self, deflection: float) -> float:
+        """Return the load of one at a deflection [N]: none where it is relaxed, whatever its initial tension."""
+        return self.initial_tension * (deflection > 0) + self.rate * max(deflection, 0.0)
+
 
 class Bistable(Model):
     """The leaves between wall and shuttle that snap through, and so have a negative stiffness."""
