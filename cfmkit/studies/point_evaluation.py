@@ -27,12 +27,15 @@ from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.studies.serial_and_cluster_executors import lost_to
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from cfmkit.metrics.metric_values import Surveys
-    from cfmkit.results import Quantity
+    from cfmkit.results import Design, Quantity
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends
+
+    Designer = Callable[[Any, Run], Design]
+    Deliver = Callable[[Spec, Designer, Run], Design]
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
@@ -107,6 +110,11 @@ class Row:
     warnings: tuple[str, ...] = ()
 
 
+def of_perfect_parts(spec: Spec, designer: Designer, run: Run) -> Design:
+    """Return what a family's designer makes of a specification: no margins for a yield, no verification."""
+    return designer(spec, run)
+
+
 @dataclass(frozen=True)
 class Study:
     """Everything that decides the row of a point, but the varied values.
@@ -127,6 +135,8 @@ class Study:
         Of everything random inside an analysis.
     lean : bool
         Whether metrics and requirements alone are looked at: models then leave out what those do not need.
+    deliver : callable
+        What makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes.
     """
 
     spec: Spec
@@ -136,6 +146,7 @@ class Study:
     curves: bool = False
     seed: int = 0
     lean: bool = False
+    deliver: Deliver = of_perfect_parts
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -201,9 +212,7 @@ class Study:
         record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
         if not self.design or record.design is None:
             return windows_judged(record.analyze(spec, run))
-        from cfmkit.studies.design_with_margins_and_verification import delivered
-
-        design = delivered(spec, record.design, Run(self.seed))
+        design = self.deliver(spec, record.design, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
         result = windows_judged(record.analyze(design.spec, run))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.studies.choose_metrics_to_note import metrics_of, sample_curve
+from cfmkit.studies.design_with_margins_and_verification import delivered
 from cfmkit.studies.engine import Work
 from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
 from cfmkit.studies.point_evaluation import Study
@@ -87,7 +88,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
         raise UsageError(f"{family(spec.family).phrase} cannot be designed, only analysed")
     names = request.metrics or (block.metrics if block else ())
     metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
-    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed), plan)
+    return Work(Study(spec, plan.paths, metrics, design, curves, request.seed, deliver=delivered), plan)
 
 
 def _example(spec: Spec) -> str:

@@ -20,8 +20,9 @@ from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.row_blocks_for_journal import ResultRows, squeezed, unsqueezed
 from cfmkit.studies.summary import Objective, Summary
+from cfmkit.studies.sweep_request_and_files import SweepRequest, prepare
 from cfmkit.studies.tables import results_csv
-from cfmkit.studies.varied_axes import axes, wish
+from cfmkit.studies.varied_axes import axes, wish, wishes
 from cfmkit.tables import read_csv
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
@@ -126,7 +127,8 @@ def test_a_point_is_designed_as_the_design_verb_does_it(monkeypatch):
     spec = spec.replace({"design.verify": "solid"})
     made = cfmkit.design(spec).spec
     assert (made.mechanism.crank_length, made.mechanism.offset) == (0.0401, 0.0003)
-    assert Study(spec, (), (), design=True).solve(spec).spec.mechanism == made.mechanism
+    study = prepare(spec, SweepRequest(wishes({"mechanism.offset": ["0 mm", "0.1 mm"]}), design=True)).study
+    assert study.solve(spec).spec.mechanism == made.mechanism
 
 
 def test_a_design_that_fails_is_a_row():

@@ -15,6 +15,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.choose_metrics_to_note import metrics_of
+from cfmkit.studies.design_with_margins_and_verification import delivered
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
@@ -151,7 +152,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     paths = tuple(one.path for one in parameters)
     groups = together(block, paths)
     refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
-    study = Study(spec, paths, (), block.design, seed=chosen)
+    study = Study(spec, paths, (), block.design, seed=chosen, deliver=delivered)
     result = _solved(study)
     study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
     study, nominal, unvalued = _with_nominal(study, result)
