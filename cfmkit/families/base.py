@@ -7,7 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cfmkit.families.run_control import Run  # noqa: TC001  once its home; other packages may still import it from here
+from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
 from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE
 from cfmkit.specs.units import between
 

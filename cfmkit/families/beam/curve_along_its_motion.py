@@ -98,4 +98,4 @@ class AlongMotion:
 
     def back(self, value: float | None) -> float | None:
         """Return a place or a force as the specification has it."""
-        return value if value is None or self.sense > 0 else 0.0 - value
+        return value if value is None or self.sense > 0 else 0.0 - value  # not -0

@@ -83,13 +83,10 @@ def curve(result: Result) -> Figure:
     regions, levels = [], []
     limit, start = (result.values[name].value for name in ("stress_limit_displacement", "range_start"))
     along = AlongMotion(solution)
-    end, reached = along.sense * along.end, along.sense * float(along.motion.max())
-    if limit is not None and along.sense * limit < along.sense * reached:
-        regions.append(
-            MarkedRange(
-                min(limit, reached), max(limit, reached), f"allowable stress reached at {value_text(limit, 'length')}"
-            )
-        )
+    end, farthest = along.sense * along.end, float(along.motion.max())
+    if limit is not None and along.sense * limit < farthest:
+        low, high = sorted((limit, along.sense * farthest))
+        regions.append(MarkedRange(low, high, f"allowable stress reached at {value_text(limit, 'length')}"))
     nominal = result.values["nominal_force"].value
     if nominal is not None and start is not None and result.spec.analysis.window is not None:  # type: ignore[attr-defined]
         levels.append(Limit(0.95 * nominal, f"0.95 F_d: from {value_text(start, 'length')}"))

@@ -339,7 +339,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
     shown = solution.with_ends
     inside = np.flatnonzero(within(shown, *window))
     values = np.array([shown.stresses[name][0] for name in names])
-    if not len(inside):
+    if not len(inside):  # the window lies between two points: the nearer one tells the place
         inside = np.array([np.abs(shown.motion - 0.5 * sum(window)).argmin()])
     best, index = np.unravel_index(int(values[:, inside].argmax()), (len(names), len(inside)))
     place = float(shown.stresses[names[best]][1][inside[index]])

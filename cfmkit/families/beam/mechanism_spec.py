@@ -173,7 +173,7 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}"
         return
     if drive.kind == "loads" and not any(map(_acts, drive.loads)):
-        yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism the mechanism"
+        yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
     if along and across:
         yield at, f"{drive.node!r} cannot move: its support is {node.support!r}"
     elif across and not parallel(drive.direction, node.direction or 0.0):

@@ -134,17 +134,18 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     drive, travel = spec.mechanism.drive, spec.analysis.travel
     if drive.kind != "displacement" or travel is None:
         return
-    stages = spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1  # each makes its share of it
+    # each of several stages makes its share of the travel
+    most = _TORN * (spec.mechanism.copies.layers if spec.mechanism.copies is not None else 1)
     straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
-    if abs(spec.extent) <= _TORN * stages * _way_to_support(network, drive.node, straight):
+    if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return
     lengths = {name: fit.length for name, fit in Layout(network, assembly.drive()).fits.items()}
     way = _way_to_support(network, drive.node, lengths)
-    if abs(spec.extent) > _TORN * stages * way:
+    if abs(spec.extent) > most * way:
         raise InputError(
             f"analysis.travel of {format_short(spec.extent, 'length')} would stretch beams to more than twice their "
             f"length: from {drive.node!r} to a node that is held they are {format_short(way, 'length')} long; "
-            f"a travel of at most {format_short(_TORN * stages * way, 'length')} is possible"
+            f"a travel of at most {format_short(most * way, 'length')} is possible"
         )
 
 

@@ -308,10 +308,11 @@ def _by_beam(texts: Mapping[str, str]) -> str:
 def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     """Return the mechanism's width, and where beams have another one."""
     mechanism, axis = assembly.spec.mechanism, mirror_axis(assembly)
+    widths = mechanism.of_beams("width")
     own = [
         Region(strip.polygon, width)
         for name, found in beams.items()
-        for width in {mechanism.beams[name.split(".")[0]].width or mechanism.width} - {mechanism.width}
+        for width in {widths[name.split(".")[0]]} - {mechanism.width}
         for strip in found
     ]
     if axis is not None:

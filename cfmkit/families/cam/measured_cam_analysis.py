@@ -75,10 +75,10 @@ STRANGE = 0.01
 """Points are those of another part if they are off the design by this part of their height."""
 
 WIDTH_CERTAIN = 5.0
-"""Standard deviations of an error of width from which on it is taken from the points, if it explains enough of them."""
+"""An error of width is taken out of the points only if it is larger than this many of its standard deviations."""
 
 WIDTH_EXPLAINS = 0.6
-"""Part of the variance of the points' errors that is left at most without an error of width that is taken."""
+"""It must also leave less than this part of the variance that the points' errors have if it is not taken out."""
 
 
 def analyze_built(spec: CamSpec) -> Result:

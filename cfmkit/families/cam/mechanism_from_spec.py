@@ -182,7 +182,7 @@ def assemble(spec: CamSpec) -> Assembly:
     check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
     path, end = reach(law, stroke, spec.analysis.path_method)
     reached = float(path.travel(end))
-    shortfall = _shortfall(law, stroke, (end, reached))
+    shortfall = _shortfall(law, stroke, end, reached)
     profile = cut_profile(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(cut_profile(path, radius + missing, end) if missing else profile, mechanism)
@@ -255,9 +255,8 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
         )
 
 
-def _shortfall(law: SlopeLaw, stroke: float, ending: tuple[float, float]) -> Finding | None:
-    """Return why the profile ends at an x and a travel, and not at `stroke` [m]; None if it does not."""
-    end, reached = ending
+def _shortfall(law: SlopeLaw, stroke: float, end: float, reached: float) -> Finding | None:
+    """Return why the profile ends at x = `end` after `reached`, and not at `stroke` [m]; None if it does not."""
     if reached >= stroke * (1 - CLOSE):
         return None
     ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm, percent
 from cfmkit.families.slider_crank.bounding_box import PLATES, height_of
-from cfmkit.families.slider_crank.flattest_springs_that_fit import SprungMotion, flattest_springs, largest_effort
+from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, SprungMotion, flattest_springs, largest_effort
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -89,9 +89,6 @@ WEAK = 0.9
 
 LINK_SHARE = 1.0 / 12.0
 """Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
-
-STILL = 1e-9
-"""Travels below this share of the slider's travel count as zero."""
 
 FINISH = "cfmkit.families.slider_crank.sprung_linkages_for_wish:finish"
 """What finishes linkages with springs at their pins."""

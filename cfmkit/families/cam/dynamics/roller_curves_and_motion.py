@@ -235,7 +235,7 @@ def pieces_of(track: Track) -> tuple[CurvePiece, ...]:
 KNOTS = 129
 GUIDE_KNOTS = 2049
 NEWTON_STEPS = 5
-"""Estimates by 2049 knots need two at most in the tests; a bracketed search takes over where five do not do."""
+"""Estimates by 2049 knots need two at most in the tests; a bracketed search takes over where five are not enough."""
 
 
 @dataclass(frozen=True)

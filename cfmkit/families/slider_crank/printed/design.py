@@ -59,7 +59,7 @@ ENOUGH = 0.99
 """Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
 
 POINTS = 61
-"""So many at most has the analysis of a uniform strip by which it is judged: between them the curve is as exact."""
+"""Points, at most, of the analysis that judges a uniform strip: between them the curve is just as exact."""
 
 TOLD = 4
 """So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""

@@ -247,8 +247,7 @@ class StripProgram(DesignProgram):
         path = self._path(self.network(z[: self.form.size]), self.travel(z))
         if path is None:
             return None
-        at = path.at_requested
-        found = State(path, path.effort[at], watched(path, self.spots))
+        found = self._pressed(path)
         self.known, self._last = path, (z.copy(), found)
         return found
 
@@ -267,9 +266,9 @@ class StripProgram(DesignProgram):
         state = self.state(z)
         if state is None:
             return None
-        slopes: tuple[FloatArray | None, FloatArray | None] | None = (None, None)
-        if sloped:
-            slopes = self._derivatives(z, state)
+        slopes: tuple[FloatArray | None, FloatArray | None] | None = (
+            self._derivatives(z, state) if sloped else (None, None)
+        )
         if slopes is None:
             return None
         force, stress = slopes
@@ -368,13 +367,12 @@ class StripProgram(DesignProgram):
         if len(found) < 2:
             return None
         (first, low), (last, high) = found[-2:]
-        (force, stress), (more, higher) = (self._felt(path) for path in (low, high))
-        return (more - force) / (last - first), (higher - stress) / (last - first)
+        before, after = self._pressed(low), self._pressed(high)
+        return (after.force - before.force) / (last - first), (after.stress - before.stress) / (last - first)
 
-    def _felt(self, path: Path) -> tuple[FloatArray, FloatArray]:
-        """Return force and stress of a path."""
-        state = State(path, path.effort[path.at_requested], watched(path, self.spots))
-        return state.force, state.stress
+    def _pressed(self, path: Path) -> State:
+        """Return the strip that is pressed along a path."""
+        return State(path, path.effort[path.at_requested], watched(path, self.spots))
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""

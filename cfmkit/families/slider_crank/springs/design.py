@@ -335,8 +335,8 @@ NEGLIGIBLE = 5e-4
 """More deviation, as a fraction of the target, that nobody would notice: such designs are reported as equals."""
 
 WITHIN = 1e-3
-"""By this share rates that are preferred stay within the tolerance: between the places of the search they are off by
-more, by some 1e-5 of the tolerance."""
+"""Share of the tolerance that preferred rates keep in reserve: between the places of the search they deviate more, by
+some 1e-5 of the tolerance."""
 
 PLACES = 60
 """Places of the window for the programmes that say how far the rates may move."""

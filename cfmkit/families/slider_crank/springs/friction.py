@@ -77,8 +77,8 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
     sine, cosine = np.sin(beta), np.cos(beta)
     with np.errstate(divide="ignore", invalid="ignore"):
         if torque:
-            along = -turns[3] - np.sign(way * slider_rate) * rubbing.guide.drag
-            held = rubbing.guide.friction * np.sign(way * slider_rate)
+            toward = np.sign(way * slider_rate)
+            along, held = -turns[3] - toward * rubbing.guide.drag, rubbing.guide.friction * toward
             rubbed = _pressed(held, along, (sine, cosine), on_coupler, signs, assembly)
         else:
             rows = (link.coupler * np.stack([-sine, cosine]), link.crank * np.stack([-np.sin(angle), np.cos(angle)]))

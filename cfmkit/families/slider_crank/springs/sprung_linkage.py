@@ -118,7 +118,7 @@ class Assembly(ShortRepr):
 
     @property
     def tight(self) -> float:
-        """What the anchor adds to the deflection of the slider's spring, along the slider's way [m]."""
+        """What the anchor adds to the deflection of the slider's spring, along the slider's path [m]."""
         return -self.linkage.branch * self.anchor if self.anchor else 0.0
 
     def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
