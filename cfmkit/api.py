@@ -168,6 +168,8 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
 def design(spec: AnySpec, run: Run | None = None) -> Design:
     """Return a complete specification that meets the targets of the `design` block, or why there is none.
 
+    With `design.yield` it has margins for the errors of its process, with `design.verify` it is corrected by its solid.
+
     Parameters
     ----------
     spec : Spec or path-like

@@ -59,7 +59,7 @@ def go_on(fresh: bool) -> str:
 
 
 def told(error: BaseException, terminal: Terminal) -> Answer:
-    """Tell the user what went wrong, with its traceback if that is wanted; return the answer that it is."""
+    """Tell the user what went wrong, with its traceback if that is wanted; return the answer with its exit code."""
     if terminal.tracebacks:
         terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
     answer = answer_to(error)

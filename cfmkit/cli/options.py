@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cfmkit.cli import shell_completion
-from cfmkit.errors import UsageError
+from cfmkit.errors import QuantityError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -161,7 +161,6 @@ class FigureChoice(Common):
         cfmkit.errors.UsageError
             If an option is malformed, or figures are both described and refused.
         """
-        from cfmkit.errors import UsageError
         from cfmkit.plots.figure_options import form_of
 
         said = {"--figures": self.figures, "--figure-width": self.figure_width, "--figure-style": self.figure_style}
@@ -279,8 +278,6 @@ def refuse_without_data(options: Measuring) -> None:
     cfmkit.errors.UsageError
         Naming the first of them.
     """
-    from cfmkit.errors import UsageError
-
     for name in ("units", "tare", "zero", "flip"):
         if getattr(options, name) is not None:
             raise UsageError(f"--{name} applies to a measurement: name its file with --data")
@@ -294,7 +291,6 @@ def seconds(text: str) -> float:
     cfmkit.errors.UsageError
         If it is no time above zero.
     """
-    from cfmkit.errors import QuantityError
     from cfmkit.specs.units import read_quantity
 
     spaced = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", text.strip())

@@ -251,7 +251,7 @@ def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, .
     """Return what is said of the points next to reversals."""
     if not found.length:
         return ()
-    length = format_short(found.length, "length" if recording.kind == "force" else "angle", 3)
+    length = format_short(found.length, recording.motion_dimension, 3)
     points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
     reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
     return (Finding("reversals", reported),)
@@ -259,14 +259,14 @@ def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, .
 
 def _default(recording: Recording) -> LowPass:
     cutoff = CYCLES_PER_STROKE / recording.travel
-    return LowPass(cutoff, "length" if recording.kind == "force" else "angle", DEFAULT_ORDER)
+    return LowPass(cutoff, recording.motion_dimension, DEFAULT_ORDER)
 
 
 def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) -> FloatArray:
     """Return the efforts with every stroke filtered by itself."""
     if chosen.per == "time" and recording.time is None:
         raise DataError("a cut-off in Hz needs a column with the time; give it in 1/mm or 1/deg instead")
-    if chosen.per not in ("time", "length" if recording.kind == "force" else "angle"):
+    if chosen.per not in ("time", recording.motion_dimension):
         raise DataError(f"a cut-off of {chosen.reported} does not fit a {recording.kind} curve")
     smooth = np.array(recording.effort)
     over = recording.time if chosen.per == "time" else recording.motion

@@ -269,7 +269,7 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
 def _options(recording: Recording, zeros: Zeros) -> str:
     """Return the options that replace those with which a recording was read, and take fitted zeros out as well."""
     raw, fitted = raw_zeros(recording, zeros.effort, zeros.motion), (zeros.effort, zeros.motion)
-    dimensions = (recording.kind, "length" if recording.kind == "force" else "angle")
+    dimensions = (recording.kind, recording.motion_dimension)
     options = [
         f'{name} "{_exact(value, dimension, 6)}"'
         for name, value, more, dimension in zip(("--tare", "--zero"), raw, fitted, dimensions, strict=True)

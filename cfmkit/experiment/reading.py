@@ -210,6 +210,11 @@ class Recording(ShortRepr):
         """Return the number of points."""
         return len(self.motion)
 
+    @property
+    def motion_dimension(self) -> str:
+        """``length`` or ``angle``."""
+        return "length" if self.kind == "force" else "angle"
+
     @cached_property
     def travel(self) -> float:
         """From the least to the largest motion [m or rad], samples far off their neighbours not counted."""

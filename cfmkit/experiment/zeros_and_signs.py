@@ -54,7 +54,7 @@ def corrected(
         raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
     resting = _resting(recording)
     shown = [_shown(tare, recording.effort[:resting], "--tare", recording.kind)]
-    shown.append(_shown(zero, recording.motion[:1], "--zero", "length" if recording.kind == "force" else "angle"))
+    shown.append(_shown(zero, recording.motion[:1], "--zero", recording.motion_dimension))
     signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
     notes = [*_notes((effort, motion), shown, recording.kind), *(f"sign of the {word} reversed" for word in flip)]
     if not notes:

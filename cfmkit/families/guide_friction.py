@@ -51,7 +51,8 @@ class GuideFriction:
         Each end carries half of what acts across the way, half of what acts out of the plane, and the couple of the
         force beside the middle line, which is itself F:
         F = free + way (drag + mu (|(across + tilt F, off)| + |(across - tilt F, off)|) / 2).
-        The right side is convex in F with a slope below 1, so the root is the only one and Newton's steps lead to it.
+        The right side is convex in F (way = 1) or concave (-1), with a slope below 1 in size: the root is the only one,
+        and Newton's steps lead to it.
 
         Parameters
         ----------

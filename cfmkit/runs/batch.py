@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from cfmkit.arrays import Several, named
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.figure_options import PLAIN, FigureForm
-from cfmkit.results import Status
 from cfmkit.runs import batch_output_files
 from cfmkit.runs.run import FinishedRun, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
@@ -162,8 +161,7 @@ def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
 
 def lost(job: BatchJob, outcome: Lost) -> Entry:
     """Return the outcome of a specification whose process did not answer."""
-    bug = outcome.status is Status.CRASHED
-    code = ExitCode.BUG if bug else outcome.status.exit_code
+    code = outcome.status.exit_code
     return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
 
 

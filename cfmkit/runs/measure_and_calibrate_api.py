@@ -156,7 +156,6 @@ def calibrate(
     from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.zeros_and_signs import corrected
-    from cfmkit.metrics import Window
     from cfmkit.numerics.least_squares import LOSSES
 
     if loss not in LOSSES:

@@ -111,13 +111,15 @@ def remove(remains: Remains, top: str | os.PathLike[str]) -> Remains:
     cfmkit.errors.FolderInUse
         If a live run works there.
     cfmkit.errors.OutputError
-        If a file cannot be removed; those before it are gone.
+        If a file cannot be removed (those before it are gone), or a run wrote there since `remains` was found.
     """
     root = remains.folder
     # Under the lock everything is looked at again: a run may have been there while the user was asked.
     with RunFolder(root) as folder:
         found = remains_in(folder.path)
-        found = replace(found, files=tuple(name for name in found.files if name in remains.files or name != LOCK))
+        if set(found.files) - set(remains.files) - {LOCK}:
+            raise OutputError(f"{root}: a run wrote there after its files were listed: run 'cfmkit clean' again")
+        found = replace(found, files=tuple(name for name in found.files if name in remains.files))
         for name in found.files:
             if name != LOCK:  # which this process holds by now, and takes away at the end of the block
                 with reporting(root / name, "remove"):

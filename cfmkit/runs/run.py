@@ -328,9 +328,9 @@ def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report
     if yields is None:
         from cfmkit.studies.yield_by_assumed_tolerances import expected
 
-        found = found.beside(no_yields(given), run_outcome.Supplement()).of_many_parts()
         reported = expected(nominal, run)
-        return found.beside({}, run_outcome.Supplement(lines=(("made", reported),))) if reported else found
+        more = run_outcome.Supplement(lines=(("made", reported),) if reported else ())
+        return found.beside(no_yields(given), more).of_many_parts()
     more = run_outcome.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()
 

@@ -219,7 +219,7 @@ class DesignKeys(Model):
     verify: Literal["solid"] | None = Field(
         None,
         description="solid: at the end the part is solved as drawn, as a planar solid; its widths (from a sheet: "
-        "the force of the design) are corrected once, so that the solid's mean force is the requested one",
+        "the force of the design) are corrected once, so that the solid has the requested force",
     )
     samples: int = Field(
         400, ge=20, le=1_000_000, description="random parts within the tolerances with which the design is evaluated"

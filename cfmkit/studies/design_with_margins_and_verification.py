@@ -6,16 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.families.run_control import Run
     from cfmkit.results import Design
     from cfmkit.specs.spec import Spec
-
-    Designer = Callable[[Any, Run], Design]
+    from cfmkit.studies.point_evaluation import Designer
 
 
 def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
@@ -29,7 +26,8 @@ def delivered(spec: Spec, designer: Designer, run: Run) -> Design:
         What designs perfect parts of the family.
     run : Run
         Seed, progress, time budget. If a yield is requested, the search for the perfect part has half of the time, and
-        that for its margins what is left.
+        that for its margins what is left. A part from a sheet is designed again for its solid, with the whole budget:
+        with what is left, the finished design could be lost.
     """
     asked = getattr(spec, "design", None)
     plain = getattr(asked, "yield", None) is None
@@ -46,9 +44,7 @@ def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.studies.redesign_for_yield import with_design_margins
 
-    clock, half = Clock.of(run.time_budget), None if run.time_budget is None else 0.5 * run.time_budget
+    clock = Clock.of(run.time_budget)
+    half = None if run.time_budget is None else 0.5 * run.time_budget
     found = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
     return with_design_margins(spec, found, replace(run.part(0.5, 1.0), time_budget=clock.left()))
-
-
-__all__ = ["delivered"]

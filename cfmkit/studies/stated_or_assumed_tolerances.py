@@ -120,8 +120,8 @@ def is_made(spec: Spec, design: DesignBlock) -> bool:
 
 
 def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
-    """Tell whether a process is said, and no value of the part errs by it; of a solid that is seen once it is drawn."""
-    return spec.fidelity != "solid" and is_made(spec, design) and not stated_tolerances(spec, design)
+    """Tell whether no value of a part that `is_made` errs; of a solid that is seen only once it is drawn."""
+    return spec.fidelity != "solid" and not stated_tolerances(spec, design)
 
 
 def _renamed(path: str) -> str:

@@ -79,13 +79,15 @@ def objective(study: Study) -> Objective | None:
         names = one.metric, other_name(one.metric)
         noted = [column for column, item in enumerate(study.metrics) if item.name in names]
         # over another window is the next best that is known: points that meet the requirement come first anyway
-        noted.sort(
-            key=lambda column: (study.metrics[column].over != one.over, study.metrics[column].name != one.metric)
+        best = min(
+            noted,
+            key=lambda column: (study.metrics[column].over != one.over, study.metrics[column].name != one.metric),
+            default=None,
         )
-        if noted:
-            limits = Bounds.of(one, study.metrics[noted[0]].dimension)
+        if best is not None:
+            limits = Bounds.of(one, study.metrics[best].dimension)
             middle = None if limits.min is None or limits.max is None else 0.5 * (limits.min + limits.max)
-            return Objective(noted[0], one.max is None, middle)
+            return Objective(best, one.max is None, middle)
     for name in DEFAULT_OBJECTIVES:
         if name in study.names:
             return Objective(study.names.index(name), False)

@@ -120,6 +120,8 @@ def _relevelled(
     made = again.spec.replace({path: wanted, FIDELITY: "solid"})
     other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
     note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
+    if getattr(given.at("design"), "yield", None) is not None:  # these are judged by requirements about what is wanted
+        note += "; the margins of design.yield are not repeated for that force"
     return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
 
 

@@ -401,7 +401,7 @@ def _spelt(unit: str) -> str:
 
 
 def _is_unit(unit: str) -> bool:
-    """Tell whether there is a unit."""
+    """Tell whether a text is a unit, in any of the spellings that are read."""
     from cfmkit.specs.units.unit_size import is_unit
 
     spelt = _spelt(unit)

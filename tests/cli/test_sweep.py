@@ -196,7 +196,9 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("options", "reported"), [((), b"again to continue"), (("--fresh",), b"again without --fresh to continue")]
+    ("options", "reported"),
+    [((), b"again to continue"), (("--fresh",), b"again without --fresh to continue")],
+    ids=["kept", "fresh"],
 )
 def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, reported):
     command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2", *options)

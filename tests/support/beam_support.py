@@ -29,6 +29,22 @@ analysis:
 """
 """EI = 0.02 N m^2, L = 0.4 m: EI/L^2 = 0.125 N."""
 
+TOGGLE = """
+cfmkit: 1
+family: beam
+name: toggle
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35, yield_strength: 28 MPa}
+  axial: true
+  thickness: 1 mm
+  width: 10 mm
+  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, top: {at: [50 mm, 5 mm], support: guided, direction: 90 deg}}
+  beams: {beam: {start: root, end: top, shape: {kind: polynomial, coefficients: [0 rad, 0.6 rad, -0.6 rad]}}}
+  drive: {kind: displacement, node: top, direction: -90 deg}
+  copies: {mirror: [50 mm, 0 mm]}
+"""
+"""Its force falls from 3 mm of travel on and is negative from 7 to 9 mm; its stress is largest half way."""
+
 
 def config(name, *changes):
     """Return a configuration with changes as ``--set`` takes them."""

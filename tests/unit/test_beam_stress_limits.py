@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from beam_support import cantilever, config, value
+from beam_support import TOGGLE, cantilever, config, value
 
 import cfmkit
 from cfmkit.families.beam.design import design
 from cfmkit.families.run_control import Run
+from cfmkit.specs.units import format_short
 
 TWO = (
     "tip: {at: [400 mm, 0 mm]}\n  beams:\n    beam: {start: root, end: tip}",
@@ -39,24 +40,19 @@ def overstressed(result):
 
 
 @pytest.mark.parametrize(
-    ("changes", "stress"),
+    "changes",
     [
-        (
-            ("analysis.points=6", "analysis.window=[12 mm, 15 mm]", "mechanism.material.yield_strength=74 MPa"),
-            "51.96 MPa",
-        ),
-        (
-            ("analysis.points=5", "analysis.window=[0.5 mm, 2 mm]", "mechanism.material.yield_strength=20 MPa"),
-            "14.04 MPa",
-        ),
+        ("analysis.points=6", "analysis.window=[12 mm, 15 mm]", "mechanism.material.yield_strength=74 MPa"),
+        ("analysis.points=5", "analysis.window=[0.5 mm, 2 mm]", "mechanism.material.yield_strength=20 MPa"),
     ],
     ids=["between two points", "a window without points"],
 )
-def test_a_stress_between_the_points_is_reported_as_the_metric_has_it(changes, stress):
+def test_a_stress_between_the_points_is_reported_as_the_metric_has_it(changes):
     """Before, 50.37 MPa were reported of 51.96 MPa, and nothing in a window without points."""
     result = cfmkit.analyze(config("beam_lan2010", *changes))
     assert value(result, "safety_factor") < 1
     (reported,) = overstressed(result)
+    stress = format_short(value(result, "stress_max"), "stress")
     assert f"the largest stress in the window is {stress}, at " in reported
 
 
@@ -68,21 +64,7 @@ def test_too_much_stress_is_reported_of_the_beams_whose_strength_is_known():
 
 def test_a_rescaled_part_that_is_overstressed_before_the_end_of_its_window_is_reported():
     """A toggle: its stress is largest half way. Before, only the stress at the end was looked at."""
-    text = """
-cfmkit: 1
-family: beam
-mechanism:
-  material: {youngs_modulus: 2 GPa, yield_strength: 28 MPa}
-  axial: true
-  thickness: 1 mm
-  width: 10 mm
-  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, top: {at: [50 mm, 5 mm], support: guided, direction: 90 deg}}
-  beams: {beam: {start: root, end: top, shape: {kind: polynomial, coefficients: [0 rad, 0.6 rad, -0.6 rad]}}}
-  drive: {kind: displacement, node: top, direction: -90 deg}
-  copies: {mirror: [50 mm, 0 mm]}
-design: {rescale: {width: 12 mm}}
-analysis: {travel: 8.5 mm, points: 21}
-"""
+    text = TOGGLE + "design: {rescale: {width: 12 mm}}\nanalysis: {travel: 8.5 mm, points: 21}\n"
     reported = {one.name: one.message for one in design(cfmkit.loads(text), Run()).warnings}
     assert "the stress at the end of the window is 23.81 MPa" in reported["rescale_stress"]
     assert "28 MPa, is reached at 2.58" in reported["rescale_stress"]

@@ -105,6 +105,12 @@ def sections_of(item: ast.FunctionDef | ast.ClassDef, classes: dict[str, ast.Cla
         yield from parameters ^ taken
 
 
+def test_a_section_that_leaves_out_or_invents_a_name_is_reported():
+    text = 'def f(a, b):\n    """F.\n\n    Parameters\n    ----------\n    a : int\n    c : int\n    """'
+    (item,) = ast.parse(text).body
+    assert {word.split()[0] for word in sections_of(item, {})} == {"b", "c"}
+
+
 def test_sections_of_docstrings_are_about_all_that_there_is_and_nothing_else():
     wrong = []
     for name in MODULES:

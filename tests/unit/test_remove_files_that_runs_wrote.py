@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cfmkit.errors import FolderInUse
+from cfmkit.errors import FolderInUse, OutputError
 from cfmkit.runs.remove_files_that_runs_wrote import remains_below, remains_in, remove
 from cfmkit.store import RunFolder
 from cfmkit.store.file_names_and_overwrite_checks import JOURNAL
@@ -119,6 +119,16 @@ def test_what_was_edited_while_the_user_was_asked_stays(tmp_path):
     (tmp_path / "curve.csv").write_text("edited")
     assert "curve.csv" not in remove(found, tmp_path).files
     assert left(tmp_path) == ["curve.csv"]
+
+
+def test_a_run_that_wrote_while_the_user_was_asked_keeps_its_files(tmp_path):
+    (tmp_path / "out").mkdir()
+    found = remains_in(tmp_path / "out")
+    a_run(tmp_path / "out")
+    there = left(tmp_path / "out")
+    with pytest.raises(OutputError, match="a run wrote there after its files were listed"):
+        remove(found, tmp_path)
+    assert left(tmp_path / "out") == there
 
 
 def test_a_kill_while_cleaning_leaves_a_manifest_that_lists_what_is_left(tmp_path, monkeypatch):

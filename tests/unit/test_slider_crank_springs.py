@@ -180,7 +180,7 @@ def test_rates_per_degree_and_per_radian_are_told_apart():
         ({"mechanism__stretched_position": "500 mm"}, "either 'coupler_length' or 'stretched_position'"),
         ({"mechanism__unloaded_offset": "1 deg"}, "either 'unloaded_angle' or 'unloaded_offset'"),
         ({"analysis__angle": ("5 deg", "-5 deg")}, "'angle' must be increasing"),
-        ({"design": {"tolerance": "1 %"}}, "state 'torque' or 'force'"),
+        ({"design": {"tolerance": "1 %"}}, "state 'torque' or 'force', which is kept constant, or 'target'"),
         ({"design": {"torque": "1 N*mm"}}, "give a window"),
         ({"design": {"force": "1 N", "angle": ("0 deg", "1 deg")}}, "belong to 'torque'"),
         ({"design": {"torque": "1 N*mm", "tolerance": "1 %", "hold_stiffness": True}}, "needs the 'stiffness'"),

@@ -31,7 +31,7 @@ from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import pareto_and_scale_drawings, proposal_making_and_judging, search, yield_of_proposal
-from cfmkit.studies.suggest.comparison_with_better_model import NOT_VERIFIED, _mean, with_better_models
+from cfmkit.studies.suggest.comparison_with_better_model import NOT_COMPARED, _mean, with_better_models
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
@@ -141,7 +141,7 @@ def test_a_comparison_that_the_time_ends_does_not_ask_for_the_option_that_was_gi
     asked, candidates = offered("beam")
     one = made(ProposalJob("beam", candidates[0], asked, 0))
     compared = with_better_models(search.Suggestions(asked, (one,), (), ()), Run(time_budget=0.0), True)
-    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {NOT_VERIFIED}"
+    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {NOT_COMPARED}"
 
 
 def test_options_replace_keys_of_a_file(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from beam_support import TOGGLE
 
 import cfmkit
 from cfmkit import api
@@ -101,23 +102,12 @@ def test_a_design_under_a_load_may_end_with_its_solid(tmp_path):
     assert cfmkit.load(str(path)).design.verify == "solid"
 
 
-RESCALED = """
-cfmkit: 1
-family: beam
-name: rescaled
-mechanism:
-  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
-  axial: true
-  thickness: 1 mm
-  width: 10 mm
-  nodes: {root: {at: [0 mm, 0 mm], support: clamped}, top: {at: [50 mm, 5 mm], support: guided, direction: 90 deg}}
-  beams: {beam: {start: root, end: top, shape: {kind: polynomial, coefficients: [0 rad, 0.6 rad, -0.6 rad]}}}
-  drive: {kind: displacement, node: top, direction: -90 deg}
-  copies: {mirror: [50 mm, 0 mm]}
-design: {rescale: {force: 20 N}}
+RESCALED = (
+    TOGGLE.replace(", yield_strength: 28 MPa", "")
+    + """design: {rescale: {force: 20 N}}
 analysis: {travel: 10 mm, points: 11, window: [1 mm, 4 mm]}
 """
-"""A toggle: its force falls from 3 mm on and is negative from 7 to 9 mm."""
+)
 
 
 @pytest.mark.parametrize("window", ["[1 mm, 4 mm]", "[7 mm, 8 mm]"], ids=["pushes", "pulls"])
@@ -140,6 +130,25 @@ def test_the_force_of_a_rescaled_solid_is_the_wanted_one_at_the_end_of_the_windo
     assert "at the end of the window" in reported
     assert "mean" not in reported
     assert made.search["verified_target"].quantity.value == pytest.approx(sense * 20.0)
+
+
+@pytest.mark.parametrize("share", [None, "50 %"], ids=["no yield", "a yield"])
+def test_a_solid_from_a_sheet_is_made_of_another_force_and_says_that_margins_are_not_repeated(monkeypatch, share):
+    from cfmkit.families.beam.design import design
+    from cfmkit.families.beam.model import analyze
+
+    asked = {"mechanism.part": {"process": "laser", "sheet": "10 mm"}, "design.yield": share}
+    spec = cfmkit.loads(RESCALED).replace(asked | {"requirements": ({"metric": "nominal_force", "min": "19 N"},)})
+
+    def softer(given, run):
+        thinner = {"mechanism.width": "9.8 mm", "mechanism.part.sheet": "9.8 mm"}
+        return analyze(given.replace(thinner | {"analysis.fidelity": "extensible"}), run)
+
+    monkeypatch.setattr("cfmkit.families.beam.plane_fem_analysis.analyze", softer)
+    made = verified(spec, design(spec, Run()), Run())
+    (reported,) = (text for word, text in made.notes if word == "verify")
+    assert "it is designed for 20.408 N instead of 20 N" in reported  # 20 N / 0.98
+    assert ("the margins of design.yield are not repeated" in reported) == (share is not None)
 
 
 def test_a_design_whose_force_pulls_keeps_its_target():

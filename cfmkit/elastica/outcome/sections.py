@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.network_under_drive import Layout
 
 _ROWS = 8  # samples of a segment
-_TIGHT = (
-    2e-12  # tolerance of Newton's method from which on there are twice as many: slopes of stresses are interpolated
-)
+_TIGHT = 2e-12  # tolerance of Newton's method from which on there are twice as many: stress slopes are interpolated
 _CLOSED = np.array([989, 5888, -928, 10496, -4540, 10496, -928, 5888, 989]) / 28350  # Newton-Cotes on nine rows
 
 _STEP = 1e-30

@@ -75,7 +75,7 @@ class SmoothStretch:
     ) -> tuple[FloatArray, FloatArray]:
         """Return points on the stretch and values there, (n, k), with those at the corners, which may be points.
 
-        Between a corner and an end of the path that is there, too, the corner is all.
+        Where the path ends at a corner there may be no point besides it: `drive` is then empty.
         """
         if self.low is not None and at_low is not None and self.low.drive not in drive[:1]:
             drive, values = np.append(self.low.drive, drive), np.vstack([at_low, values])

@@ -1,4 +1,4 @@
-"""What a specification may say about the parts of a network: nodes, beams and their shapes, springs, loads, drives."""
+"""What a specification says about a network: nodes, beams, springs, loads, drives, copies, and how it is cut."""
 
 from __future__ import annotations
 

@@ -87,6 +87,11 @@ class Yield:
     failed: int
     count: int
 
+    @property
+    def ends(self) -> Interval:
+        """The shares of good parts if all failed samples are bad ones, and if all are good ones."""
+        return self.good / self.count, (self.good + self.failed) / self.count
+
 
 def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Yield:
     """Return the share of samples that are good.

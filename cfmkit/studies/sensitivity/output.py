@@ -81,10 +81,8 @@ def exit_code(found: Findings) -> ExitCode:
         return ExitCode.INTERRUPTED
     evaluator = found.evaluator
     if evaluator.count and evaluator.failed == evaluator.count and not evaluator.ends[Status.TIMEOUT]:
-        ends = {Status.CRASHED: ExitCode.BUG, Status.INVALID: ExitCode.INVALID}
-        return next(
-            (code for end, code in ends.items() if evaluator.ends[end] == evaluator.count), ExitCode.NO_SOLUTION
-        )
+        alike = (end for end in (Status.CRASHED, Status.INVALID) if evaluator.ends[end] == evaluator.count)
+        return next(alike, Status.NO_EQUILIBRIUM).exit_code
     stated = found.setup.method == "local" and not found.lacking
     # a tolerance that does not exist is an answer
     if (evaluator.failed and not stated) or (found.lacking and found.setup.method != "inverse"):
@@ -110,7 +108,7 @@ def yield_ok(found: Findings) -> bool:
 
 def _shown_good(share: Yield, wanted: float) -> bool:
     """Return whether so many parts are good, even if all whose fate is not known are bad."""
-    return share.value >= wanted and share.good / share.count >= wanted
+    return share.value >= wanted and share.ends[0] >= wanted
 
 
 def by_interval(found: Findings) -> bool:
@@ -201,8 +199,8 @@ def _requirements(found: Findings) -> list[dict[str, Any]]:
         return each
     value, good = _known(found.all_met.value), yield_ok(found)
     shown = "no value (samples failed)" if value is None else f"{100 * value:.4g} %"
-    if value is not None and (failed := found.all_met.failed):
-        low, high = ((found.all_met.good + more) / found.all_met.count for more in (0, failed))
+    if value is not None and found.all_met.failed:
+        low, high = found.all_met.ends
         shown = f"{100 * low:.4g} % to {100 * high:.4g} % (samples failed)"
     outcome = "ok, within the 95 % interval" if by_interval(found) else "ok" if good else "missed"
     sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {outcome}"

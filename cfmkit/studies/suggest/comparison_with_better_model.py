@@ -1,4 +1,4 @@
-"""What the next better model of its family makes of a proposal: its mean over the travel, compared."""
+"""What the finest model of its family makes of a proposal: its mean over the travel, compared."""
 
 from __future__ import annotations
 
@@ -28,26 +28,27 @@ if TYPE_CHECKING:
 AGREES = 0.05
 """Difference of the means up to which two models say the same."""
 
-
-NOT_VERIFIED = "it was not finished when the time budget ended"
+NOT_COMPARED = "it was not finished when the time budget ended"
+"""Why a proposal has no comparison if the time did not suffice."""
 
 
 def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions:
-    """Return suggestions whose proposals say what the next better model of their family makes of them.
+    """Return suggestions whose proposals say what the finest model of their family makes of them.
 
     Parameters
     ----------
     found : Suggestions
+        With their proposals judged by their own models.
     run : Run
-        Its executor does the work, its time budget ends it: what was not verified then says so.
+        Its executor does the work, its time budget ends it: what was not compared then says so.
     solve : bool
         Whether to run those models; else it is said that they were not.
     """
     if not solve:
-        return replace(found, proposals=tuple(map(unverified, found.proposals)))
+        return replace(found, proposals=tuple(map(not_compared, found.proposals)))
     clock, bugs = Clock.of(run.time_budget), list(found.bugs)
     executor = surviving_until(run, clock.deadline, bugs)
-    done = dict(executor(partial(_verified_of, found.proposals), iter(range(len(found.proposals))), clock.late))
+    done = dict(executor(partial(_compared_at, found.proposals), iter(range(len(found.proposals))), clock.late))
     kept = [_judged(old, done.get(index)) for index, old in enumerate(found.proposals)]
     return replace(found, proposals=tuple(kept), bugs=tuple(bugs))
 
@@ -56,12 +57,13 @@ def _judged(old: Proposal, outcome: Proposal | Lost | None) -> Proposal:
     """Return a proposal with what came of the comparison."""
     if isinstance(outcome, Proposal):
         return outcome
-    crashed = outcome is not None and outcome.status is Status.CRASHED
-    return unverified(old, outcome.message if outcome is not None and crashed else NOT_VERIFIED)
+    if outcome is not None and outcome.status is Status.CRASHED:
+        return not_compared(old, outcome.message)
+    return not_compared(old, NOT_COMPARED)
 
 
-def _verified_of(proposals: Sequence[Proposal], index: int) -> Proposal:
-    return verified(proposals[index])
+def _compared_at(proposals: Sequence[Proposal], index: int) -> Proposal:
+    return compared(proposals[index])
 
 
 def better(proposal: Proposal) -> tuple[str, Spec] | None:
@@ -77,8 +79,8 @@ def better(proposal: Proposal) -> tuple[str, Spec] | None:
     return None
 
 
-def verified(proposal: Proposal) -> Proposal:
-    """Return a proposal that says how far a better model is from it; as it is where there is none."""
+def compared(proposal: Proposal) -> Proposal:
+    """Return a proposal that says how far a finer model is from it; as it is where there is none."""
     found = better(proposal)
     if found is None:
         return proposal
@@ -97,8 +99,8 @@ def verified(proposal: Proposal) -> Proposal:
     )
 
 
-def unverified(proposal: Proposal, why: str = "--verify") -> Proposal:
-    """Return a proposal that says which better model was not run, and why or how it is."""
+def not_compared(proposal: Proposal, why: str = "--verify") -> Proposal:
+    """Return a proposal that says which finer model was not run, and why or how it is."""
     found = better(proposal)
     return proposal if found is None else _noted(proposal, f"not compared with the model {found[0]!r}: {why}", None)
 

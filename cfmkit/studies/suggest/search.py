@@ -175,7 +175,7 @@ def suggest(
 def surviving_until(run: Run, deadline: float | None, bugs: list[str]) -> Executor:
     """Return an executor until a deadline, in `time.time` [s], in which a bug costs its own job only.
 
-    So it is in the processes of a pool; here it is so in this process, too. Tracebacks are added to `bugs`.
+    The processes of a pool behave like that by themselves, this process does not. Tracebacks are added to `bugs`.
     """
     executor = until(run.executor, deadline)
 
@@ -230,7 +230,7 @@ class _Making:
             proposal = _survived(jobs[index], outcome)
             if proposal.message != OUT_OF_TIME:
                 self._known[index] = proposal
-                # A machine with less to do may finish it next time; a bug, or a process that died, may not be there.
+                # What ended early, crashed, or lost its process is not kept: it may succeed next time.
                 if not isinstance(outcome, Lost) and proposal.message != ENDED_EARLY:
                     notes.add(keys[index], proposal.as_record())
             self._tried += jobs[index].near is None
@@ -399,8 +399,8 @@ def ordered(proposals: Sequence[Proposal], prefer: Sequence[str]) -> list[Propos
 def measure(proposal: Proposal, name: str) -> float:
     """Return what is the smaller the better: area in the plane, ripple, parts, stress over the allowable one, depth.
 
-    What is unknown is the worst: of a mechanism without a modelled stress, or a material without a strength, nobody
-    knows that it bears its load.
+    What is unknown is the worst: whether a mechanism bears its load is not known without a model of its stress, or
+    without the strength of its material.
     """
     numbers = {key: value for key, value in proposal.numbers.items() if value is not None}
     if name == "size":
