@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -211,7 +211,7 @@ class Recording(ShortRepr):
         return len(self.motion)
 
     @property
-    def motion_dimension(self) -> str:
+    def motion_dimension(self) -> Literal["length", "angle"]:
         """``length`` or ``angle``."""
         return "length" if self.kind == "force" else "angle"
 
