@@ -1,0 +1,393 @@
+"""A network under a drive as arrays of mixed spectral elements; everything is dimensionless.
+
+Lengths are counted in the mean beam length L0, forces in F0 = EI / L0^2 with EI of the first beam, the drive in L0
+(a displacement), rad (a rotation) or 1 (loads). Every node that no link moves is a body with three unknowns (x, y in
+the frame of its support, and a rotation). An attachment is where an element's end, a spring or a load acts on a body,
+by chance through a rigid arm, with a rotation of its own behind a pin. The ends of elements inside a beam are bodies,
+too.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points
+from cfmkit.elastica.model.beam import Fit, fit
+from cfmkit.elastica.model.drive import Displacement, Loading
+from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
+from cfmkit.elastica.model.numbering import apart, driven
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network, Spring
+
+FLOOR_UNDER_MOTION = 3e-12
+"""1/EA [L^2/EI] of a straight beam that does not stretch: at rest nothing else determines the force along it."""
+FLOOR_UNDER_LOADS = 1e-3 * FLOOR_UNDER_MOTION
+"""The same where loads drive: they reach 1e3 times the force that a motion causes before it is noticed."""
+MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates its sine to 1e-10
+TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
+LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
+LAYER_GROWTH = 4.0  # factor from one of them to the next
+FRAME_OF_DRIVE = 3
+"""What `driven` says of a node that is held nowhere: its frame is that of the drive, of which it moves along x."""
+SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
+
+
+class Scales(NamedTuple):
+    """Units of length [m], force [N] and the drive (m, rad or 1)."""
+
+    length: float
+    force: float
+    drive: float
+
+    @property
+    def moment(self) -> float:
+        """Unit of moment and energy [N m]."""
+        return self.force * self.length
+
+
+class Elements(NamedTuple):
+    """Elements at their q Gauss points; e elements of one degree."""
+
+    angle: Any  # (e, q) of the axis at rest [rad]
+    weight: Any  # (e, q) quadrature weight times ds
+    rigidity: Any  # (e, q) EI / (ds/du)^2
+    axial: Any  # (e, q) 1/EA
+    shear: Any  # (e, q) 1/GA
+    ahead: Any  # (e, q) arc length from the point to the element's end
+    length: Any  # (e,)
+    line: Any  # (e, 2, 2) line load: constant and growing with the drive; x, y
+    gap: Any  # (e, 2) by which a prestressed beam misses its node at rest
+    ends: Any  # (e, 2) attachments
+    unknowns: Any  # (e, degree + 9): those of both ends (x, y, body's and own rotation), bubbles, force
+    beam: tuple[str, ...]  # the beam each one is a piece of
+    cuts: FloatArray  # (e, 2) where it begins and ends, parameter of the beam's shape
+
+
+class Attachments(NamedTuple):
+    """Places where something acts on a body."""
+
+    unknowns: Any  # (k, 4): x, y, rotation of the body that carries it; its own rotation
+    arm: Any  # (k, 2) from the body's node, as it lies at rest
+    origin: Any  # (k, 2) the body's node at rest
+    frame: Any  # (k, 2) cos and sin of the axes of the body's x and y
+
+
+class Attached(NamedTuple):
+    """A spring or a load and where it acts."""
+
+    item: Any
+    places: tuple[int, ...]  # attachments
+    grows: bool = False  # with the drive
+
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """All arrays of a network under a drive, and the names behind its unknowns."""
+
+    degree: int
+    elements: Elements
+    attachments: Attachments
+    springs: tuple[Attached, ...]
+    loads: tuple[Attached, ...]
+    size: int  # unknowns, held ones included; the last two an element are its force
+    free: Any  # indices of those that are solved for
+    base: Any  # (size,) values of the held ones
+    rate: Any  # (size,) their change with the drive
+    scales: Scales
+    bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
+    nodes: Mapping[str, int]  # attachment of every node
+    fits: Mapping[str, Fit]
+
+    @property
+    def n_motions(self) -> int:
+        """Number of unknowns that are motions; forces come behind them."""
+        return self.size - 2 * len(self.elements.length)
+
+
+def discretise(
+    network: Network,
+    drive: Drive,
+    degree: int = 10,
+    pieces: int = 1,
+    tension: Mapping[str, float] | None = None,
+    scales: Scales | None = None,
+) -> Discretisation:
+    """Return the arrays of a network under a drive.
+
+    Parameters
+    ----------
+    network, drive : Network, Drive
+        They may hold complex steps: then the arrays do, with `scales` those of the network without them.
+    degree : int
+        Of the rotation on an element, at least 2.
+    pieces : int
+        Elements for every smooth piece of a beam, at least.
+    tension : mapping, optional
+        Beams under a large tension N to their L sqrt(N/EI).
+    scales : Scales, optional
+        Units; found from the beams unless given.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
+    """
+    return _Builder(network, drive, degree, pieces, tension or {}, scales).build()
+
+
+class _Builder:
+    """Numbers unknowns and attachments and collects the elements."""
+
+    def __init__(
+        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any
+    ) -> None:
+        self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
+        self.count = itertools.count()
+        self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
+        self.fits = {name: self._fit(beam) for name, beam in network.beams.items()}
+        self.scales = scales or self._scales()
+        self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
+        self.driven = driven(network, drive)
+        along = self.driven is not None and self.driven[1] == FRAME_OF_DRIVE
+        self.turned = {drive.node: drive.direction} if along else {}  # type: ignore[union-attr]
+        self.turns = {name: body[2] for name, body in self.bodies.items()}
+        self.own = {name: self._own_place(name) for name in network.nodes}
+
+    def build(self) -> Discretisation:
+        """Return the arrays."""
+        pieces = [piece for name, beam in self.network.beams.items() for piece in self._beam(name, beam)]
+        springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
+        given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
+        loads = tuple(
+            Attached(load, (self._attach(load.node),), grows) for load, grows in given if isinstance(load, PointLoad)
+        )
+        nodes = {name: self._attach(name) for name in self.network.nodes}
+        dofs, arms, origins, frames = zip(*self.places, strict=True)
+        turn = np.array(frames)
+        attachments = Attachments(
+            np.array(dofs), np.array(arms), np.array(origins), np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        )
+        elements, size = self._elements(pieces, attachments)
+        free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
+        return Discretisation(
+            self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
+            self.bodies, nodes, self.fits,
+        )  # fmt: skip
+
+    # -- bodies and attachments ------------------------------------------------------------------------------------
+    def _fit(self, beam: Beam) -> Fit:
+        start, end = self.network.nodes[beam.start], self.network.nodes[beam.end]
+        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
+        return fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
+
+    def _scales(self) -> Scales:
+        length = float(np.mean([np.real(fitted.length) for fitted in self.fits.values()]))
+        section = next(iter(self.network.beams.values())).section
+        rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
+        return Scales(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
+
+    def _body(self) -> tuple[int, int, int]:
+        return next(self.count), next(self.count), next(self.count)
+
+    def _own_place(self, name: str) -> tuple[Any, Any, Any, Any]:
+        """Return unknowns, arm, origin and frame of a node.
+
+        Its arm swings with its master's body, or with the pin between the two if that is where the master is.
+        """
+        master, carrier = self.network.master_of(name), self.network.body_of(name)
+        node, at = self.network.nodes[name], self.network.nodes[master]
+        turn, pinned = self._turn_of(carrier), carrier != master
+        swing = turn if pinned and not apart(self.network, carrier) else self.bodies[master][2]
+        unknowns = np.array([*self.bodies[master][:2], swing, turn])
+        frame = self.turned.get(master, at.support.direction)
+        arm = np.array([node.x - at.x, node.y - at.y]) / self.scales.length
+        return unknowns, arm, np.array([at.x, at.y]) / self.scales.length, frame
+
+    def _turn_of(self, carrier: str) -> int:
+        if carrier not in self.turns:
+            self.turns[carrier] = next(self.count)
+        return self.turns[carrier]
+
+    def _attach(self, name: str, offset: Any = (0.0, 0.0), pin: bool = False) -> int:
+        """Return a new attachment at a node: with a rigid offset, behind a pin."""
+        unknowns, arm, origin, frame = self.own[name]
+        carrier = self.network.body_of(name)
+        if carrier not in self.bodies and apart(self.network, carrier):
+            node, body = self.network.nodes[name], self.network.nodes[carrier]
+            if any(offset) or node.x != body.x or node.y != body.y:
+                raise InputError(f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own")
+        unknowns = unknowns.copy()
+        if pin:
+            unknowns[3] = next(self.count)
+        self.places.append((unknowns, arm + np.asarray(offset) / self.scales.length, origin, frame))
+        return len(self.places) - 1
+
+    def _spring_places(self, spring: Spring) -> tuple[int, ...]:
+        if isinstance(spring, SlideSpring):
+            return (self._attach(spring.node),)
+        return tuple(self._attach(name) for name in (spring.start, spring.end) if name is not None)
+
+    # -- elements --------------------------------------------------------------------------------------------------
+    def _beam(self, name: str, beam: Beam) -> Iterator[dict[str, Any]]:
+        """Yield the elements of a beam."""
+        fitted = self.fits[name]
+        start = self._attach(beam.start, beam.start_offset, beam.start_joint == "pin")
+        end = self._attach(beam.end, beam.end_offset, beam.end_joint == "pin")
+        cuts = _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
+        floor = self._floor(beam, fitted)
+        last = start
+        for k, (left, right) in enumerate(itertools.pairwise(cuts)):
+            piece = self._piece(beam, fitted, left, right, floor)
+            piece["ends"] = last, (end if k == len(cuts) - 2 else self._inner_body(last, piece))
+            yield piece | {"beam": name, "cuts": (left, right), "raw": beam.closure == "raw", "inner": k < len(cuts) - 2}
+            last = piece["ends"][1]
+
+    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float, floor: float) -> dict[str, Any]:
+        """Return the tables of an element between two parameters of a beam's shape."""
+        length, force = self.scales.length, self.scales.force
+        rule, inside = basis(self.degree), 0.5 * (left + right)
+        t = left + (right - left) * rule.places
+        speed = fitted.speed(t, inside) * (right - left) / length + 0.0 * t
+        rigidity, axial, shear = beam.section.rigidities(fitted.arc(t), float(np.real(fitted.arc(inside))))
+        whole = (speed * rule.weights).sum()
+        return {
+            "angle": fitted.angle(t, inside) + 0.0 * t,
+            "weight": speed * rule.weights,
+            "rigidity": rigidity / (force * length**2) / speed**2,
+            "axial": axial * force + floor + 0.0 * t,
+            "shear": shear * force + 0.0 * t,
+            "ahead": whole - integrals_to_points(self.degree) @ speed,
+            "length": whole,
+        }
+
+    def _floor(self, beam: Beam, fitted: Fit) -> float:
+        """Return 1/EA that a straight beam gets which does not stretch."""
+        angles = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5))
+        if beam.section.axial or len(fitted.course.breaks) > 2 or np.ptp(angles + np.zeros(9)) > 0:
+            return 0.0
+        rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
+        floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
+        return float(floor * self.scales.force * self.scales.length**2 / rigidity)
+
+    def _inner_body(self, last: int, piece: Mapping[str, Any]) -> int:
+        """Return the attachment of a new body at the end of an element inside a beam."""
+        _, arm, origin, _ = self.places[last]
+        x, y = ((piece["weight"] * turn(piece["angle"])).sum() for turn in (np.cos, np.sin))
+        body = self._body()
+        self.places.append((np.array([*body, body[2]]), np.zeros(2), origin + arm + np.array([x, y]), 0.0))
+        return len(self.places) - 1
+
+    def _elements(self, pieces: list[dict[str, Any]], attachments: Attachments) -> tuple[Elements, int]:
+        """Return the elements and the number of unknowns: bubbles and forces are numbered behind all motions of ends."""
+        bubbles = [[next(self.count) for _ in range(self.degree - 1)] for _ in pieces]
+        forces = [[next(self.count), next(self.count)] for _ in pieces]
+        ends = np.array([piece["ends"] for piece in pieces])
+        unknowns = np.hstack([attachments.unknowns[ends[:, 0]], attachments.unknowns[ends[:, 1]], bubbles, forces])
+        columns = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+        tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
+        beams = tuple(piece["beam"] for piece in pieces)
+        line = self._line_loads()
+        elements = Elements(
+            **tables, line=np.array([line[name] for name in beams]), gap=np.zeros((len(pieces), 2)), ends=ends,
+            unknowns=unknowns, beam=beams, cuts=np.array([piece["cuts"] for piece in pieces]),
+        )  # fmt: skip
+        return elements._replace(gap=self._gaps(pieces, elements, attachments)), next(self.count)
+
+    def _line_loads(self) -> dict[str, Any]:
+        """Return the line loads of every beam: constant and growing with the drive."""
+        sums: dict[str, Any] = {name: np.zeros((2, 2)) for name in self.network.beams}
+        unit = self.scales.length / self.scales.force
+        for grows, loads in enumerate((self.network.loads, self.drive.loads)):
+            for load in loads:
+                if isinstance(load, LineLoad):
+                    added = np.zeros((2, 2), np.result_type(load.wx, load.wy, float))
+                    added[grows] = np.array([load.wx, load.wy]) * unit * (self.scales.drive if grows else 1.0)
+                    sums[load.beam] = sums[load.beam] + added
+        return sums
+
+    def _gaps(self, pieces: list[dict[str, Any]], elements: Elements, attachments: Attachments) -> Any:
+        """Return by how much the last element of each beam that is forced into place misses its node."""
+        place = attachments.origin + attachments.arm
+        span = place[elements.ends[:, 1]] - place[elements.ends[:, 0]]
+        reach = [(elements.weight * turn(elements.angle)).sum(axis=1) for turn in (np.cos, np.sin)]
+        last = np.array([piece["raw"] and not piece["inner"] for piece in pieces])
+        return np.where(last[:, None], span - np.stack(reach, axis=1), 0.0)
+
+    # -- what is held ----------------------------------------------------------------------------------------------
+    def _constraints(
+        self, size: int, elements: Elements, attachments: Attachments, acting: list[Attached]
+    ) -> tuple[Any, Any, Any]:
+        """Return the free unknowns, the values of held ones and their change with the drive."""
+        held, base, rate = np.zeros(size, bool), np.zeros(size), np.zeros(size)
+        for name, body in self.bodies.items():
+            support = self.network.nodes[name].support
+            flags = support.along, support.across, support.rotation
+            for flag, unknown, value in zip(flags, body, support.displacement, strict=True):
+                if flag:
+                    held[unknown] = True
+                    base[unknown] = value / (1.0 if unknown == body[2] else self.scales.length)
+        held |= ~_used(size, elements, attachments, acting)
+        if self.driven is not None:
+            node, local, sense = self.driven
+            unknown = self.bodies[node][local % FRAME_OF_DRIVE]
+            held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
+        return np.flatnonzero(~held), base, rate
+
+
+def _used(size: int, elements: Elements, attachments: Attachments, acting: list[Attached]) -> Any:
+    """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
+    used = np.zeros(size, bool)
+    used[elements.unknowns[:, [0, 1, 3, 4, 5, *range(7, elements.unknowns.shape[1])]]] = True
+    arms = np.abs(attachments.arm).max(axis=1) > 0
+    used[elements.unknowns[:, [2, 6]][arms[elements.ends]]] = True
+    for item, places, _ in acting:
+        for unknowns, has_arm in zip(attachments.unknowns[list(places)], arms[list(places)], strict=True):
+            if isinstance(item, TorsionSpring):
+                used[unknowns[3]] = True
+                continue
+            used[unknowns[:2]] = True
+            used[unknowns[2]] |= has_arm
+            used[unknowns[3]] |= isinstance(item, PointLoad) and (item.follows or item.moment != 0)
+    return used
+
+
+def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
+    """Return the parameters between which the elements of a beam lie."""
+    stations = [float(np.real(fitted.parameter(float(s)))) for s in np.real(beam.section.stations)]
+    marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
+    marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
+    marks[0], marks[-1] = 0.0, 1.0
+    count = max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
+    cuts = [left + (right - left) * k / count for left, right in itertools.pairwise(marks) for k in range(count)]
+    cuts.append(1.0)
+    return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
+
+
+def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
+    """Return cuts with layers at both ends of every element: a taut beam bends there, within sqrt(EI/N)."""
+    refined = []
+    for left, right in itertools.pairwise(cuts):
+        width, layers = LAYER_WIDTH / tautness, []
+        while width < 0.3 * (right - left):
+            layers.append(width)
+            width *= LAYER_GROWTH
+        refined += [left, *(left + layer for layer in layers), *(right - layer for layer in reversed(layers))]
+    return [*refined, 1.0]
+
+
+def without_floor(discretisation: Discretisation, elements: Any) -> Discretisation:
+    """Return the same arrays with elements that do not stretch at all."""
+    axial = discretisation.elements.axial.copy()
+    axial[elements] = 0.0
+    return replace(discretisation, elements=discretisation.elements._replace(axial=axial))

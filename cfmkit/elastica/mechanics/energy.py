@@ -1,0 +1,173 @@
+"""Gradient and Hessian of the functional of a network, its inertia, and the drive's effort; all dimensionless.
+
+Every function takes z, the values of all unknowns, and two factors: `drive` multiplies what grows with the drive,
+`share` (0 to 1) what is constant: displaced supports, constant loads, free lengths, the gap of beams that are forced
+into place.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import lapack
+
+from cfmkit.elastica.mechanics.poses import Poses, poses
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.mechanics.terms import TERMS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.terms import Contribution
+
+SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
+REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of its size
+
+
+class Fields(NamedTuple):
+    """What is known at the Gauss points of the elements, (e, q) each."""
+
+    curvature: Any  # phi' by the element's parameter
+    cos: Any
+    sin: Any
+    normal: Any  # N, along the tangent
+    shear: Any  # Q, across it
+    slope_x: Any  # dX/ds
+    slope_y: Any
+
+
+def fields(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
+    """Return rotations and section forces at the Gauss points."""
+    e, rule = network.elements, basis(network.degree)
+    own = z[e.unknowns]
+    rotation = own[:, rotation_columns(network.degree)]
+    force = own[:, None, -2:] + line_load(network, drive, share)[:, None, :] * e.ahead[:, :, None]
+    turn = e.angle + rotation @ rule.values.T
+    cos, sin = np.cos(turn), np.sin(turn)
+    normal = force[..., 0] * cos + force[..., 1] * sin
+    shear = force[..., 1] * cos - force[..., 0] * sin
+    stretch, slip = 1 + e.axial * normal, e.shear * shear
+    return Fields(
+        rotation @ rule.slopes.T, cos, sin, normal, shear, stretch * cos - slip * sin, stretch * sin + slip * cos
+    )
+
+
+def rotation_columns(degree: int) -> Any:
+    """Return which of an element's unknowns are coefficients of its rotation: own rotations of both ends, bubbles."""
+    return np.r_[3, 7, 8 : degree + 7]
+
+
+def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
+    """Return the line load on the elements, (e, 2)."""
+    return share * network.elements.line[:, 0] + drive * network.elements.line[:, 1]
+
+
+def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+    """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
+    own, kind = _element_gradients(network, z, drive, share)
+    parts = list(_contributions(network, z, drive, share))
+    total = np.zeros(network.size, np.result_type(kind, *(part.gradient for part in parts)))
+    np.add.at(total, network.elements.unknowns, own)
+    for part in parts:
+        np.add.at(total, part.unknowns, part.gradient)
+    return total
+
+
+def _contributions(network: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[Contribution]:
+    for attached in (*network.springs, *network.loads):
+        yield TERMS[type(attached.item)](network, attached, z, share, drive)
+
+
+def _end_poses(network: Discretisation, z: Any) -> tuple[Poses, Poses]:
+    return tuple(poses(network.attachments, z, network.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
+
+
+def _element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
+    """Return the gradients of the elements by their unknowns, (e, degree + 9), and their type."""
+    e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
+    start, end = _end_poses(network, z)
+    last = z[e.unknowns[:, -2:]]
+    first = last + line_load(network, drive, share) * e.length[:, None]
+    bend = e.weight * e.rigidity * at.curvature
+    turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
+    own = np.zeros(e.unknowns.shape, np.result_type(bend, turning, start.place, first))
+    own[:, rotation_columns(network.degree)] = bend @ rule.slopes - turning @ rule.values
+    own[:, 0:3] = -(first[:, None, :] @ start.jacobian)[:, 0]
+    own[:, 4:7] = (last[:, None, :] @ end.jacobian)[:, 0]
+    reach = np.stack([(e.weight * at.slope_x).sum(axis=1), (e.weight * at.slope_y).sum(axis=1)], axis=1)
+    own[:, -2:] = end.place - start.place - reach - (1.0 - share) * e.gap
+    return own, own.dtype
+
+
+def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+    """Return the Hessian by all unknowns, (size, size): symmetric unless loads follow."""
+    e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
+    start, end = _end_poses(network, z)
+    columns, softer = rotation_columns(network.degree), e.axial - e.shear
+    f, g = 1 + softer * at.normal, softer * at.shear
+    own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
+    bend, turn = e.weight * e.rigidity, e.weight * (at.normal * f - g * at.shear)
+    slopes, values = rule.slopes, rule.values
+    own[:, columns[:, None], columns] = (slopes.T * bend[:, None, :]) @ slopes + (values.T * turn[:, None, :]) @ values
+    by_force = np.stack([g * at.cos - f * at.sin, g * at.sin + f * at.cos], axis=1) * e.weight[:, None, :]
+    coupling = -(by_force @ values)
+    for axis in (0, 1):
+        own[:, columns, axis - 2] = own[:, axis - 2, columns] = coupling[:, axis]
+    own[:, -2:, 0:3], own[:, -2:, 4:7] = -start.jacobian, end.jacobian
+    own[:, 0:3, -2:], own[:, 4:7, -2:] = -start.jacobian.transpose(0, 2, 1), end.jacobian.transpose(0, 2, 1)
+    own[:, -2, -2] = -(e.weight * (e.axial * at.cos**2 + e.shear * at.sin**2)).sum(axis=1)
+    own[:, -1, -1] = -(e.weight * (e.axial * at.sin**2 + e.shear * at.cos**2)).sum(axis=1)
+    own[:, -2, -1] = own[:, -1, -2] = -(e.weight * softer * at.cos * at.sin).sum(axis=1)
+    last = z[e.unknowns[:, -2:]]
+    first = last + line_load(network, drive, share) * e.length[:, None]
+    own[:, 2, 2] += (first * start.arm).sum(axis=1)
+    own[:, 6, 6] -= (last * end.arm).sum(axis=1)
+    total = np.zeros((network.size, network.size))
+    np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), own)
+    for part in _contributions(network, z, drive, share):
+        np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
+    return total
+
+
+def values(network: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
+    """Return all unknowns from the free ones: held ones are displaced by their share, and by the drive."""
+    z = share * network.base + drive * network.rate
+    z = z.astype(np.result_type(z, free))
+    z[network.free] = free
+    return z
+
+
+def strain_energy(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
+    """Return the energy of beams and springs."""
+    e, at = network.elements, fields(network, z, drive, share)
+    beams = e.weight * (e.rigidity * at.curvature**2 + e.axial * at.normal**2 + e.shear * at.shear**2)
+    springs = (TERMS[type(spring.item)](network, spring, z, share, drive).energy for spring in network.springs)
+    return beams.sum() / 2 + sum(springs)
+
+
+def count_unstable(network: Discretisation, tangent: Any) -> int:
+    """Return the number of unstable directions at a held drive from the tangent of the free unknowns [Ha].
+
+    Without loads that follow: the negative pivots of L D L^T less one for every component of a section force. Those
+    are maxima of the functional, or constraints with one negative and one positive pivot each. Under loads that follow:
+    the negative real eigenvalues of the motions' stiffness.
+    """
+    if any(load.item.follows for load in network.loads):
+        return int((motion_eigenvalues(network, tangent) < 0).sum())
+    factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
+    single = pivots > 0
+    negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
+    return negative - 2 * len(network.elements.length)
+
+
+def motion_eigenvalues(network: Discretisation, tangent: Any) -> Any:
+    """Return the real eigenvalues of the stiffness of the motions, section forces condensed, ascending."""
+    moves = np.flatnonzero(network.free < network.n_motions)
+    unit = np.zeros((len(network.free), len(moves)))
+    unit[moves, np.arange(len(moves))] = 1.0
+    flexibility = np.linalg.solve(tangent, unit)[moves]
+    inverse = np.linalg.eigvals(flexibility)
+    real = (np.abs(inverse.imag) < REAL_SHARE * np.abs(inverse)) & (np.abs(inverse) > 0)
+    return np.sort(1 / inverse[real].real)
