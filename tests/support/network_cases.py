@@ -25,13 +25,12 @@ DENSITY = 1000.0  # [kg/m3] of every beam, where frequencies are taken
 N_FREQUENCIES = 3
 MAX_POINTS = 12
 """Points of a path of which values are kept: of more, evenly picked ones, the last among them."""
-TYPES = {
-    name: getattr(elastica, name)
-    for name in (
-        "Beam Control CosineArch Displacement LineLoad LineSpring Link Loading Network Node PointLoad Polyline "
-        "Polynomial Rotation Section SlideSpring Spline Support Taper TorsionSpring"
-    ).split()
-} | {"Bent": Bent}
+MODEL = (
+    "Beam", "Control", "CosineArch", "Displacement", "LineLoad", "LineSpring", "Link", "Loading", "Network", "Node",
+    "PointLoad", "Polyline", "Polynomial", "Rotation", "Section", "SlideSpring", "Spline", "Support", "Taper",
+    "TorsionSpring",
+)  # fmt: skip
+TYPES = {name: getattr(elastica, name) for name in MODEL} | {"Bent": Bent}
 
 
 def to_json(value: Any) -> Any:
@@ -126,7 +125,11 @@ def differences(seen: Mapping[str, Any], known: Mapping[str, Any], tolerance: fl
     or moment over `length`, drives of events with the largest known one. Stresses and frequencies may differ by ten times
     the tolerance: they are derivatives of the path.
     """
-    wrong = [f"{name}: {seen[name]} for {known[name]}" for name in ("status", "points", "requested") if seen[name] != known[name]]
+    wrong = [
+        f"{name}: {seen[name]} for {known[name]}"
+        for name in ("status", "points", "requested")
+        if seen[name] != known[name]
+    ]
     stable = [[count == 0 for count in values["unstable"]] for values in (seen, known)]
     wrong += ["stability of points"] if stable[0] != stable[1] else []
     if [event[0] for event in seen["events"]] != [event[0] for event in known["events"]]:
@@ -140,7 +143,9 @@ def differences(seen: Mapping[str, Any], known: Mapping[str, Any], tolerance: fl
         values = [np.array([record[name][node] for node in nodes]) * scale for record in (seen, known)]
         compared.append((name, *values, tolerance))
     beams = list(known["stress"])
-    compared.append(("stress", *([record["stress"][beam] for beam in beams] for record in (seen, known)), 10 * tolerance))
+    compared.append(
+        ("stress", *([record["stress"][beam] for beam in beams] for record in (seen, known)), 10 * tolerance)
+    )
     compared.append(("frequencies", seen["frequencies"], known["frequencies"], 10 * tolerance))
     drives = [[event[1] for event in record["events"]] for record in (seen, known)]
     compared.append(("events", *drives, max(1e-5, tolerance)))

@@ -86,7 +86,9 @@ def test_networks_with_every_feature_have_the_forces_of_the_shooting_engine(seed
         free = follow(network, np.linspace(0.25, 1.0, 4) * last)
         assert effort(network, free, last) == pytest.approx(path.effort[-1], rel=1e-7)
         z = energy.values(network, free, last)
-        assert energy.strain_energy(network, z, last) * network.scales.moment == pytest.approx(path.energy[-1], rel=1e-7)
+        assert energy.strain_energy(network, z, last) * network.scales.moment == pytest.approx(
+            path.energy[-1], rel=1e-7
+        )
 
 
 def test_a_pulled_strip_converges_spectrally() -> None:
@@ -124,7 +126,9 @@ def test_a_column_that_does_not_stretch_is_stable_below_its_critical_load() -> N
     for factor in (0.999, 1.001):
         free = equilibrium(network, np.zeros(len(network.free)), factor, 1.0)
         z = energy.values(network, free, factor)
-        counts.append(energy.count_unstable(network, energy.hessian(network, z, factor)[np.ix_(network.free, network.free)]))
+        counts.append(
+            energy.count_unstable(network, energy.hessian(network, z, factor)[np.ix_(network.free, network.free)])
+        )
     assert counts == [0, 1]
 
 

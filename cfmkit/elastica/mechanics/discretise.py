@@ -226,7 +226,9 @@ class _Builder:
         if carrier not in self.bodies and apart(self.network, carrier):
             node, body = self.network.nodes[name], self.network.nodes[carrier]
             if any(offset) or node.x != body.x or node.y != body.y:
-                raise InputError(f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own")
+                raise InputError(
+                    f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own"
+                )
         unknowns = unknowns.copy()
         if pin:
             unknowns[3] = next(self.count)
@@ -250,7 +252,12 @@ class _Builder:
         for k, (left, right) in enumerate(itertools.pairwise(cuts)):
             piece = self._piece(beam, fitted, left, right, floor)
             piece["ends"] = last, (end if k == len(cuts) - 2 else self._inner_body(last, piece))
-            yield piece | {"beam": name, "cuts": (left, right), "raw": beam.closure == "raw", "inner": k < len(cuts) - 2}
+            yield piece | {
+                "beam": name,
+                "cuts": (left, right),
+                "raw": beam.closure == "raw",
+                "inner": k < len(cuts) - 2,
+            }
             last = piece["ends"][1]
 
     def _piece(self, beam: Beam, fitted: Fit, left: float, right: float, floor: float) -> dict[str, Any]:
@@ -289,7 +296,7 @@ class _Builder:
         return len(self.places) - 1
 
     def _elements(self, pieces: list[dict[str, Any]], attachments: Attachments) -> tuple[Elements, int]:
-        """Return the elements and the number of unknowns: bubbles and forces are numbered behind all motions of ends."""
+        """Return the elements and the number of unknowns: bubbles and forces are numbered behind motions of ends."""
         bubbles = [[next(self.count) for _ in range(self.degree - 1)] for _ in pieces]
         forces = [[next(self.count), next(self.count)] for _ in pieces]
         ends = np.array([piece["ends"] for piece in pieces])

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.linalg import lapack
 
-from cfmkit.elastica.mechanics.poses import Poses, poses
 from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.mechanics.poses import Poses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
 
 if TYPE_CHECKING:
