@@ -2,11 +2,11 @@
 
     python tools/freeze_networks.py [--only TEXT] [--add CASES.jsonl]
 
-Every network is followed at a tolerance of 1e-9, and the values that `tests/support/network_cases.py` takes of its path
-replace those of the file. The values are the judge of changes to the beam engine: write them only where the mechanics is
-known to be right, and say in the commit which changed and why. `--add` takes further cases: lines with name, network,
-drive and control. A path that does not reach 1e-9 is kept with the tolerance that it reaches, at most 1e-6; else the
-case is refused.
+Every network is followed at a tolerance of 1e-9, and the values that `tests/support/network_cases.py` takes of its
+path replace those of the file. The values are the judge of changes to the beam engine: write them only where the
+mechanics is known to be right, and say in the commit which changed and why. `--add` takes further cases: lines with
+name, network, drive and control. A path that does not reach 1e-9 is kept with the tolerance that it reaches, at most
+1e-6; else the case is refused.
 """
 
 from __future__ import annotations

@@ -122,8 +122,8 @@ def differences(seen: Mapping[str, Any], known: Mapping[str, Any], tolerance: fl
     """Return in words where observed values differ from known ones; numbers by `tolerance` of the path's largest.
 
     Motions are compared with the largest of any node, places in units of `length` [m], reactions with the largest force
-    or moment over `length`, drives of events with the largest known one. Stresses and frequencies may differ by ten times
-    the tolerance: they are derivatives of the path.
+    or moment over `length`, drives of events with the largest known one. Stresses and frequencies may differ by
+    ten times the tolerance: they are derivatives of the path.
     """
     wrong = [
         f"{name}: {seen[name]} for {known[name]}"
