@@ -273,7 +273,8 @@ class Drawing(ShortRepr):
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands
     and what is moved. `notes` say what the contours do not show: how often a part is to be made. `dimensions` and
     `facts` are what a sheet of paper says beside the outline: main lengths, and what it is made of in (word, text).
-    `labels` are engraved. `warnings` say what is wrong with the part as drawn.
+    `labels` are engraved. `warnings` say what is wrong with the part as drawn. `tolerance` is how far files may be from
+    the exact outlines unless somebody states another value [m].
     """
 
     name: str
@@ -285,6 +286,7 @@ class Drawing(ShortRepr):
     facts: tuple[tuple[str, str], ...] = ()
     labels: tuple[EngravedText, ...] = ()
     warnings: tuple[Finding, ...] = ()
+    tolerance: float = TOLERANCE
 
     @property
     def extents(self) -> tuple[float, float, float, float]:

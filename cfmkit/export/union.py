@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 ROUGH = 1e-6
 """By default contours are no farther from the true ones [m]."""
 
+ROUNDING = 1e-3
+"""Gaps of this share of `rough` between pieces are rounding, and are closed."""
+
 _QUARTER, _MOST_PIECES = 32, 10_000  # pieces of a quarter circle
-_SPECK = 1e-12  # holes smaller than this are rounding [m2]
 
 
 def merged(
@@ -54,17 +56,18 @@ def merged(
     from shapely import Polygon, union_all
 
     # what overlaps by rounding only must still become one piece
-    whole = union_all([Polygon(piece).buffer(rough / 4, join_style="mitre") for piece in pieces])
+    grown = union_all([Polygon(piece).buffer(ROUNDING * rough, join_style="mitre") for piece in pieces])
+    whole = grown.buffer(-ROUNDING * rough, join_style="mitre")
     if fillet > 0:
         pieces_of = max(_QUARTER, quarter_pieces(fillet, rough / 4))
         whole = whole.buffer(fillet, quad_segs=pieces_of).buffer(-fillet, quad_segs=pieces_of)
     if holes:
         whole = whole.difference(union_all([Polygon(hole) for hole in holes]))
     whole = whole.simplify(rough / 2)
-    parts = [part for part in getattr(whole, "geoms", [whole]) if part.area > _SPECK]
+    parts = [part for part in getattr(whole, "geoms", [whole]) if part.area > rough**2]
     if not parts:
         raise GeometryError("the pieces of the part leave nothing to cut")
-    return tuple(contour for part in parts for contour in _contours(part, layer))
+    return tuple(contour for part in parts for contour in _contours(part, layer, rough**2))
 
 
 def quarter_pieces(radius: float, bulge: float) -> int:
@@ -72,12 +75,12 @@ def quarter_pieces(radius: float, bulge: float) -> int:
     return min(_MOST_PIECES, math.ceil(0.25 * math.pi / math.acos(max(1.0 - bulge / radius, 0.0)))) if radius > 0 else 1
 
 
-def _contours(part: Any, layer: str) -> Iterator[Contour]:
+def _contours(part: Any, layer: str, speck: float) -> Iterator[Contour]:
     """Yield the outline of a polygon and its holes, without specks."""
     from shapely import Polygon
 
     for ring, hole in ((part.exterior, False), *((ring, True) for ring in part.interiors)):
-        if Polygon(ring).area > _SPECK:
+        if Polygon(ring).area > speck:
             ends = [(float(x), float(y)) for x, y in ring.coords]
             edges = tuple(Line(a, b) for a, b in itertools.pairwise(ends) if a != b)
             yield Contour(edges, layer, closed=True, hole=hole)

@@ -39,8 +39,8 @@ GRADING = 0.25
 """How fast element sizes may grow [m per m]: 0.2 to 0.3 keeps triangles near the boundary above 25 degrees."""
 
 
-STEP = 1e-6
-"""Steps of an edge up to which they are the drawing's rounding [m]: outlines are that far from the true edge.
+STEP = 2e-6
+"""Steps of an edge up to which they are the drawing's rounding, in lengths of the edge.
 
 Where the disc at a node of two beams just misses the corners of their ends, a step of 0.6 um is left over.
 """
@@ -137,7 +137,9 @@ def _without_steps(ring: FloatArray) -> FloatArray:
     """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners within `STEP`."""
     chain = Ring(ring)
     corner, turns = np.abs(chain.turns) > CORNER, chain.turns
-    step = (chain.lengths <= STEP) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
+    step = (
+        (chain.lengths <= STEP * chain.places[-1]) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
+    )
     if not step.any():
         return ring
     ring = np.where(step[:, None], 0.5 * (ring + np.roll(ring, -1, axis=0)), ring)

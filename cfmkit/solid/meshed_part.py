@@ -59,8 +59,10 @@ TANGENT = 0.5
 BULKY, COARSE = 2.0, 4.0
 """Area of a part, in that of strips of its thinnest size along its edges, from which on blocks have elements so many
 times as large: mechanisms of beams have 1.0 to 1.4, that of Lan 1.9 with fillets of 5 mm, 19 with fillets of 20 mm."""
-ON = 5e-6
-"""Nodes nearer to a pad or a hole than this belong to it [m]: outlines are drawn within that."""
+ON = 1e-3
+"""Nodes nearer to a pad or a hole than this belong to it, in thicknesses of the thinnest place."""
+RING = 2e-5
+"""How far the lines of a boundary may be from its arcs, in the same: their bending stiffness is then within 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,11 @@ class Part:
     largest: float = 1.0
     obstacles: tuple[FloatArray, ...] = ()
 
+    @property
+    def near(self) -> float:
+        """How far nodes of a pad or a hole may be from it [m]."""
+        return ON * self.thinnest
+
     def meshed(self, size: float, across: float = LEAST_ACROSS) -> Meshed:
         """Return the part with elements of a size [m], and of so many across the thickness at least.
 
@@ -136,7 +143,7 @@ class Part:
         share = SHARE * size / (self.thinnest / ACROSS)
         across = self.thinnest / size if self.largest > 1.0 else across
         seams = [seam for place in self.places for seam in place.seams]
-        grid = mesh(self.rings, self.largest * size, share, across, seams, ON)
+        grid = mesh(self.rings, self.largest * size, share, across, seams, self.near)
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         unjudged = held | self._beside_clamps(grid, held)
@@ -155,7 +162,7 @@ class Part:
             for seam in (seam for place in self.places for seam in place.seams):
                 face = seam[1] - seam[0]
                 sine = abs(face[0] * along[1] - face[1] * along[0]) / (np.hypot(*face) * np.hypot(*along))
-                if sine > TANGENT and LineString(seam).distance(LineString(ends)) < ON:
+                if sine > TANGENT and LineString(seam).distance(LineString(ends)) < self.near:
                     around = LineString(seam).interpolate(LineString(seam).project(Point(ends.mean(axis=0))))
                     near[tree.query_ball_point(around.coords[0], BESIDE * self.thinnest)] = True
         return near
@@ -176,7 +183,7 @@ class Part:
         taken = np.zeros(len(nodes), bool)
         found: list[Group] = []
         for place in self.places:
-            inside = np.flatnonzero(within(nodes, place.shapes, ON) & ~taken)
+            inside = np.flatnonzero(within(nodes, place.shapes, self.near) & ~taken)
             if len(inside):
                 found.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
                 taken[inside] = True
@@ -274,17 +281,18 @@ def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
     return COARSE if area > BULKY * 0.5 * around * thinnest else 1.0
 
 
-def rings_of(contours: Sequence[Contour], sagitta: float = 1e-6) -> tuple[Ring, ...]:
+def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[Ring, ...]:
     """Return the boundary that closed contours draw, as rings.
 
     Parameters
     ----------
     contours : sequence of Contour
         Outlines and holes.
-    sagitta : float
-        Largest distance of the rings from arcs [m]; smooth edges are taken by their points.
+    thinnest : float
+        Thinnest place of the part [m]: rings are within `RING` of it from arcs; smooth edges are taken by their
+        points.
     """
-    return tuple(Ring.of(contour.points(sagitta, TURN), contour.hole) for contour in contours)
+    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole) for contour in contours)
 
 
 ALLOWED = 5e-4

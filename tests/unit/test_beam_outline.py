@@ -222,7 +222,7 @@ def test_a_finer_tolerance_gives_another_contour_and_a_coarser_one_the_same_as_e
     spec = cantilever(("end: tip}", "end: tip, shape: {kind: cosine, rise: 40 mm}}"))
     count = [sum(len(one.edges) for one in cfmkit.drawing(spec, each).contours) for each in TOLERANCES]
     assert count[0] <= count[1] < count[2] < count[3]
-    assert cfmkit.drawing(spec).contours[0].edges == cfmkit.drawing(spec, 5e-6).contours[0].edges
+    assert cfmkit.drawing(spec).contours[0].edges == cfmkit.drawing(spec, 2e-4 * MM).contours[0].edges
 
 
 @pytest.mark.parametrize("turns", [1.6, 2.6, 10.25])

@@ -16,7 +16,6 @@ import numpy as np
 from cfmkit.elastica import PointLoad
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.export.contours import (
-    TOLERANCE,
     Contour,
     Curve2D,
     Drawing,
@@ -30,7 +29,7 @@ from cfmkit.export.contours import (
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.network_elements_spec import PartSpec
-from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis
+from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis, thinnest_of
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
 from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_drawn_solid
 from cfmkit.specs.units import format_short
@@ -49,8 +48,12 @@ PAD = 4.0
 EYE, HOLE = 2.5, 1.2
 """Radii of the eye and of the hole at a pinned support, in thicknesses."""
 
-ROUGH = 1e-6
-"""A beam that ends nearer to its node than this stands on it [m]."""
+FINE = 2e-4
+"""How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
+beam: both edges together change its bending stiffness by 1.2e-3 at most."""
+
+ROUGH = 1e-4
+"""A beam that ends nearer to its node than this stands on it, in breadths of the bar that would join them."""
 
 SWEPT = 25
 """Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
@@ -87,17 +90,18 @@ class HeldPlace:
     seams: tuple[FloatArray, ...] = ()
 
 
-def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ...]:
+def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:
     """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes.
 
     Parameters
     ----------
     spec : BeamSpec
         Whose part is drawn.
-    tolerance : float
+    tolerance : float, optional
         As for `drawing` [m].
     """
     assembly = assemble(spec)
+    tolerance = tolerance or _fine(assembly)
     beams = _strips(assembly, tolerance)
     loaded = {load.node for load in assembly.network.loads if isinstance(load, PointLoad)}
     return tuple(_held_places(assembly, beams, tolerance, loaded))
@@ -151,19 +155,21 @@ def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], b
     return HeldPlace(node, node, at, (line,), (line,))
 
 
-def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     """Return the part, its centre lines, and the point table of every beam.
 
     Parameters
     ----------
     spec : BeamSpec
         What to draw.
-    tolerance : float
-        Largest distance of the contour from the exact edges [m].
+    tolerance : float, optional
+        Largest distance of the contour from the exact edges [m]; default: `FINE`.
     """
     from cfmkit.export.union import merged
 
     assembly = assemble(spec)
+    fine = _fine(assembly)
+    tolerance = tolerance or fine
     beams = _strips(assembly, tolerance)
     pieces, blocks, holes = _pieces(assembly, beams, SHARE * tolerance)
     frame = _frame(assembly, beams, tolerance)
@@ -176,7 +182,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
         blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
     part = spec.mechanism.part or PartSpec()
     pieces = [*pieces, *frame]
-    contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
+    contours = merged(pieces, part.fillet, holes, rough=SHARE * tolerance)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
@@ -196,13 +202,19 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
         dimensions=dimensions,
         facts=facts,
         warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, blocks, contours, part.fillet)),
+        tolerance=fine,
     )
+
+
+def _fine(assembly: Assembly) -> float:
+    return FINE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
 
 
 def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
     """Return the polygons of the frame around the part and of the bars to its pads [m], if one is requested."""
     assembly = assemble(spec)
-    return _frame(assembly, _strips(assembly, TOLERANCE), TOLERANCE)
+    tolerance = _fine(assembly)
+    return _frame(assembly, _strips(assembly, tolerance), tolerance)
 
 
 def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
@@ -280,7 +292,7 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
 
 def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
     for axis in along:
-        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > ROUGH:
+        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > ROUGH * math.dist(start, end):
             yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)
 
 
@@ -399,7 +411,7 @@ def _ends(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> l
 def _arm(network: Network, node: str, at: FloatArray, width: float) -> list[FloatArray]:
     """Return the bar from a node to the end of a beam that stands beside it [m]; none where it stands on it."""
     place = np.array([network.nodes[node].x, network.nodes[node].y])
-    return [_bar(place, at, width)] if np.hypot(*(at - place)) > ROUGH else []
+    return [_bar(place, at, width)] if np.hypot(*(at - place)) > ROUGH * width else []
 
 
 def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:

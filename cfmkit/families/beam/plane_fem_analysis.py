@@ -27,7 +27,7 @@ from cfmkit.families.beam.network_from_spec import (
     thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.outline import FINE, SHARE, drawing, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -277,9 +277,8 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
         for one in regions(spec)
     ]
-    fillet = (spec.mechanism.part or PartSpec()).fillet
-    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut))
-    thinnest = _thinnest(assembly)
+    fillet, thinnest = (spec.mechanism.part or PartSpec()).fillet, _thinnest(assembly)
+    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut, thinnest))
     return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
 
 
@@ -452,12 +451,11 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
-def _sharp(fillet: float) -> str:
+def _sharp(fillet: float, thinnest: float) -> str:
     """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
-    from cfmkit.export.union import ROUGH
     from cfmkit.solid.boundary_and_element_sizes import smallest_arc
 
-    if 0.0 < fillet < smallest_arc(ROUGH):
+    if 0.0 < fillet < smallest_arc(SHARE * FINE * thinnest):
         radius = format_short(fillet, "length")
         return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
     return sharp_inside(fillet, ())
@@ -470,7 +468,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
-    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet):
+    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet, _thinnest(solution.assembly)):
         yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():

@@ -170,7 +170,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
         )
         for number, one in enumerate(piece.held, start=1)
     ]
-    return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
+    return Part(rings_of((piece.contour,), about.thickness), about.thickness, about.width, law, (shuttle, *walls))
 
 
 def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
