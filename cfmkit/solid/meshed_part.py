@@ -27,12 +27,14 @@ from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.path_following import advanced, follow
 from cfmkit.solid.rigid_groups import Group, Supports, within
+from cfmkit.solid.sections_of_mesh import check_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
     from cfmkit.solid.mesh import TriangleMesh
@@ -114,6 +116,8 @@ class Part:
         Side of an element where the part is thick, in those of its thinnest place.
     obstacles : tuple of (n, 2) arrays
         Polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one.
+    sections : tuple of BeamSection
+        Of its beams: meshes must have their thickness.
     """
 
     rings: tuple[Ring, ...]
@@ -124,6 +128,7 @@ class Part:
     regions: tuple[tuple[FloatArray, float], ...] = ()
     largest: float = 1.0
     obstacles: tuple[FloatArray, ...] = ()
+    sections: tuple[BeamSection, ...] = ()
 
     @property
     def near(self) -> float:
@@ -144,6 +149,7 @@ class Part:
         across = self.thinnest / size if self.largest > 1.0 else across
         seams = [seam for place in self.places for seam in place.seams]
         grid = mesh(self.rings, self.largest * size, share, across, seams, self.near)
+        check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         unjudged = held | self._beside_clamps(grid, held)

@@ -27,7 +27,7 @@ from cfmkit.families.beam.network_from_spec import (
     thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import FINE, SHARE, drawing, regions, standing_frame
+from cfmkit.families.beam.outline import drawing, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -265,21 +265,22 @@ def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidS
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.boundary_and_element_sizes import with_arcs
-    from cfmkit.solid.meshed_part import TURN, HeldOrDriven, Part, largest_in, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
-    cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
+    drawn = drawing(_without_frame(spec, frame))
+    cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
         for one in regions(spec)
     ]
-    fillet, thinnest = (spec.mechanism.part or PartSpec()).fillet, _thinnest(assembly)
-    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut, thinnest))
-    return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
+    thinnest = _thinnest(assembly)
+    rings = rings_of(cut, thinnest)
+    largest = largest_in(rings, thinnest)
+    return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
 
 
 def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
@@ -289,7 +290,7 @@ def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
     part = spec.mechanism.part
     if not frame or part is None or part.frame is None:
         return spec
-    pads = [one for place in regions(spec) for one in place.shapes if len(one) == 4]
+    pads = [one for place in regions(spec) for one in place.shapes if place.padded]
     kept = outside([one.at for one in part.holes], frame, pads)
     holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
     alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
@@ -451,16 +452,6 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
-def _sharp(fillet: float, thinnest: float) -> str:
-    """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
-    from cfmkit.solid.boundary_and_element_sizes import smallest_arc
-
-    if 0.0 < fillet < smallest_arc(SHARE * FINE * thinnest):
-        radius = format_short(fillet, "length")
-        return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
-    return sharp_inside(fillet, ())
-
-
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
     if reported := _ended(solution):
@@ -468,7 +459,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
-    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet, _thinnest(solution.assembly)):
+    if reported := sharp_inside((spec.mechanism.part or PartSpec()).fillet, ()):
         yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
