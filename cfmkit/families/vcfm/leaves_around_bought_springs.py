@@ -35,8 +35,9 @@ from cfmkit.families.vcfm.leaf_sizing import (
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
-from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.guides import guide_words
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, guide_rod_for, nearest
+from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
@@ -83,25 +84,41 @@ class LeavesAroundSprings:
     half_beams: int
 
     @property
+    def deflection(self) -> float:
+        """Largest one of a spring, with the preload and at the end of the leaves' linear range [m]."""
+        return float(self.linear[1]) + self.target.preload_stroke
+
+    @property
+    def held_springs(self) -> BoughtSprings:
+        """The springs with a rod if they would buckle without a guide, and without one that they do not need."""
+        coil, springs = self.springs.coil, self.springs
+        if self.deflection <= springs.unguided:
+            free = springs.model_dump(exclude_unset=True, exclude={"guide_rod", "guide_tube"})
+            return type(springs).model_validate(free) if springs.is_guided else springs
+        if springs.is_guided or coil is None:
+            return springs
+        return type(springs).model_validate(springs.model_dump(exclude_unset=True) | {"guide_rod": guide_rod_for(coil)})
+
+    @property
     def label(self) -> str:
         """Number and name."""
         return f"{self.springs.count} x {self.springs.name or 'the spring'}"
 
-    def rank(self, wanted: VcfmDesign) -> tuple[float, float, int]:
-        """Return what springs that fit are sorted by: how far below the limit, length of leaves [m], number."""
+    def rank(self, wanted: VcfmDesign) -> tuple[bool, float, float, int]:
+        """Return what springs that fit are sorted by: guide, how far below the limit, length of leaves [m], number."""
         below = 0.0
         if wanted.rise is not None:
             below = 1.0 - self.target.height / wanted.rise
         elif wanted.preload is not None:
             below = 1.0 - self.target.preload_stroke / wanted.preload
-        return round(below, 6), float(self.leaf.length), self.springs.count
+        return self.held_springs.is_guided, round(below, 6), float(self.leaf.length), self.springs.count
 
 
 def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     """Return the design with leaves around springs of the catalogue, or around those of the mechanism.
 
-    Of springs that fit the one is taken whose rise, or preload, comes nearest to the largest that is allowed; where
-    neither is limited, the one with the shortest leaves.
+    Of springs that fit those come first that need no guide against buckling, and of these the one whose rise, or
+    preload, comes nearest to the largest that is allowed; if neither is limited, the one with the shortest leaves.
 
     Parameters
     ----------
@@ -169,11 +186,12 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
                 "initial_tension": offer.initial_tension if offer.kind == "extension" else 0.0,
                 "max_elongation": offer.largest,
                 "free_length": offer.free_length,
+                "body_length": None if offer.wound is not None else offer.body_length,
                 "outer_diameter": offer.outer_diameter,
                 "name": offer.name,
                 "wound": wire_of(offer),
                 "life": offer.life,
-            }
+            } | support_of(offer)
             known = {key: value for key, value in about.items() if value is not None}
             yield BoughtSprings.model_validate(known), offer
 
@@ -239,11 +257,12 @@ def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: floa
 
 def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
     """Return what springs miss with the leaves around them; None where they fit."""
-    springs, leaf, own = found.springs, found.leaf, found.target
-    most = float(found.linear[1]) + own.preload_stroke
+    springs, leaf = found.springs, found.leaf
+    most, held = found.deflection, found.held_springs
     limits = (
         ("deflected by", most, springs.max_elongation, "they allow"),
         ("deflected by", most, room_of_coils(springs), "their turns touch at"),
+        ("deflected by", most, np.inf if held.is_guided else held.unguided, "without a guide they buckle at"),
         ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
         ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
         ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
@@ -281,7 +300,7 @@ def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
     return spec.replace(
         {
             "mechanism.positive": None,
-            "mechanism.springs": found.springs.model_dump(exclude_unset=True),
+            "mechanism.springs": found.held_springs.model_dump(exclude_unset=True),
             "mechanism.bistable.half_beams": found.half_beams,
             "mechanism.bistable.length": float(leaf.length),
             "mechanism.bistable.angle": float(leaf.angle),
@@ -350,6 +369,8 @@ def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Des
         stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
         if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > NOTED * own.preload_stroke:
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
+    if words := guide_words(found.held_springs):
+        note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"
     made = completed(
         _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
     )

@@ -23,10 +23,12 @@ from cfmkit.specs.spec import (
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
+from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, Support, settle_rate
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
 
 
 LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
@@ -83,7 +85,7 @@ class Positive(Model):
         return self
 
 
-class BoughtSprings(Model):
+class BoughtSprings(Support):
     """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
 
     Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
@@ -102,6 +104,9 @@ class BoughtSprings(Model):
     free_length: PositiveLength | None = Field(
         None, description="relaxed length, for drawings and for the space required"
     )
+    body_length: PositiveLength | None = Field(
+        None, description="with the turns touching; default: of closed ends, from 'wound'"
+    )
     outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
     name: str | None = Field(None, min_length=1, description="designation, for the parts list")
     wound: SpringWire | None = Field(
@@ -114,7 +119,18 @@ class BoughtSprings(Model):
         settle_rate(self, self.kind)
         if self.initial_tension and self.kind == "compression":
             raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
+        self.check_guide(self.kind, self.coil, self.outer_diameter)
         return self
+
+    @property
+    def coil(self) -> Wound | None:
+        """Its wire, coil and turns; None if they are not stated."""
+        return None if self.wound is None else self.wound.wound(self.kind)
+
+    @property
+    def unguided(self) -> float:
+        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
+        return unguided_deflection(self.kind, self.free_length, self.coil, self.outer_diameter, self.seats)
 
     @property
     def rate(self) -> float:

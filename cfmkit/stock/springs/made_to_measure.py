@@ -1,19 +1,20 @@
 """Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
-The formulas and the wire are those of `cfmkit.stock.springs.helical_spring_formulas`, the share of the strength is that
-of the generic series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are
-close-wound, loops are as high as the inside of the coil.
+The formulas are those of `cfmkit.stock.springs.helical_spring_formulas`, the wire is music wire of the diameters in its
+table, the share of the strength is that of the generic series. Bodies are close-wound, loops are as high as the inside
+of the coil.
 """
 
 from __future__ import annotations
 
-from math import log2
+from math import log2, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -42,15 +43,14 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
     (690.0, 1.71, 15.3, 43)
     """
-    found = [_wound("extension", index, rate, stretch) for index in INDICES]
-    fitting = [one for one in found if loaded_length(one) <= room]
-    return min(fitting, key=lambda one: one.outer_diameter, default=None)
+    fitting = [spring for spring in _candidates("extension", rate, stretch) if loaded_length(spring) <= room]
+    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
 def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
     """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
 
-    None if there is none: the body would be longer.
+    None if there is none: the body, which is longest when it is wound up, would be longer.
 
     Examples
     --------
@@ -60,8 +60,9 @@ def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
-    found = [_wound("torsion", index, rate, turn) for index in INDICES]
-    return min((one for one in found if one.body_length <= room), key=lambda one: one.outer_diameter, default=None)
+    springs = _candidates("torsion", rate, turn)
+    fitting = [spring for spring in springs if spring.body_length_wound_up(turn) <= room]
+    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
 def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | None:
@@ -69,8 +70,8 @@ def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | 
 
     None if there is none: the coil would be wider.
     """
-    found = [_wound("torsion", index, rate, turn) for index in INDICES]
-    return min((one for one in found if one.outer_diameter <= widest), key=lambda one: one.body_length, default=None)
+    fitting = [spring for spring in _candidates("torsion", rate, turn) if spring.outer_diameter <= widest]
+    return min(fitting, key=lambda spring: spring.body_length, default=None)
 
 
 def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray) -> FloatArray:
@@ -95,7 +96,8 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
     rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     index = np.array(INDICES)[:, None]
-    ends = 1.0 + (0.0 if kind == "torsion" else 2.0 * (index - 1.0))
+    # in wires: one more than the turns, and what winds up, or both loops
+    ends = 1.0 + (deflection / (2.0 * pi) if kind == "torsion" else 2.0 * (index - 1.0))
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     each = rate * stress * np.maximum(deflection, 1e-12) / (share * tensile_strength(1e-3))
 
@@ -103,7 +105,8 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
         return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), FEWEST))
 
     # the thicker the wire, the stiffer, and the longer
-    low, thickest = np.full(each.shape, THINNEST / 1e-3), 1e3 * widest / (index + 1.0) + np.zeros(each.shape)
+    thickest = np.minimum(1e3 * widest / (index + 1.0), 1e3 * MUSIC_WIRE.thickest) + np.zeros(each.shape)
+    low = np.full(each.shape, THINNEST / 1e-3)
     high = np.maximum(thickest, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -116,6 +119,12 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
 def loaded_length(spring: Wound) -> float:
     """Return the length at rest with both loops [m]."""
     return spring.body_length + 2.0 * (spring.coil - spring.wire)
+
+
+def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
+    """Return the spring of each index whose wire is drawn so thick."""
+    springs = [_wound(kind, index, rate, deflection) for index in INDICES]
+    return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
 
 
 def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
