@@ -35,6 +35,9 @@ class Springs(Model):
     rest_length: PositiveLength | None = Field(
         None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
     )
+    initial_tension: Annotated[Force, Field(ge=0)] = Field(
+        0.0, description="force at which one spring begins to open: it pulls with so much more than its elongation says"
+    )
     max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed for a spring")
     name: str | None = Field(None, min_length=1, description="designation, for the parts list")
     wound: SpringWire | None = Field(
@@ -74,9 +77,22 @@ class Springs(Model):
             return sum(self.each)
         return self.each * (self.count or 1)
 
+    @property
+    def tension_stretch(self) -> float:
+        """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
+        if not self.initial_tension:
+            return 0.0
+        count = len(self.each) if isinstance(self.each, tuple) else self.count or 1
+        return count * self.initial_tension / self.total
+
     def scaled_to(self, total: float) -> Springs:
-        """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any."""
-        made = {} if self.wound is None else {"wound": None, "name": None, "life": None}
+        """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any.
+
+        Their initial tension is in proportion, if they have any.
+        """
+        made: dict[str, Any] = {} if self.wound is None else {"wound": None, "name": None, "life": None}
+        if self.initial_tension:
+            made["initial_tension"] = self.initial_tension * total / self.total
         if isinstance(self.stiffness, tuple):
             values = tuple(value * total / self.total for value in self.stiffness)
             return self.model_copy(update={"stiffness": values} | made)
@@ -304,14 +320,19 @@ class Mechanism(Model):
         return self.springs.preload or 0.0
 
     @property
+    def effective_preload(self) -> float:
+        """Elongation at the start of springs without initial tension that pull as hard as these [m]."""
+        return self.preload + self.springs.tension_stretch
+
+    @property
     def springs_rest(self) -> float:
-        """Half the distance of the roller axes with the springs at rest [m]."""
-        return self.rest_half_width - 0.5 * self.preload
+        """Half the distance of the roller axes at which the springs, extended as they are, would pull no more [m]."""
+        return self.rest_half_width - 0.5 * self.effective_preload
 
     @property
     def springs_rest_as_cut(self) -> float:
-        """Half the distance of the roller axes at which the springs are at rest that the profile is cut for [m]."""
-        preload = self.preload if self.profile.preload is None else self.profile.preload
+        """The same distance that the profile is cut for [m]."""
+        preload = self.effective_preload if self.profile.preload is None else self.profile.preload
         return (self.profile.rest_half_width or self.rest_half_width) - 0.5 * preload
 
     @field_validator("springs", mode="before")
