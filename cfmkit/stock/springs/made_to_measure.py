@@ -28,6 +28,9 @@ THINNEST = 0.2e-3
 FEWEST = 3.0
 """Turns below which the loops decide the rate."""
 
+PIN_SHARE = 0.9
+"""Diameter of a pin over the inside of a torsion spring that is wound up: what spring makers leave as clearance."""
+
 HALVINGS = 16
 """Of the wire's diameter, where the length decides it."""
 
@@ -41,36 +44,38 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     --------
     >>> spring = extension_spring(690.0, 0.132, 0.136)
     >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (690.0, 1.71, 15.3, 43)
+    (690.0, 1.68, 15.1, 48)
     """
     fitting = [spring for spring in _candidates("extension", rate, stretch) if loaded_length(spring) <= room]
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
+def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> Wound | None:
     """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
 
-    None if there is none: the body, which is longest when it is wound up, would be longer.
+    None if there is none: the body, which is longest when it is wound up, would be longer, or the inside, which is
+    narrowest then, too narrow for a pin of that diameter [m].
 
     Examples
     --------
     >>> spring = torsion_spring(0.05, 1.0, 0.05)
     >>> round(spring.rate, 9), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (0.05, 0.77, 4.6, 6)
+    (0.05, 0.76, 4.5, 6)
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
-    springs = _candidates("torsion", rate, turn)
+    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
     fitting = [spring for spring in springs if spring.body_length_wound_up(turn) <= room]
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | None:
+def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float = 0.0) -> Wound | None:
     """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
 
-    None if there is none: the coil would be wider.
+    None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
     """
-    fitting = [spring for spring in _candidates("torsion", rate, turn) if spring.outer_diameter <= widest]
+    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
+    fitting = [spring for spring in springs if spring.outer_diameter <= widest]
     return min(fitting, key=lambda spring: spring.body_length, default=None)
 
 
@@ -125,6 +130,11 @@ def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
     """Return the spring of each index whose wire is drawn so thick."""
     springs = [_wound(kind, index, rate, deflection) for index in INDICES]
     return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
+
+
+def _on_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
+    """Return the torsion springs that fit over a pin [m] when they are wound up by an angle [rad]."""
+    return [spring for spring in springs if PIN_SHARE * spring.inner_diameter_wound_up(turn) >= pin]
 
 
 def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
