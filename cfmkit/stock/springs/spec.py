@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
@@ -51,11 +52,17 @@ class WireLimits(Model):
         description="S-N points or Basquin's line of the wire, in terms of that stress, for the life; needs the same",
     )
 
+    @model_validator(mode="after")
+    def _moduli_are_known(self) -> Self:
+        for key in ("shear_modulus", "youngs_modulus"):
+            if getattr(self, key) is None:
+                # past the frozen model, and not counted as set: another material then has others
+                object.__setattr__(self, key, getattr(WIRES[self.material], key))
+        return self
+
     def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> Wound:
         """Return a spring of this wire."""
-        known = WIRES[self.material]
-        shear, young = self.shear_modulus or known.shear_modulus, self.youngs_modulus or known.youngs_modulus
-        return Wound(kind, wire, coil, turns, shear, young, self.material)
+        return Wound(kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self.material)
 
     def check_wire(self, wire: float | None, coil: float | None) -> None:
         """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn.
@@ -64,8 +71,8 @@ class WireLimits(Model):
         """
         if wire and coil and coil < 2.0 * wire:
             raise ValueError("'coil' is the mean diameter: at least twice the wire's")
-        stated = "material" in self.model_fields_set
-        if wire is None or (not stated and (self.shear_modulus or self.youngs_modulus)):
+        own = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
+        if wire is None or (own and "material" not in self.model_fields_set):
             return
         try:
             WIRES[self.material].check_diameter(wire)
@@ -131,13 +138,21 @@ class SpringWire(WireLimits):
     def check_rate(self, kind: Kind, stated: float | None) -> None:
         """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
         if stated is not None and abs(stated / self.wound(kind).rate - 1.0) > AGREE:
-            raise ValueError(_disagree(self.wound(kind).rate / stated))
+            raise ValueError(_disagree(self.wound(kind), stated))
 
 
-def _disagree(times: float) -> str:
+def _disagree(wound: Wound, stated: float) -> str:
+    """Return what is wrong with a rate that is not that of wire, coil and turns."""
+    alike = [
+        one.name
+        for one in WIRES.values()
+        if abs(stated / replace(wound, shear_modulus=one.shear_modulus, youngs_modulus=one.youngs_modulus).rate - 1.0)
+        <= AGREE
+    ]
+    other = f" (that of {', '.join(alike)} agrees)" if alike else ""
     return (
-        f"wire, coil and turns give {times:.3g} times the rate that is stated: leave one of them out, or give the "
-        "wire's modulus"
+        f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
+        f"give the wire's 'material'{other} or modulus"
     )
 
 
@@ -212,7 +227,7 @@ class CatalogueSpring(WireLimits, Support):
                 "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
             )
         if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
-            raise ValueError(_disagree(self.wound.rate / stated))
+            raise ValueError(_disagree(self.wound, stated))
         return self
 
     def _check_sizes(self) -> None:
@@ -229,6 +244,9 @@ class CatalogueSpring(WireLimits, Support):
         least = wound.turns * wound.wire
         if self.body_length is not None and self.body_length < least * (1 - AGREE):
             raise ValueError(f"'body_length' is less than the turns on each other: {format_short(least, 'length')}")
+        room = None if self.free_length is None else self.free_length - (self.body_length or least * (1 - AGREE))
+        if self.kind == "compression" and self.max_elongation and room and self.max_elongation > room * (1 + 1e-9):
+            raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
         if self.kind == "extension" and self.free_length is not None and self.free_length < least * (1 - AGREE):
             raise ValueError(f"'free_length' is less than the turns on each other: {format_short(least, 'length')}")
 
