@@ -108,6 +108,7 @@ COIL = {"wire": "1 mm", "coil": "10 mm", "turns": 20}
 LINES = [
     # the line of a report; 0.5094 N/mm is 81.5 GPa d^4/(8 D^3 n)
     {"kind": "extension", "stiffness": "0.5094 N/mm", **COIL},
+    {"kind": "extension", "stiffness": "0.5094 N/mm", **COIL, "initial_tension": "3.2 N", "free_length": "39 mm"},
     # the same spring of 302 by Shigley's 69 GPa and by a maker's 70 GPa
     {"kind": "extension", "stiffness": "0.431 N/mm", **COIL, "material": "stainless-302"},
     {"kind": "extension", "stiffness": "0.4375 N/mm", **COIL, "material": "stainless-302"},
@@ -139,6 +140,7 @@ def test_a_correct_line_of_a_catalogue_is_accepted(line):
         ({"kind": "compression", "free_length": "40 mm", "max_elongation": "30 mm"}, "more than 'free_length' leaves"),
         ({"kind": "compression", "guide_rod": "9.5 mm"}, "'guide_rod' must be thinner"),
         ({"kind": "compression", "guide_tube": "10 mm"}, "'guide_tube' must be wider"),
+        ({"initial_tension": "20 N"}, "'initial_tension' of 20 N cannot be wound"),
         ({"guide_rod": "7 mm"}, "'guide_rod' is for compression springs"),
         ({"kind": "compression", "initial_tension": "1 N"}, "'initial_tension' is of extension springs"),
     ],

@@ -24,7 +24,7 @@ from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, Support, settle_rate
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringSupport, SpringWire, settle_rate
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -85,7 +85,7 @@ class Positive(Model):
         return self
 
 
-class BoughtSprings(Support):
+class BoughtSprings(SpringSupport):
     """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
 
     Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is

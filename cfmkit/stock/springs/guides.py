@@ -9,10 +9,10 @@ from cfmkit.stock.springs.offer_type_and_generic_series import guide_rod_for
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import Wound
-    from cfmkit.stock.springs.spec import Support
+    from cfmkit.stock.springs.spec import SpringSupport
 
 
-def guide_words(support: Support) -> list[str]:
+def guide_words(support: SpringSupport) -> list[str]:
     """Return what a parts list says of the guide of a spring; empty if it has none."""
     words = []
     if support.guide_rod is not None:

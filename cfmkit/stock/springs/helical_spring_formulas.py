@@ -136,6 +136,21 @@ class Wound:
         return buckling_deflection(free_length, self.coil, seats, (self.youngs_modulus, self.shear_modulus))
 
     @property
+    def usual_initial_tension(self) -> tuple[float, float]:
+        """Range of initial tension that extension springs of this index are easily wound with [N] [Sh, eq. 10-41].
+
+        Examples
+        --------
+        >>> low, high = Wound("extension", 1e-3, 10e-3, 20.0).usual_initial_tension
+        >>> round(low, 2), round(high, 2)
+        (2.38, 3.97)
+        """
+        stress = 231e6 / math.exp(0.105 * self.index)
+        spread = max(6.9e6 * (4.0 - (self.index - 3.0) / 6.5), 0.0)
+        load = math.pi * self.wire**3 / (8.0 * self.coil)
+        return load * max(stress - spread, 0.0), load * (stress + spread)
+
+    @property
     def fitting_rod(self) -> float:
         """Diameter of the thickest rod that guides the spring with clearance [m]."""
         inner = self.inner_diameter

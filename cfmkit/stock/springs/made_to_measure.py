@@ -141,7 +141,7 @@ def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
     """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
     unit = Wound(kind, 1e-3, index * 1e-3, FEWEST)
     # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
-    # with the 0.163rd power: with 1 mm as the unit of the wire
+    # with the 0.145th power: with 1 mm as the unit of the wire
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     exponent = (3.0 if kind == "torsion" else 2.0) - falls

@@ -28,6 +28,10 @@ AGREE = 0.1
 """A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
 
 
+TIGHTEST = 3.0
+"""Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
+none has more than this."""
+
 MIDDLE_OF_WIRE = 0.5
 """Wire diameters by which a stated outer diameter may differ from that of coil and wire: half of what tells it from the
 mean diameter."""
@@ -82,7 +86,7 @@ class WireLimits(Model):
             raise ValueError(f"{error}; state {others}the wire's own moduli") from None
 
 
-class Support(Model):
+class SpringSupport(Model):
     """How a compression spring is kept from buckling."""
 
     seats: Seats = Field(
@@ -156,8 +160,23 @@ def _disagree(wound: Wound, stated: float) -> str:
     )
 
 
+def check_initial_tension(wound: Wound | None, tension: float) -> None:
+    """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
+    if wound is None or not tension:
+        return
+    low, high = (format_short(one, "force") for one in wound.usual_initial_tension)
+    if tension > TIGHTEST * wound.usual_initial_tension[1]:
+        stated = format_short(tension, "force")
+        raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
+
+
 def settle_rate(springs: Any, kind: Kind) -> None:
-    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated."""
+    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
+
+    Their initial tension must be one that such a wire is wound with.
+    """
+    if springs.wound is not None:
+        check_initial_tension(springs.wound.wound(kind), springs.initial_tension)
     if springs.stiffness is None:
         if springs.wound is None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
@@ -168,7 +187,7 @@ def settle_rate(springs: Any, kind: Kind) -> None:
             springs.wound.check_rate(kind, one)
 
 
-class CatalogueSpring(WireLimits, Support):
+class CatalogueSpring(WireLimits, SpringSupport):
     """A spring that can be bought."""
 
     name: str = Field(min_length=1, description="part number")
@@ -237,6 +256,7 @@ class CatalogueSpring(WireLimits, Support):
             raise ValueError(f"'initial_tension' is of extension springs; this is of kind {self.kind!r}")
         if wound is None:
             return
+        check_initial_tension(wound, self.initial_tension)
         outer = self.outer_diameter
         if outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
             reported = format_short(wound.outer_diameter, "length")

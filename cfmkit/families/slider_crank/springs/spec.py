@@ -10,7 +10,7 @@ from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength,
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire, Support
+from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringSupport, SpringWire
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -24,7 +24,7 @@ ExtensionRate = Annotated[Stiffness, Field(ge=0)]
 JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
 
 
-class Bought(Support):
+class Bought(SpringSupport):
     """A spring of one leg that is bought."""
 
     at: JointName = Field(description="the joint that it acts at")
