@@ -309,11 +309,11 @@ def _with_spring(
     springs = Springs(
         stiffness=item.rate,
         count=count,
-        initial_tension=item.initial_tension,
         max_elongation=item.largest,
         name=item.name,
         wound=wire_of(item),
         life=item.life,
+        **({"initial_tension": item.initial_tension} if item.initial_tension else {}),
     )
     constant = pull / (4.0 * springs.total)
     law = _law(spec, target, constant, factor, preload)
@@ -488,7 +488,7 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
         "rest_half_width": mechanism.rest_half_width,
         "roller_radius": mechanism.roller_radius,
     }
-    springs = choice.springs.model_dump(exclude_none=True, exclude_defaults=True)
+    springs = choice.springs.model_dump(exclude_none=True, exclude_unset=True)
     for stated in ("preload", "rest_length"):  # what the file says is replaced by what was chosen, nothing included
         springs.pop(stated, None)
     if choice.preload:

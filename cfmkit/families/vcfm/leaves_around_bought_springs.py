@@ -75,6 +75,8 @@ class LeavesAroundSprings:
         Where the leaves' stiffness is constant [m].
     half_beams : int
         Number of leaves.
+    listed : bool
+        Whether the springs are from a catalogue, and not those of the mechanism.
     """
 
     springs: BoughtSprings
@@ -82,6 +84,7 @@ class LeavesAroundSprings:
     leaf: LeafStrip
     linear: tuple[float, float]
     half_beams: int
+    listed: bool = False
 
     @property
     def deflection(self) -> float:
@@ -90,14 +93,18 @@ class LeavesAroundSprings:
 
     @property
     def held_springs(self) -> BoughtSprings:
-        """The springs with a rod if they would buckle without a guide, and without one that they do not need."""
-        coil, springs = self.springs.coil, self.springs
-        if self.deflection <= springs.unguided:
-            free = springs.model_dump(exclude_unset=True, exclude={"guide_rod", "guide_tube"})
-            return type(springs).model_validate(free) if springs.is_guided else springs
-        if springs.is_guided or coil is None:
-            return springs
-        return type(springs).model_validate(springs.model_dump(exclude_unset=True) | {"guide_rod": guide_rod_for(coil)})
+        """The springs as they are to be built: with a rod if they would buckle without a guide.
+
+        What a catalogue offers as a guide is left out if the springs do not need one.
+        """
+        springs, coil, buckles = self.springs, self.springs.coil, self.deflection > self.springs.unguided
+        known = springs.model_dump(exclude_unset=True)
+        if buckles and not springs.is_guided and coil is not None:
+            return type(springs).model_validate(known | {"guide_rod": guide_rod_for(coil)})
+        if self.listed and springs.is_guided and not buckles:
+            plain = {key: value for key, value in known.items() if key not in ("guide_rod", "guide_tube")}
+            return type(springs).model_validate(plain)
+        return springs
 
     @property
     def label(self) -> str:
@@ -242,7 +249,7 @@ def _around(
             return Miss(label, 1.0, problem.finding.message)
     else:
         leaf = _wide_enough(spec, own, thickness, length)
-    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count)
+    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count, offer is not None)
     return _missed(spec, target, found, offer) or found
 
 
@@ -369,7 +376,7 @@ def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Des
         stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
         if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > NOTED * own.preload_stroke:
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
-    if words := guide_words(found.held_springs):
+    if (words := guide_words(found.held_springs)) and found.deflection > found.springs.unguided:
         note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"
     made = completed(
         _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
