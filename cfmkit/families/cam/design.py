@@ -42,13 +42,14 @@ from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
 from cfmkit.results import OVERWRITTEN, Design, Finding, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
-from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
+    from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism
+    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Loads
     from cfmkit.families.run_control import Run
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
@@ -295,7 +296,7 @@ def _with_spring(
     Between axes that are farther apart than its free length a spring is stretched at the start; its initial tension
     acts like more of that.
     """
-    from cfmkit.families.cam.spec import Springs
+    from cfmkit.families.cam.springs_spec import Springs
 
     label, (pull, factor, smallest) = f"{count} x {item.name}", wanted
     opened = item.initial_tension / item.rate
@@ -306,15 +307,7 @@ def _with_spring(
             text = f"too long ({mm(item.free_length)} relaxed between axes {mm(room)} apart at the start)"
             return Miss(label, item.free_length / room - 1.0, text)
         preload = room - item.free_length + opened
-    springs = Springs(
-        stiffness=item.rate,
-        count=count,
-        max_elongation=item.largest,
-        name=item.name,
-        wound=wire_of(item),
-        life=item.life,
-        **({"initial_tension": item.initial_tension} if item.initial_tension else {}),
-    )
+    springs = Springs.of(item, count)
     constant = pull / (4.0 * springs.total)
     law = _law(spec, target, constant, factor, preload)
     if smallest is not None and _undercuts(spec, law, smallest):

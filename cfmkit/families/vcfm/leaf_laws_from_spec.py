@@ -17,8 +17,9 @@ from cfmkit.families.vcfm.leaves.v_beam import VBeam
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Spring
-    from cfmkit.families.vcfm.spec import Bistable, BoughtSprings, LeafMaterial, Positive, VcfmSpec
+    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
 
 
 RIM = 0.75
