@@ -75,7 +75,8 @@ def test_a_spring_shorter_than_its_place_is_tight_at_the_start_and_the_cam_is_cu
         "counts": (2,),
     }
     found = chosen((bought,), rolling_friction=0)
-    assert found.spec.mechanism.springs.preload == pytest.approx(0.008)
+    assert found.spec.mechanism.springs.preload == pytest.approx(0.006)
+    assert found.spec.mechanism.profile.preload == pytest.approx(0.006 + 1.38 / 690.0)
     np.testing.assert_allclose(analyze(found.spec).curve.force, 50.0, rtol=1e-9)
 
 
@@ -119,8 +120,8 @@ def test_a_list_may_be_a_file(tmp_path):
     pulled = offers(source, "extension")
     assert [(one.name, one.counts) for one in pulled] == [("E-1", (1, 2)), ("E-2", (2,))]
     assert pulled[0].rate == pytest.approx(550.0)
-    assert pulled[1].rate == pytest.approx(72e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
-    assert offers(source, "torsion")[0].rate == pytest.approx(190e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
+    assert pulled[1].rate == pytest.approx(81.5e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
+    assert offers(source, "torsion")[0].rate == pytest.approx(206e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
 
 
 @pytest.mark.parametrize(
@@ -363,4 +364,4 @@ def test_a_pair_needs_every_spring_twice():
     spec, _ = cranked()
     pair = spec.replace({"mechanism.copies": "mirrored"})
     counts = [family("slider-crank").analyze(one, Run()).tables["parts"]().columns[2].cells() for one in (spec, pair)]
-    assert counts == [[2, 1, 1], [4, 2, 2]]
+    assert counts == [[2, 2, 2], [4, 4, 4]]

@@ -249,7 +249,9 @@ def springs(result: Result) -> Figure:
     diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
     figure = diagram_figure(Heading.of(result, "elongation of the springs"), [diagram], right_mm=17.0)
     stiffness, count = float(to_border(solution.assembly.loads.stiffness, "stiffness")), spring_count(solution)
-    right_axis(figure.axes[0], stiffness, f"force of {'the spring' if count == 1 else f'the {count} springs'} [N]")
+    words = "the spring" if count == 1 else f"the {count} springs"
+    tension = count * solution.assembly.spec.mechanism.springs.initial_tension
+    right_axis(figure.axes[0], stiffness, f"force of {words} [N]", float(to_border(tension, "force")))
     return figure
 
 

@@ -243,8 +243,9 @@ def _dead_point(solution: Solution) -> Iterator[Finding]:
 
 def _travel_at(solution: Solution, elongation: float) -> float:
     """Return the travel at which the springs are stretched by so much [m]."""
-    track, rest = solution.assembly.track, solution.assembly.loads.rest_half_width
-    return min(track.slider_at(rest + 0.5 * elongation) - track.start, float(solution.travel[-1]))
+    track, opened = solution.assembly.track, solution.assembly.spec.mechanism.springs.tension_stretch
+    half_width = solution.assembly.loads.rest_half_width + 0.5 * (elongation + opened)
+    return min(track.slider_at(half_width) - track.start, float(solution.travel[-1]))
 
 
 def _springs(solution: Solution) -> Iterator[Finding]:
@@ -282,7 +283,8 @@ def _lift_off(solution: Solution) -> Iterator[Finding]:
     loads = solution.assembly.loads
     beside = abs(loads.sideways[0])
     if beside and beside > float(spring_force(solution.states, loads)[0]):
-        released = _travel_at(solution, beside / loads.stiffness)
+        opened = loads.stiffness * solution.assembly.spec.mechanism.springs.tension_stretch
+        released = _travel_at(solution, (beside - opened) / loads.stiffness)
         yield finding(
             "lift_off",
             f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "

@@ -19,7 +19,8 @@ import numpy as np
 
 from cfmkit.families.cam.bounding_box import depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
-from cfmkit.families.cam.spec import CamSpec, Springs
+from cfmkit.families.cam.spec import CamSpec
+from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place

@@ -94,7 +94,10 @@ DEFINITIONS = {
         "largest force on the way up while the roller pivots on the corner; none if friction holds it there",
     ),
     "jam_travel": ("length", "travel at the start over which the mechanism self-locks: no force moves the slider up"),
-    "spring_elongation_max": ("length", "largest elongation of the springs"),
+    "spring_elongation_max": (
+        "length",
+        "largest elongation of the springs from their relaxed length; initial tension is no elongation",
+    ),
     "contact_force_max": ("force", "largest contact force between a roller and the cam"),
     "pressure_angle_max": (
         "angle",
@@ -200,7 +203,9 @@ def _wire(solution: Solution) -> dict[str, Quantity]:
     wire = springs.wound
     wound = None if wire is None else wire.wound("extension")
     fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
-    least, most = (stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max()))
+    least, most = (
+        springs.initial_tension * (end >= 0.0) + stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max())
+    )
     return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
 
 

@@ -134,7 +134,8 @@ class Solution(ShortRepr):
     @cached_property
     def elongation(self) -> FloatArray:
         """Elongation of the springs [m]."""
-        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width)
+        opened = self.assembly.spec.mechanism.springs.tension_stretch
+        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened
 
     @property
     def corner_travel(self) -> float:
@@ -224,7 +225,8 @@ class Built(ShortRepr):
     @property
     def elongation(self) -> FloatArray:
         """Elongation of the springs, (n,) [m]."""
-        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width
+        opened = self.assembly.spec.mechanism.springs.tension_stretch
+        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width - opened
 
     def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""

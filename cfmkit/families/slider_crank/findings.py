@@ -32,6 +32,8 @@ FINDINGS = {
     "crank is",
     "effort_changes_sign": "the force or torque changes sign within the window",
     "joint_overrotated": "a spring is deflected beyond its limit",
+    "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
+    "spring_binds_on_pin": "a torsion spring becomes narrower than its pin when it is wound up",
     "infeasible_targets": "no springs meet the targets of the design",
     "spring_at_bound": "a spring rate is at one of its bounds",
     "spring_dropped": "the best rate of a spring is zero: the design omits it",

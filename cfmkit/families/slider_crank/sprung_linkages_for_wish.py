@@ -280,20 +280,20 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
     turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
     pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
-    part = spec.mechanism.part
+    part, pin = spec.mechanism.part, spec.mechanism.pins.diameter if spec.mechanism.pins else 0.0
     deep = room = _depth_of_springs(wish, (part.sheet if part else None) or 0.0)
     if wish.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
-        least = shortest_torsion_spring(*turns["pivot"], widest)
-        deep = room - (0.0 if least is None else least.body_length)
+        least = shortest_torsion_spring(*turns["pivot"], widest, pin)
+        deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
     bought: dict[str, Wound] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and wish.depth is not None:
-            deep = room - max((height_of(other, coil) for other, coil in bought.items()), default=0.0)
+            deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
         if name == "slider":
             coil = extension_spring(*turns[name], rest if pulled else 0.0)
         else:
-            coil = torsion_spring(*turns[name], deep)
+            coil = torsion_spring(*turns[name], deep, pin)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil

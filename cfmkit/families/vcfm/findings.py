@@ -62,6 +62,7 @@ FINDINGS = {
     "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "spring_overstretched": "bought springs are deflected beyond their limit",
+    "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
     "spring_slack": "bought springs are slack over a part of the travel",
     "no_spring_fits": "no spring of the catalogue fits",
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
@@ -288,8 +289,8 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
 
 
 def _bought_springs(solution: Solution) -> Iterator[Finding]:
-    for name, reported in spring_faults(solution):
-        yield finding(name, reported)
+    for name, reported, *cures in spring_faults(solution):
+        yield finding(name, reported, *cures)
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:

@@ -161,12 +161,11 @@ def _bought(solution: Solution) -> dict[str, Quantity]:
     springs = solution.spec.mechanism.springs
     if springs is None:
         return {}
-    wound = None if springs.wound is None else springs.wound.wound(springs.kind)
     fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
     used = []
     for push in solution.pushes:
         least, most = (springs.load(float(place) + push.preload) for place in (push.travel[0], push.travel[-1]))
-        used.append(SpringInUse(wound, least, most, fatigue, springs.life))
+        used.append(SpringInUse(springs.coil, least, most, fatigue, springs.life))
     farthest = max(float(push.travel[-1]) + push.preload for push in solution.pushes)
     return {"spring_deflection_max": _quantity("spring_deflection_max", max(farthest, 0.0))} | wire_quantities(used)
 

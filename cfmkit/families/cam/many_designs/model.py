@@ -140,7 +140,7 @@ def _symmetric_closed(spec: CamSpec) -> bool:
         and not (mechanism.stops or mechanism.envelope)
         and not (mechanism.pins or mechanism.bearings or mechanism.guide)
         and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
-        and not (mechanism.preload or profile.preload)
+        and not (mechanism.effective_preload or profile.preload)
         and profile.friction == 0
         and profile.slope_factor == 1
         and profile.offset == 0
@@ -217,6 +217,8 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
     if mechanism.pins or mechanism.bearings or mechanism.guide or (spec.gravity and mechanism.mounting):
         return False
     if profile.preload is None and mechanism.preload:  # the cam follows what its springs have at the start
+        return False
+    if mechanism.springs.initial_tension:  # how much elongation that is depends on the stiffness
         return False
     if spec.fidelity != "quasi-static" or analysis.manufacturing or analysis.path_method != "quadrature":
         return False

@@ -34,6 +34,7 @@ from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.parts_list import BoughtPart, listed
+from cfmkit.stock.springs.guides import guide_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -102,9 +103,9 @@ def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
     for one in mechanism.springs.bought:
         value = getattr(mechanism.springs, one.at)
         rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
-        kind = "spring" if one.at == "slider" else "torsion spring"
-        place = one.at.replace("_", " ")
-        found.append(BoughtPart(place, one.name, one.count * mechanism.sets, f"{kind}, {rate} of all in one leg"))
+        kind = f"{one.loaded or ''} spring".strip() if one.at == "slider" else "torsion spring"
+        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(one)])
+        found.append(BoughtPart(one.at.replace("_", " "), one.name, one.count * mechanism.sets, data))
     if mechanism.pins:
         found.append(BoughtPart("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
     return tuple(found)

@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ EYE_SHARE, HOLE_SHARE = 0.08, 0.04
 """Radii of eyes, which are half as wide as links, and of pin holes in lengths of the shorter link, where no pins are
 stated."""
 
+PIN_IN_COIL = 0.8
+"""Diameter of a pin that is not stated over the inside of the relaxed spring around it: wound up that is narrower."""
+
 EYE_OF_HOLE = 2.0
 """Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
 
@@ -30,7 +34,9 @@ def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
     linkage = linkage_of(spec.mechanism)
     short = min(linkage.crank, linkage.coupler)
     pins = spec.mechanism.pins
-    hole = HOLE_SHARE * short if pins is None else 0.5 * pins.diameter
+    coils = [coil for name in JOINTS[:3] for coil in spec.mechanism.springs.coils_at(name)]
+    around = min((0.5 * PIN_IN_COIL * coil.inner_diameter for coil in coils), default=short)
+    hole = min(HOLE_SHARE * short, around) if pins is None else 0.5 * pins.diameter
     return max(EYE_SHARE * short, EYE_OF_HOLE * hole), hole
 
 
