@@ -14,10 +14,12 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import table
+from cfmkit.experiment.coverage import LARGEST_HOLE
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
@@ -55,13 +57,18 @@ class MeasureReport(ShortRepr):
         """What the user must know of recording and window."""
         return (*self.source.warnings, *self.numbers.warnings)
 
+    @property
+    def status(self) -> Status:
+        """Partial where some numbers cannot be known."""
+        return Status.PARTIAL if self.numbers.holes else Status.COMPLETE
+
     @cached_property
     def data(self) -> dict[str, Any]:
         """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
         source, low_pass = self.source, self.source.low_pass
         return {
-            "status": "complete",
-            "message": "",
+            "status": self.status.key,
+            "message": self.numbers.shortfall,
             "metrics": metrics_json(self.numbers.raw),
             "requirements": [],
             "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
@@ -82,11 +89,68 @@ def _ends(report: MeasureReport) -> dict[str, Any]:
     return {"from": low, "to": high, "unit": border_unit(dimension)}
 
 
+def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
+    """Return what metrics.json says of one specimen, or of several: their metrics by name as ``force_mean[A,load]``."""
+    if len(reports) == 1:
+        return next(iter(reports.values())).data
+    each = {name: report.data for name, report in reports.items()}
+    short = {name: data["message"] for name, data in each.items() if data["message"]}
+    return {
+        "status": (Status.PARTIAL if short else Status.COMPLETE).key,
+        "message": "; ".join(f"{name}: {message}" for name, message in short.items()),
+        "metrics": _tagged(each, "metrics"),
+        "requirements": [],
+        "warnings": [
+            {"name": item["name"], "message": f"{name}: {item['message']}"}
+            for name, data in each.items()
+            for item in data["warnings"]
+        ],
+        "metrics_filtered": _tagged(each, "metrics_filtered"),
+        "groups": {name: _about(data) for name, data in each.items()},
+    }
+
+
+def _tagged(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
+    """Return the metrics of all specimens, each with its specimen in brackets."""
+    found = {}
+    for group, data in each.items():
+        for name, value in data[key].items():
+            metric, branch = split_name(name)
+            found[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
+    return found
+
+
+def _about(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+
+
 def report_on(
-    source: MeasuredCurves, frame: MeasuringFrame | None = None, window: Window | None = None
+    source: MeasuredCurves,
+    frame: MeasuringFrame | None = None,
+    window: Window | None = None,
+    largest_hole: float = LARGEST_HOLE,
 ) -> MeasureReport:
     """Return the report on a measured mechanism."""
-    return MeasureReport(source, numbers_of(source, frame, window))
+    return MeasureReport(source, numbers_of(source, frame, window, largest_hole))
+
+
+def _stacked(tables: Mapping[str, Table]) -> Table:
+    """Return the tables of several specimens as one, the specimen first; that of one as it is."""
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    names = list(dict.fromkeys(column.name for table in tables.values() for column in table.columns))
+    columns = [TableColumn("group", tuple(name for name, table in tables.items() for _ in range(_rows(table))))]
+    for name in names:
+        values: list[Any] = []
+        for one in tables.values():
+            found = next((column.values for column in one.columns if column.name == name), None)
+            values += [""] * _rows(one) if found is None else list(found)
+        columns.append(TableColumn(name, tuple(values)))
+    return Table(tuple(columns))
+
+
+def _rows(table: Table) -> int:
+    return len(table.columns[0].values)
 
 
 def curves_table(source: MeasuredCurves) -> Table:
@@ -127,13 +191,15 @@ def _column_name(name: str) -> str:
     return f"{metric} {branch}" if branch else metric
 
 
-def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = None) -> Iterator[tuple[str, bytes]]:
+def files(
+    reports: Mapping[str, MeasureReport], plots: bool = True, form: FigureForm | None = None
+) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a measurement as (name below the folder, content).
 
     Parameters
     ----------
-    report : MeasureReport
-        Of one recording.
+    reports : mapping of str to MeasureReport
+        By specimen.
     plots : bool
         Whether to draw.
     form : FigureForm, optional
@@ -141,14 +207,18 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
     """
     from cfmkit.tables.json_writing import json_bytes
 
-    yield "curve.csv", to_csv(curves_table(report.source))
-    yield "cycles.csv", to_csv(cycles_table(report))
-    yield "metrics.json", json_bytes(report.data)
+    yield "curve.csv", to_csv(_stacked({name: curves_table(report.source) for name, report in reports.items()}))
+    yield "cycles.csv", to_csv(_stacked({name: cycles_table(report) for name, report in reports.items()}))
+    yield "metrics.json", json_bytes(data_of(reports))
     if plots:
         from cfmkit.experiment.figures import figures
         from cfmkit.plots.figure_options import PLAIN
 
-        yield from (form or PLAIN).files(figures(report.source, report.numbers))
+        for number, report in enumerate(reports.values(), 1):
+            drawn = figures(report.source, report.numbers)
+            yield from (form or PLAIN).files(
+                drawn if len(reports) == 1 else {f"{k}-{number}": v for k, v in drawn.items()}
+            )
 
 
 def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str, Any]:

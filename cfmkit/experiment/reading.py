@@ -221,7 +221,10 @@ def read_recordings(
             f"{name}: --group: {shown(column.name)} is nowhere {shown(value)}; there are {_options(key, parts)}"
         )
     chosen = {value: parts[value]} if value else parts
-    return {item: _recording(part, roles, encoding, f"{name}, {column.name} {item}") for item, part in chosen.items()}
+    total = sum(len(part.rows) for part in parts.values())
+    return {
+        item: _recording(part, roles, encoding, f"{name}, {column.name} {item}", total) for item, part in chosen.items()
+    }
 
 
 TABLE, ONE = "table", "none"
@@ -240,15 +243,16 @@ def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, na
     names = [str(number + 1) for number in range(len(tables))]
     if key != TABLE or (value and value not in names):
         places = ", ".join(str(table.rows[0] + 1) for table in tables)
+        choices = _options(TABLE, names)
         raise DataError(
-            f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {_options(TABLE, names)}"
+            f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {choices}"
         )
     chosen = [value] if value else names
     found = {}
     for item in chosen:
         table = tables[int(item) - 1]
         roles = roles_of(table.numeric, table.columns, name)
-        found[item] = _recording(table, roles, encoding, f"{name}, table {item}")
+        found[item] = _recording(table, roles, encoding, f"{name}, table {item}", sum(len(one.rows) for one in tables))
     return found
 
 
@@ -291,11 +295,14 @@ def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo |
     return None
 
 
-def _recording(table: LabTable, roles: Mapping[str, ColumnInfo], encoding: str, name: str) -> Recording:
-    """Return the curve of a table."""
+def _recording(
+    table: LabTable, roles: Mapping[str, ColumnInfo], encoding: str, name: str, n_rows: int | None = None
+) -> Recording:
+    """Return the curve of a table; of a part of one `n_rows` is how many rows the file has of it."""
     filled = table.with_values(list(roles.values()))
+    n_rows = len(filled.rows) if n_rows is None else n_rows
     values = {role: filled.numbers(column) for role, column in roles.items()}
-    others = sum(bool(line.strip(EMPTY)) for line in table.lines) - len(filled.rows) - (table.header is not None)
+    others = sum(bool(line.strip(EMPTY)) for line in table.lines) - n_rows - (table.header is not None)
     dialect = table.shape.dialect
     decisions = Decisions(
         encoding,

@@ -314,7 +314,7 @@ def _is_data(cells: Sequence[str], dialect: Dialect) -> bool:
 
 
 def _score(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
-    """Return how many lines are data in this dialect, which part of their cells is numbers, how many cells they have."""
+    """Return how many lines are data in this dialect, which part of their cells is numbers, and their width."""
     good = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
     if not good:
         return 0, 0.0, 0

@@ -12,6 +12,7 @@ from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.reading import read_recording, read_recordings
 
 TIME, MOTION, FORCE = loop_columns()
+POINTS = list(zip(TIME, MOTION, FORCE, strict=True))
 LBF, KGF, INCH = 4.4482216152605, 9.80665, 25.4
 
 
@@ -33,7 +34,7 @@ EXPORTS = {
     "Mark-10": 'Reading,"Load [lbF]","Travel [in]","Time [sec.]"\n'
     + "".join(
         f"{n},{f / LBF:.7f},{s / INCH:.7f},{t:.2f}\n"
-        for n, (t, s, f) in enumerate(zip(*loop_columns(), strict=True), 1)
+        for n, (t, s, f) in enumerate(POINTS, 1)
     ),
     "Imada": "No.,Force,Unit,Displacement,Unit,Judge\n" + lines("{n},{f},kgf,{s},mm,OK", KGF),
     "Imada, unit before": "No.;Unit;Force;Unit;Travel\n" + lines("{n};N;{f};mm;{s}"),
@@ -74,7 +75,7 @@ EXPORTS = {
     "gF": "s [mm];F [gF]\n" + lines("{s};{f}", KGF / 1e3),
     "kp": "s [mm];F [kp]\n" + lines("{s};{f}", KGF),
     "micrometres": "s [µm];F [mN]\n"
-    + "".join(f"{1e3 * s:.3f};{1e3 * f:.3f}\n" for _, s, f in zip(*loop_columns(), strict=True)),
+    + "".join(f"{1e3 * s:.3f};{1e3 * f:.3f}\n" for _, s, f in POINTS),
 }
 
 
