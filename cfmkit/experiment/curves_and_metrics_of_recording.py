@@ -83,6 +83,8 @@ class MeasuredCurves(ShortRepr):
         The same points with filtered forces; empty without a filter.
     reached : Window
         What every branch reached before points next to reversals were left out.
+    passage : float
+        Longest way next to a reversal that was left out [m or rad].
     low_pass : LowPass or None
         The filter.
     warnings : tuple of Finding
@@ -93,6 +95,7 @@ class MeasuredCurves(ShortRepr):
     strokes: Strokes
     raw: tuple[Curve, ...]
     reached: Window
+    passage: float = 0.0
     filtered: tuple[Curve, ...] = ()
     low_pass: LowPass | None = None
     warnings: tuple[Finding, ...] = ()
@@ -132,7 +135,7 @@ def measured(
         If another word stands for the filter, or for what is left out.
     """
     _check_words(low_pass, leave_out)
-    strokes, reached, left_out = _strokes(recording, leave_out, cycles)
+    strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
     each = strokes.measured
     warnings = (*_warnings(recording, strokes), *left_out)
     chosen = _default(recording) if low_pass == "default" else low_pass
@@ -142,7 +145,7 @@ def measured(
             f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
         )
         warnings = (*warnings, Finding("negative_loop", f"{reported}: is the sign of a column reversed?"))
-    plain = MeasuredCurves(recording, strokes, raw, reached=reached, warnings=warnings)
+    plain = MeasuredCurves(recording, strokes, raw, reached, passage, warnings=warnings)
     if chosen is None:
         return plain
     try:
@@ -196,15 +199,15 @@ def read_measured(
 
 def _strokes(
     recording: Recording, leave_out: Collection[str], cycles: Cycles | None
-) -> tuple[Strokes, Window, tuple[Finding, ...]]:
-    """Return what counts of each stroke, what all branches reached, and what is said of the points left out."""
+) -> tuple[Strokes, Window, float, tuple[Finding, ...]]:
+    """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
     strokes = choose(_without(recording, spiky), cycles, recording.name)
     reached, reported = _reached(recording, strokes), _spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
-        return strokes, reached, reported
+        return strokes, reached, 0.0, reported
     found = settled(recording, strokes)
-    return found.strokes, reached, (*reported, *_passages_left_out(recording, found))
+    return found.strokes, reached, found.length, (*reported, *_passages_left_out(recording, found))
 
 
 def _spiky(recording: Recording) -> NDArray[np.bool_]:
@@ -550,17 +553,13 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
         for part in [curve.on(branch).motion]
     }
     widest = min(low for low, _ in extents.values()), max(high for _, high in extents.values())
-    allowed = LARGEST_HOLE * (widest[1] - widest[0])
-    # Samples at reversals and passages next to them are missing on one branch or the other of every recording.
-    reached = min(common.lo, source.reached.lo), max(common.hi, source.reached.hi)
-    if reached[0] - widest[0] <= allowed and widest[1] - reached[1] <= allowed:
+    # Passages at reversals are left out of one branch or the other of every recording.
+    allowed = LARGEST_HOLE * (widest[1] - widest[0]) + source.passage
+    late, early = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
+    cut = [late] * (common.lo - widest[0] > allowed) + [early] * (widest[1] - common.hi > allowed)
+    if not cut:
         return ()
-    first = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
-    (branch, number), (low, high) = next(
-        (key, extents[key])
-        for key, missing in zip(first, (reached[0] - widest[0], widest[1] - reached[1]), strict=True)
-        if missing > allowed
-    )
+    (branch, number), (low, high) = cut[0], extents[cut[0]]
     where = Hole(low, high, branch, number).text(kind)
     reported = f"the window ends where the shortest branch does, {where}; others cover {span_text(*widest, kind)}"
     return (Finding("window_cut", f"{reported}: choose with --window or --cycles"),)

@@ -196,7 +196,10 @@ def test_file_and_noise_belong_together(tmp_path):
         ("x [mm];y [mm]\n" + "60;2\n" * 30, "both flanks are needed with at least 20 points each"),
         ("x [mm];y [N]\n" + "60;2\n" * 30, "the column 'y' needs a unit of length"),
         ("side;x [mm];y [mm]\n" + "middle;60;2\n" * 30, "the side is 'middle'; it must be 'left' or 'right'"),
-        ("x [mm];y [mm]\n" + "60;2\n" * 9 + "60;NaN\n" + "60;3\n" * 30, "line 11: column 'y' [mm] holds 'NaN', which is not a number"),
+        (
+            "x [mm];y [mm]\n" + "60;2\n" * 9 + "60;NaN\n" + "60;3\n" * 30,
+            "line 11: column 'y' [mm] holds 'NaN', which is not a number",
+        ),
         ("", "the file is empty"),
     ],
 )
