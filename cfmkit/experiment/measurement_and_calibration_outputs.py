@@ -13,9 +13,9 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
-from cfmkit.experiment.calibration import table
+from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
 from cfmkit.experiment.coverage import LARGEST_HOLE
-from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
+from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, hole_finding, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
@@ -267,6 +267,20 @@ def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
     return (("causes", ", ".join(reported)),) if reported else ()
 
 
+def shortfall(comparison: Comparison) -> str:
+    """Return why the errors have no value; "" where they have one."""
+    if not comparison.holes:
+        return ""
+    return hole_finding(comparison.holes, comparison.window, comparison.curve.kind).message
+
+
+def comparison_warnings(comparison: Comparison, source: MeasuredCurves) -> tuple[Finding, ...]:
+    """Return what the user must know of a recording beside a model."""
+    if not comparison.holes:
+        return source.warnings
+    return (*source.warnings, hole_finding(comparison.holes, comparison.window, comparison.curve.kind))
+
+
 def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
     """Return what makes the file of a comparison: the measured curve."""
     return {"data.csv": lambda: to_csv(curves_table(source))}
@@ -304,7 +318,8 @@ def calibration_data(calibration: Calibration) -> dict[str, Any]:
 
 def _rms(comparison: Comparison) -> float:
     errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
-    return float(np.sqrt(np.mean(errors**2)))
+    weight = np.concatenate([item.weight for item in comparison.samples])
+    return float(np.sqrt(np.average(errors**2, weights=weight)))
 
 
 def _border(value: float, calibration: Calibration) -> float:
@@ -325,8 +340,20 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     lines = []
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
-        reported = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
-        lines.append(("fitted", f"{item.path} = {reported} (95 %), from {_exact(item.start, item.dimension)}"))
+        if width > UNKNOWN * item.size and not calibration.fit.at_bound[k]:
+            lines.append(("fitted", f"{item.path} {CANNOT}"))
+            continue
+        low, high = max(value - width, item.low), min(value + width, item.high)
+        reported = f"± {_exact(width, item.dimension, 2)} (95 %)"
+        if (low, high) != (value - width, value + width):
+            reported = f"({_exact(low, item.dimension)} to {_exact(high, item.dimension)}, 95 %, within its bounds)"
+        lines.append(
+            (
+                "fitted",
+                f"{item.path} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
+            )
+        )
+    lines += _loss_lines(calibration.after)
     zeros = calibration.zeros
     if zeros.effort or zeros.motion:
         options = _options(recording, zeros)
@@ -334,6 +361,18 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     if zeros.drift:
         lines.append(("data", "no option subtracts the fitted drift from a recording (analyze --data, measure)"))
     return tuple(lines)
+
+
+def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
+    """Return what is said where the model has no losses and the measurement has."""
+    if not after.branches:
+        return []
+    area, half = (item.value for item in after.loss().values())
+    if area is None or half is None:
+        return [("loss", "the model has no losses: it is fitted to the mean of the branches")]
+    gap = f"{format_short(half, after.curve.kind)} to either side"
+    reported = f"a measured cycle loses {format_short(area, 'energy')}, on average {gap}"
+    return [("loss", f"the model has no losses: it is fitted to the mean of the branches; {reported}")]
 
 
 def _options(recording: Recording, zeros: Zeros) -> str:
@@ -368,6 +407,6 @@ def residuals_table(calibration: Calibration) -> Table:
         (
             TableColumn("branch", tuple(branch.tolist())),
             border_column(curve.motion_name, motion, curve.motion_dimension),
-            border_column("residual", calibration.fit.residuals, curve.kind),
+            border_column("residual", np.concatenate([item.errors(curve) for item in after.samples]), curve.kind),
         )
     )
