@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
-from cfmkit.experiment.coverage import holes_between, holes_of, weights
+from cfmkit.experiment.coverage import holes_of
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed, emptied, large_holes
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.families import family
@@ -19,6 +19,7 @@ from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.numerics.holes_in_samples import holes_between, weights
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -184,7 +185,7 @@ def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatA
     places = np.linspace(low, high, min(len(one["motion"]), len(other["motion"])))
     known = np.ones(len(places), dtype=bool)
     for part in (one, other):
-        for start, stop in holes_between(part["motion"], Window(low, high)):
+        for start, stop in holes_between(part["motion"], low, high):
             known &= (places <= start) | (places >= stop)
     places = places[known]
     effort, passed = (

@@ -14,28 +14,14 @@ import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics import Window
-
-LARGEST_HOLE = 0.02
-"""Part of the window: with a larger hole in it no number over the window can be known."""
-
-STEPS = 3.0
-"""Samples that are farther apart than so many usual steps leave a hole: a spike or two that are left out do not."""
-
-NEIGHBOURS = 10
-"""Steps to either side of one that say what is usual there: recorders change their step on the way."""
-
-USUAL = 80.0
-"""Percentile of those: of 21 steps four may be larger, as where single samples stand in a hole."""
 
 
 @dataclass(frozen=True)
@@ -58,34 +44,6 @@ class Hole:
         return span_text(self.low, self.high, kind) + (f" on {self.branch!r}{cycle}" if self.branch else "")
 
 
-def usual_steps(places: FloatArray) -> FloatArray:
-    """Return what is usual around each step, (n - 1,), between (n,) places in increasing order [m or rad]."""
-    from scipy.ndimage import percentile_filter
-
-    steps = np.diff(places)
-    if len(steps) <= 2 * NEIGHBOURS:
-        return np.full(len(steps), np.percentile(steps, USUAL) if len(steps) else 0.0)
-    found: FloatArray = percentile_filter(steps, USUAL, 2 * NEIGHBOURS + 1, mode="reflect")
-    return found
-
-
-def _is_hole(places: FloatArray) -> NDArray[np.bool_]:
-    """Return after which places there is a hole, (n - 1,) bool; repeated places have no step of their own."""
-    distinct, last = np.unique(places[::-1], return_index=True)
-    found = np.zeros(max(len(places) - 1, 0), dtype=bool)
-    steps = np.diff(distinct)
-    found[len(places) - 1 - last[:-1]] = steps > STEPS * usual_steps(distinct)
-    return found
-
-
-def holes_between(places: FloatArray, window: Window) -> list[tuple[float, float]]:
-    """Return the holes between places in increasing order, as far as they are in a window [m or rad]."""
-    after = np.flatnonzero(_is_hole(places))
-    ends = zip(places[after].tolist(), places[after + 1].tolist(), strict=True)
-    inside = [(max(low, window.lo), min(high, window.hi)) for low, high in ends]
-    return [(low, high) for low, high in inside if low < high]
-
-
 def holes_of(curves: Sequence[Curve], window: Window) -> tuple[Hole, ...]:
     """Return the holes of all branches of all cycles in a window, in their order."""
     found = []
@@ -93,30 +51,13 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[Hole, ...]:
         cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
         for branch in curve.branches:
             places = np.sort(curve.on(branch).motion)
-            found += [Hole(low, high, branch, cycle) for low, high in holes_between(places, window)]
+            found += [Hole(low, high, branch, cycle) for low, high in holes_between(places, window.lo, window.hi)]
     return tuple(found)
 
 
 def share_covered(holes: Sequence[Hole], window: Window) -> float:
     """Return which part of a window one branch of one cycle covers."""
     return 1.0 - sum(hole.width for hole in holes) / (window.hi - window.lo)
-
-
-def weights(places: FloatArray) -> FloatArray:
-    """Return the way that each sample stands for, half of that to each neighbour, (n,); holes count as usual steps.
-
-    Parameters
-    ----------
-    places : (n,) array
-        In increasing order [m or rad].
-    """
-    steps = np.diff(places)
-    found = np.zeros(len(places))
-    if len(steps):
-        steps = np.where(_is_hole(places), np.minimum(steps, usual_steps(places)), steps)
-        found[1:] += 0.5 * steps
-        found[:-1] += 0.5 * steps
-    return found
 
 
 def read_largest_hole(text: str | float | None) -> float:

@@ -22,7 +22,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Cycles, Stroke, Strokes, choose, covered, read_cycles, split
-from cfmkit.experiment.coverage import LARGEST_HOLE, STEPS, Hole, holes_of, share_covered
+from cfmkit.experiment.coverage import Hole, holes_of, share_covered
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
@@ -30,6 +30,7 @@ from cfmkit.experiment.reversal_transitions import settled
 from cfmkit.experiment.zeros_and_signs import corrected
 from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name, split_name
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, STEPS
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import format_short

@@ -14,11 +14,11 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
-from cfmkit.experiment.coverage import LARGEST_HOLE
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, hole_finding, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv

@@ -173,7 +173,7 @@ class Branch:
         if isfinite(part.effort.sum()):
             return part
         failed = len(part.effort) - int(np.isfinite(part.effort).sum())
-        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no equilibrium"
+        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no known {self.kind}"
 
     @property
     def inside(self) -> BranchTrace:
