@@ -248,6 +248,24 @@ class Measuring(Common):
         ),
     ] = None
 
+    cycles: Annotated[
+        str | None,
+        option(
+            "--cycles",
+            metavar="FIRST:LAST",
+            text="Cycles to use, e.g. 2:5, or 3 for one; default: the complete ones of full travel.",
+        ),
+    ] = None
+    group: Annotated[
+        str | None,
+        option(
+            "--group",
+            metavar="COLUMN",
+            text="Column that tells specimens apart; 'Specimen=2' chooses one, 'table=2' one of several tables, 'none' "
+            "takes all rows as one specimen.",
+        ),
+    ] = None
+
     @property
     def flips(self) -> tuple[str, ...]:
         """What ``--flip`` names."""
@@ -267,7 +285,7 @@ def read_measured(name: str, options: Measuring) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
     from cfmkit.experiment.curves_and_metrics_of_recording import read_measured as read
 
-    return read(name, options.units, options.tare, options.zero, options.flips)
+    return read(name, options.units, options.tare, options.zero, options.flips, options.cycles, options.group)
 
 
 def refuse_without_data(options: Measuring) -> None:
@@ -278,7 +296,7 @@ def refuse_without_data(options: Measuring) -> None:
     cfmkit.errors.UsageError
         Naming the first of them.
     """
-    for name in ("units", "tare", "zero", "flip"):
+    for name in ("units", "tare", "zero", "flip", "cycles", "group"):
         if getattr(options, name) is not None:
             raise UsageError(f"--{name} applies to a measurement: name its file with --data")
 

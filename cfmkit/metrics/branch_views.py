@@ -79,6 +79,9 @@ class MeasuringFrame:
     winding: WindingPath | None = field(default=None, compare=False)
     durability: Durability | None = None
     curve: TargetCurve | None = None
+    over_motion: bool = False
+    """Whether means are over the motion and not over the points: those of a recording stand where its clock put them.
+    """
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -170,7 +173,7 @@ class Branch:
         if isfinite(part.effort.sum()):
             return part
         failed = len(part.effort) - int(np.isfinite(part.effort).sum())
-        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no equilibrium"
+        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no known {self.kind}"
 
     @property
     def inside(self) -> BranchTrace:
@@ -264,7 +267,14 @@ class Branch:
     def spread(self) -> Spread:
         """Mean and extremes in the window."""
         effort = self.inside.effort
-        return Spread.of(float(effort.sum()) / len(effort), *self._extremes)
+        mean = self.mean_over_motion(effort) if self.frame.over_motion else float(effort.sum()) / len(effort)
+        return Spread.of(mean, *self._extremes)
+
+    def mean_over_motion(self, values: FloatArray) -> float:
+        """Return the mean of values at the points in the window over the motion, by trapezoids."""
+        motion = self.inside.motion
+        width = float(motion[-1] - motion[0])
+        return float(np.trapezoid(values, motion)) / width if width else float(values.mean())
 
     @cached_property
     def level(self) -> float:

@@ -39,6 +39,8 @@ def standard_deviation(branch: Branch) -> float:
     effort = branch.inside.effort
     if len(effort) < 2:
         raise Undefined("a standard deviation needs two points")
+    if branch.frame.over_motion:
+        return sqrt(branch.mean_over_motion((effort - mean(branch)) ** 2))
     return float(spread.deviation(effort, mean(branch)))
 
 

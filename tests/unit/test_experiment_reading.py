@@ -173,7 +173,7 @@ def test_malformed_units_options_are_usage_errors(tmp_path, units):
 def test_an_option_that_contradicts_the_header_or_names_no_column_is_refused(tmp_path):
     with pytest.raises(DataError, match="the header gives 's' in mm, --units in m"):
         read(tmp_path, csv_text(), "s=m")
-    with pytest.raises(DataError, match="a column 'F1' that is not there; did you mean 'F'"):
+    with pytest.raises(DataError, match="there is no column 'F1'; did you mean 'F'"):
         read(tmp_path, csv_text("t;s;F"), "F1=N")
 
 

@@ -14,6 +14,7 @@ from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import between
@@ -68,6 +69,7 @@ BUILT_DEFINITIONS = {
         "95th percentile over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force",
     ),
+    "profile_coverage": ("ratio", "part of the window in which both rollers touch measured parts of the flanks"),
     "loop_area_per_friction": (
         "energy",
         "area of the loop per unit of rolling friction, over the window: a measured loop area divided by it is the "
@@ -431,9 +433,40 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "profile_force_sd": float(np.nanstd(share, ddof=1)),
         "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
         "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
+        "profile_coverage": profile_coverage(built),
         "loop_area_per_friction": loop_area_per_friction(built),
     }
-    return {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    unknown = OF_THE_FORCE if large_holes(built) else ()
+    found = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    why = "a part of the flanks was not measured"
+    return found | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
+
+
+OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_friction")
+"""What needs the force everywhere in the window."""
+
+
+def _window_of(built: Built) -> tuple[float, float]:
+    """Return the window in travels, by default all of them [m]."""
+    window = built.assembly.spec.analysis.window
+    if window is None:
+        return float(built.travel[0]), float(built.travel[-1])
+    low, high = between(window, requested_travel(built))
+    return low - built.origin, high - built.origin
+
+
+def large_holes(built: Built) -> tuple[tuple[float, float], ...]:
+    """Return the travels in the window at which the force is not known [m]."""
+    start, stop = _window_of(built)
+    inside = ((max(low, start), min(high, stop)) for low, high in built.unmeasured)
+    return tuple((low, high) for low, high in inside if high - low > LARGEST_HOLE * (stop - start))
+
+
+def profile_coverage(built: Built) -> float:
+    """Return which part of the window is known."""
+    start, stop = _window_of(built)
+    missing = sum(max(min(high, stop) - max(low, start), 0.0) for low, high in built.unmeasured)
+    return 1.0 - missing / (stop - start)
 
 
 def pressure_of(built: Built, way: float) -> FloatArray:

@@ -212,6 +212,8 @@ class Built(ShortRepr):
         Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
     origin : float
         What is added to the travel to give the displacement [m].
+    holes : tuple of (float, float)
+        Travels between which a contact is where nothing was measured, of either flank [m].
     """
 
     assembly: Assembly
@@ -221,6 +223,19 @@ class Built(ShortRepr):
     sides: Sides
     shares: dict[str, FloatArray]
     origin: float
+    holes: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def unmeasured(self) -> tuple[tuple[float, float], ...]:
+        """Travels between which the force is not known, in their order, those that overlap joined [m]."""
+        joined: list[tuple[float, float]] = []
+        for low, high in sorted(self.holes):
+            low, high = max(low, float(self.travel[0])), min(high, float(self.travel[-1]))
+            if joined and low <= joined[-1][1]:
+                joined[-1] = joined[-1][0], max(joined[-1][1], high)
+            elif low < high:
+                joined.append((low, high))
+        return tuple(joined)
 
     @property
     def elongation(self) -> FloatArray:
