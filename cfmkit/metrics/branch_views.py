@@ -27,6 +27,8 @@ from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
 
 ZERO = 1e-9
 """An effort at the reference below this share of the largest is rounding: a band in per cent of it has no width."""
+
+STATED_ERROR = 1e-12
+"""Numerical error of a curve whose model states none, in parts of its largest effort: the digits of a file, sums."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,10 @@ class MeasuringFrame:
         Fatigue and relaxation of the material.
     curve : TargetCurve or None
         What it should follow where it is not to be constant.
+    effort_error : float or None
+        Numerical error of the effort [N or N m], below which there is nothing to compare with; None: not stated.
+    part_efforts : callable or None
+        Returns the largest effort of one spring or member of a branch at places of its motion (`Result.part_efforts`).
     """
 
     target: float | None = None
@@ -79,6 +88,12 @@ class MeasuringFrame:
     winding: WindingPath | None = field(default=None, compare=False)
     durability: Durability | None = None
     curve: TargetCurve | None = None
+    effort_error: float | None = None
+    part_efforts: Callable[[str, FloatArray], FloatArray] | None = field(default=None, compare=False)
+
+    def has_target(self) -> bool:
+        """Return True if there is a target that is not zero within the numerical error of the effort."""
+        return self.target is not None and abs(self.target) > (self.effort_error or 0.0)
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -88,7 +103,7 @@ class MeasuringFrame:
         Undefined
             If there is none.
         """
-        if not self.target:
+        if self.target is None or not self.has_target():
             reported = "the target is zero" if self.target is not None else "there is no target to compare with"
             raise Undefined(f"{reported}; 'deviation_from_curve' compares with a curve" if self.curve else reported)
         return self.target
@@ -264,7 +279,44 @@ class Branch:
     def spread(self) -> Spread:
         """Mean and extremes in the window."""
         effort = self.inside.effort
-        return Spread.of(float(effort.sum()) / len(effort), *self._extremes)
+        return Spread.of(float(effort.sum()) / len(effort), *self._extremes, self.error)
+
+    @cached_property
+    def error(self) -> float:
+        """Numerical error of the effort [N or N m]."""
+        if self.frame.effort_error is not None:
+            return self.frame.effort_error
+        sizes = np.abs(self.trace.effort)
+        return STATED_ERROR * float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+
+    @property
+    def vanishes(self) -> str:
+        """Why a share of this effort has no value: it is zero within its numerical error, or changes its sign."""
+        if max(map(abs, self._extremes)) > self.error:
+            return f"the {self.kind} changes sign or is zero"
+        balancer = "; 'static_balance' judges a balancer" if self.frame.part_efforts else ""
+        return f"the {self.kind} is zero within its numerical error, {self.error_text}{balancer}"
+
+    @property
+    def error_text(self) -> str:
+        """The numerical error of the effort with its unit."""
+        from cfmkit.specs.units import format_short
+
+        return format_short(self.error, self.kind, 2)
+
+    @property
+    def largest_part(self) -> float:
+        """Largest effort of one spring or member at the points in the window, its ends included [N or N m].
+
+        Raises
+        ------
+        Undefined
+            If the model does not know them, or the branch does not cover the window.
+        """
+        if self.frame.part_efforts is None:
+            raise Undefined("the model does not tell what single springs and members do")
+        sizes = self.frame.part_efforts(self.name, self.inside.motion)
+        return float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
 
     @cached_property
     def level(self) -> float:
@@ -304,8 +356,8 @@ class Branch:
         here = self.at(place)
         if model is not None:  # an interpolated value may hide that there is no effort
             here = float(model.effort(self.name, np.array([place]))[0])
-        if abs(here) <= ZERO * float(np.nanmax(np.abs(self.function.effort))):
-            raise Undefined(f"the {self.kind} at the reference pose is zero")
+        if abs(here) <= max(self.error, ZERO * float(np.nanmax(np.abs(self.function.effort)))):
+            raise Undefined(f"the {self.kind} at the reference pose is zero within its numerical error")
         return here
 
     @cached_property

@@ -72,7 +72,7 @@ class CutWindows(ManyWindows):
 
     def __init__(self, sampled: SampledBranch, window: Places) -> None:
         """Cut the window of each cam out."""
-        self.count = len(sampled.values)
+        self.count, self.error = len(sampled.values), 0.0
         ways = _ways(sampled, window)
         _, first, which = np.unique(ways, axis=0, return_index=True, return_inverse=True)
         if len(first) == 1 and ways[0, 1]:
@@ -99,6 +99,11 @@ class CutWindows(ManyWindows):
     def extremes(self) -> tuple[FloatArray, FloatArray]:
         """Largest and smallest value of each cam, (d,) each."""
         return self._each(lambda part: part.extremes[0]), self._each(lambda part: part.extremes[1])
+
+    @property
+    def size(self) -> FloatArray:
+        """Largest value at the samples of each cam, whatever its sign, (d,)."""
+        return self._each(lambda part: part.size)
 
     @property
     def deviation(self) -> FloatArray:
