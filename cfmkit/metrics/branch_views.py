@@ -259,20 +259,23 @@ class Branch:
             return winding_branches.extremes(path, *self.ends_on_way)
         if model is None:
             return float(part.effort.max()), float(part.effort.min())
-        motion, effort, (low, high) = part.motion, part.effort, self.ends
-        peaks = model.peaks
+        return self._next_to_samples(partial(model.effort, self.name), part.effort, model.peaks)
+
+    def _next_to_samples(
+        self, function: Callable[[FloatArray], FloatArray], values: FloatArray, peaks: FloatArray
+    ) -> tuple[float, float]:
+        """Return the largest and the smallest value of a function of the motion in the window, from its samples on."""
+        motion, (low, high) = self.inside.motion, self.ends
         between = (peaks > low) & (peaks < high)
         if between.any():
-            heights = model.effort(self.name, peaks)
-            motion, effort = (
-                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (effort, heights))
+            heights = function(peaks)
+            motion, values = (
+                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (values, heights))
             )
             motion, chosen = np.unique(motion, return_index=True)
-            motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
+            motion, values = motion[np.isfinite(values[chosen])], values[chosen][np.isfinite(values[chosen])]
         uneven = bool(between.any()) and len(peaks) < continuous_means_and_extremes.FEW
-        top, bottom = continuous_means_and_extremes.extremes(
-            partial(model.effort, self.name), motion[None, :], effort[None, :], uneven
-        )
+        top, bottom = continuous_means_and_extremes.extremes(function, motion[None, :], values[None, :], uneven)
         return float(top[0]), float(bottom[0])
 
     @cached_property
@@ -306,7 +309,7 @@ class Branch:
 
     @property
     def largest_part(self) -> float:
-        """Largest effort of one spring or member at the points in the window, its ends included [N or N m].
+        """Largest effort of one spring or member in the window [N or N m].
 
         Raises
         ------
@@ -315,8 +318,11 @@ class Branch:
         """
         if self.frame.part_efforts is None:
             raise Undefined("the model does not tell what single springs and members do")
-        sizes = self.frame.part_efforts(self.name, self.inside.motion)
-        return float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+        function, model = partial(self.frame.part_efforts, self.name), self.frame.closed
+        sizes = function(self.inside.motion)
+        if model is None or not np.isfinite(sizes).all():
+            return float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+        return self._next_to_samples(function, sizes, model.peaks)[0]
 
     @cached_property
     def level(self) -> float:

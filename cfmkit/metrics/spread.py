@@ -165,11 +165,6 @@ class ManyWindows:
         return Spread.of(self.mean, *self.extremes, self.error)
 
     @property
-    def size(self) -> FloatArray:
-        """Largest effort at the samples of each curve, whatever its sign, (d,)."""
-        return np.asarray(np.abs(self.effort).max(axis=1))
-
-    @property
     def deviation(self) -> FloatArray:
         """Sample standard deviation (n - 1) of each curve, (d,)."""
         return np.asarray(deviation(self.effort, self.mean))

@@ -122,7 +122,7 @@ def test_a_cam_that_lies_flat_weighs_on_its_guide_only():
     lying = analyze(cam(rolling_friction=0.002, mounting=flat)).state
     np.testing.assert_allclose(lying.up.slider, plain.up.slider, rtol=1e-12)
     rubs = analyze(cam(rolling_friction=0.002, mounting=flat, guide={"friction": 0.1})).state
-    weight = 9.81 * (0.068 + 2 * 0.077 + 2 * 0.38)
+    weight = 9.80665 * (0.068 + 2 * 0.077 + 2 * 0.38)
     np.testing.assert_allclose((rubs.up.slider - plain.up.slider)[1:], 0.1 * weight, rtol=1e-9)
 
 

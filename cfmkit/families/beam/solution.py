@@ -119,16 +119,24 @@ class Solution(ShortRepr):
         return self.assembly.effort_unit * effort_error(self.path, self.spec.analysis.tolerance)
 
     def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the largest effort of one beam or spring of one copy at some places of the motion [N or N m].
+        """Return the largest effort of one beam or spring of one copy at places of the motion of any shape [N or N m].
 
-        Of states that the path has at one place, the largest.
+        Where the path turns back, between its points, and of several states at one place the largest.
         """
+        if self.everywhere is not None:
+            return self._part_efforts_at(np.ravel(places)).reshape(np.shape(places))
         motion, efforts = self.with_ends.motion, self.with_ends.largest_member_efforts
         low, high = np.minimum(motion[1:], motion[:-1]), np.maximum(motion[1:], motion[:-1])
         at = np.clip(places, low.min(), high.max())[:, None]
         share = np.clip((at - motion[:-1]) / np.where(high > low, np.diff(motion), 1.0), 0.0, 1.0)
         between = (1.0 - share) * efforts[:-1] + share * efforts[1:]
         return np.asarray(np.where((at >= low) & (at <= high), between, 0.0).max(axis=1))
+
+    def _part_efforts_at(self, places: FloatArray) -> FloatArray:
+        assert self.everywhere is not None
+        there = self.everywhere.at(places)
+        alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
+        return np.where(there.accurate, alone.largest_member_efforts, np.nan)
 
     @cached_property
     def largest_member_efforts(self) -> FloatArray:

@@ -80,7 +80,7 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
     if spec.analysis.travel is None:
         return None
     block = block.in_places((0.0, spec.travel))
-    if not _applies(spec, block) or not names <= set(SCALARS) | IN_WINDOW:
+    if not _applies(spec, block) or not names <= set(SCALARS) | METRICS:
         return None
     values = [np.full(block.size, np.nan) for _ in block.measures]
     done = _sound(spec, block, names)
@@ -89,13 +89,11 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         slab = Slab.of(spec, {path: np.asarray(item)[chosen] for path, item in block.values.items()}, len(chosen))
         for measure, found in zip(block.measures, values, strict=True):
             found[chosen] = _measured(slab, measure)
-            if measure.name in IN_WINDOW:
+            if measure.name in METRICS:
                 done[chosen] &= slab.inside(measure.window).mean > slab.error
         for name, mask in warned(spec, slab).items():
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = mask
-    named = [
-        {"load" if one.name in IN_WINDOW else "": found} for one, found in zip(block.measures, values, strict=True)
-    ]
+    named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
     target = None if spec.design is None or spec.design.force is None else np.full(block.size, spec.design.force)
     return BlockAnswer(done, tuple(named), target, warnings=warnings)
 
@@ -108,7 +106,7 @@ def _applies(spec: VcfmSpec, block: Block) -> bool:
         and mechanism.bistable.flexure_length is None  # which bounds the length
         and analysis.preloads[0] == min(analysis.preloads) == 0
     )
-    ends = [measure.window for measure in block.measures if measure.window and measure.name in IN_WINDOW]
+    ends = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
     inside = all(low >= 0 and high <= spec.travel for low, high in ends)
     return plain and inside and set(block.values) <= set(VARIED)
 
@@ -206,21 +204,25 @@ class Slab:
     @cached_property
     def error(self) -> FloatArray:
         """Rounding of the sums of leaves and spring, (k,) [N]: as `results.round_off` has it."""
-        leaves, spring = self._parts(self.grid)
+        leaves, spring = self._parts(self.grid[None, :])
         return np.asarray(ROUND_OFF * (leaves + spring).max(axis=1))
 
     def _parts(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the sizes of the forces of all leaves and of the spring at some travels, (k, n) each [N]."""
-        shape, place = (len(self.half_beams), len(travel)), travel[None, :]
-        leaves, spring = self.half_beams * self.leaf.force(place), self.spring.force(place)
+        """Return the sizes of the forces of all leaves and of the spring at travels (k or 1, n), (k, n) each [N]."""
+        shape = len(self.half_beams), travel.shape[1]
+        leaves, spring = self.half_beams * self.leaf.force(travel), self.spring.force(travel)
         return np.broadcast_to(np.abs(leaves), shape), np.broadcast_to(np.abs(spring), shape)
 
     def static_balance(self, window: tuple[float, float] | None) -> FloatArray:
-        """Return the largest force in a window over that of one leaf, or of the spring, at its points, (k,)."""
+        """Return the largest force in a window over that of one leaf, or of the spring, (k,)."""
         many = self.inside(window)
-        leaves, spring = self._parts(many.motion)
-        part = np.maximum(leaves / self.half_beams, spring).max(axis=1)
+        part, _ = extremes_next_to(self._largest_part, many.motion[None, :], self._largest_part(many.motion[None, :]))
         return np.asarray(static_balance(many.spread, part))
+
+    def _largest_part(self, travel: FloatArray) -> FloatArray:
+        """Return the largest force of one leaf, or of the spring, at travels of each design, (k, n) [N]."""
+        leaves, spring = self._parts(travel)
+        return np.maximum(leaves / self.half_beams, spring)
 
     def _extremes(self, travel: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the largest and smallest force: next to the samples, or where the leaves buckle and straighten."""
@@ -285,7 +287,7 @@ def _measured(slab: Slab, measure: Measure) -> FloatArray:
     return metric_of(measure.name, slab.inside(measure.window), slab.target)
 
 
-IN_WINDOW = metrics_of("force") | {STATIC_BALANCE}
+METRICS = metrics_of("force") | {STATIC_BALANCE}
 """Metrics of one branch inside its window."""
 
 

@@ -137,9 +137,10 @@ class Solution(ShortRepr):
 
     def part_efforts(self, _branch: str, travel: FloatArray, /) -> FloatArray:
         """Return the largest force of one leaf, or of one spring, at some travels and the nominal preload [N]."""
-        leaf = self.sampler.leaf_force(travel) / self.parts.half_beams
-        spring = self.sampler.spring(travel + self.nominal.preload)[0] / self.springs
-        return np.asarray(np.maximum(np.abs(leaf), np.abs(spring)))
+        places = np.ravel(travel)
+        leaf = self.sampler.leaf_force(places) / self.parts.half_beams
+        spring = self.sampler.spring(places + self.nominal.preload)[0] / self.springs
+        return np.asarray(np.maximum(np.abs(leaf), np.abs(spring)).reshape(np.shape(travel)))
 
     @property
     def springs(self) -> int:

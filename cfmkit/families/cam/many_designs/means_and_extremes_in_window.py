@@ -101,11 +101,6 @@ class CutWindows(ManyWindows):
         return self._each(lambda part: part.extremes[0]), self._each(lambda part: part.extremes[1])
 
     @property
-    def size(self) -> FloatArray:
-        """Largest value at the samples of each cam, whatever its sign, (d,)."""
-        return self._each(lambda part: part.size)
-
-    @property
     def deviation(self) -> FloatArray:
         """Sample standard deviation (n - 1) of each cam, (d,)."""
         return self._each(lambda part: part.deviation)

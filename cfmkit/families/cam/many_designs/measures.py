@@ -63,7 +63,8 @@ def _rms(cams: Slab, branch: str, window: Window) -> FloatArray:
 def _static_balance(cams: Slab, branch: str, window: Window) -> FloatArray:
     """Return the largest force over that of the strongest spring: without weights its share of all of them."""
     inside = cams.inside(branch, window)
-    return np.asarray(static_balance(inside.spread, inside.size * cams.designs.strongest / cams.designs.stiffness))
+    largest = np.maximum(np.abs(inside.extremes[0]), np.abs(inside.extremes[1]))
+    return np.asarray(static_balance(inside.spread, largest * cams.designs.strongest / cams.designs.stiffness))
 
 
 def _everywhere(cams: Slab, window: Window) -> ManyBranches:

@@ -273,8 +273,8 @@ class Solution(ShortRepr):
 
     def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest effort of one spring of one leg at some places of the motion [N m or N]."""
-        shares = _weighed(self.assembly.rates, self.assembly.forces(places))
-        return np.asarray(np.abs(shares).max(axis=0) / self.legs)
+        shares = _weighed(self.assembly.rates, self.assembly.forces(np.ravel(places)))
+        return np.asarray(np.abs(shares).max(axis=0).reshape(np.shape(places)) / self.legs)
 
     @cached_property
     def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:

@@ -282,10 +282,15 @@ class Slab:
             return np.asarray(np.where(self.rates[:, :, None] > 0.0, self.rates[:, :, None] * units, 0.0))
 
     def _static_balance(self, window: tuple[float, float] | None) -> FloatArray:
-        """Return the largest effort in a window over that of one spring of one leg at its points, (m,)."""
-        each = np.abs(self.shares(self.base.inside(window))).max(axis=1)
-        part = each.max(axis=1, initial=0.0, where=np.isfinite(each)) / self.legs
-        return np.asarray(static_balance(self.inside(window).spread, part))
+        """Return the largest effort in a window over that of one spring of one leg, (m,)."""
+        places, units = self.base.samples_and_grid(window)
+
+        def largest(at: FloatArray) -> FloatArray:
+            unit = self.base.assembly.forces(at.ravel()).reshape(4, *at.shape)
+            return np.asarray(np.abs(self.rates[:, :, None] * unit.swapaxes(0, 1)).max(axis=1))
+
+        part, _ = extremes(largest, places[None, :], np.abs(self.shares(units)).max(axis=1))
+        return np.asarray(static_balance(self.inside(window).spread, part / self.legs))
 
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the efforts in a window."""
