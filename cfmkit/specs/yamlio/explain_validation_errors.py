@@ -248,8 +248,8 @@ def _too_few_or_many(line: _Error) -> str:
     value = line.trace.node
     if isinstance(value, str):
         return f"the text has {len(value)} characters; {limit}" if value else "the text is empty"
-    if isinstance(value, dict) and not value:
-        return f"the block is empty; {limit}"
+    if isinstance(value, dict):
+        return f"the block has {len(value)} entries; {limit}" if value else f"the block is empty; {limit}"
     return f"the list has {len(value)} items; {limit}" if isinstance(value, tuple) else _needs(line)
 
 
