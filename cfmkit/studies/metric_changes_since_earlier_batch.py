@@ -48,7 +48,7 @@ class MetricChange:
     unit : str
         Of both.
     relative : float or None
-        The difference over the larger of both; None where they are not numbers.
+        The difference over what it was: 1 where it doubled; None where they are not numbers, or it was zero.
     beyond : bool
         Whether it is more than the tolerance.
     """
@@ -183,8 +183,8 @@ def _of_metrics(
             yield MetricChange(spec, name, old, new, unit, None, True)
             continue
         if abs(new - old) > NOTHING:
-            relative = (new - old) / max(abs(old), abs(new))
-            yield MetricChange(spec, name, old, new, unit, relative, abs(relative) > tolerance)
+            relative = (new - old) / abs(old) if old else None
+            yield MetricChange(spec, name, old, new, unit, relative, relative is None or abs(relative) > tolerance)
 
 
 def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:

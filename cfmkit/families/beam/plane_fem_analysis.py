@@ -133,6 +133,11 @@ class SolidSolution(ShortRepr):
         return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
 
     @property
+    def effort_error(self) -> float:
+        """Error of the mesh [N or N m]."""
+        return self.error.force * float(np.abs(self.effort).max())
+
+    @property
     def everywhere(self) -> None:
         """Nothing: a pose between two of these takes seconds."""
 
@@ -222,6 +227,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
+        effort_error=solution.effort_error,
         tables={"fillets": partial(_fillet_table, solution)},
         state=solution,
     )

@@ -134,7 +134,8 @@ def ranges(solution: OnCurve) -> dict[str, float | None]:
     numbers |= {"nominal_force": along.back(nominal), "stress_at_end": _stress_at(along, end)}
     if solution.assembly.allowable_stress is not None:
         numbers["stress_limit_displacement"] = along.back(_stress_reaches(along, solution.assembly.allowable_stress))
-    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), along) if nominal else None
+    known = abs(nominal) > (solution.effort_error or 0.0)  # else 95 % of it are rounding
+    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), along) if known else None
     if start is not None and start <= end and end > 0:
         numbers |= {"range_start": along.back(start), "range_fraction": (end - start) / end}
         if nominal > 0:  # else no band lies around the force there

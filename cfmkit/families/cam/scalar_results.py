@@ -49,7 +49,7 @@ BUILT_DEFINITIONS = {
     ),
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
     "registration_y_per_width": (
-        "ratio",
+        "factor",
         "shift in y that the registration finds for a cam that is wider on both flanks, per width along its normal",
     ),
     "profile_force_sd": ("force", "standard deviation (n - 1) of the force error due to the profile"),

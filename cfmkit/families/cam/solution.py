@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.statics import Forces, Loads, jams, levers, load_on_contact, load_on_slider
+from cfmkit.results import round_off
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -136,6 +137,13 @@ class Solution(ShortRepr):
         """Elongation of the springs [m]."""
         opened = self.assembly.spec.mechanism.springs.tension_stretch
         return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened
+
+    @property
+    def effort_error(self) -> float:
+        """Rounding of the sum of springs and weights on the slider [N]."""
+        weight = self.assembly.loads.slider_weight
+        both = np.concatenate([self.up.slider, self.down.slider])
+        return round_off(np.stack([both - weight, np.full(len(both), weight)]))
 
     @property
     def corner_travel(self) -> float:

@@ -135,6 +135,11 @@ class SolidSampler(ExactSampler):
             self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
 
+    @property
+    def accuracy(self) -> float:
+        """Error of the mesh, in parts of the largest force."""
+        return self.mesh_error.force
+
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
         found = _poses_at(travel, (self.pushed, self.pulled))

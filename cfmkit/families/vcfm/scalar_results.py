@@ -32,7 +32,7 @@ DEFINITIONS = {
     "first_stiffness": ("stiffness", "stiffness K_b1 of the leaves as made"),
     "rise": ("length", "h of the leaves: travel to the flat pose"),
     "slenderness": (
-        "ratio",
+        "factor",
         "rise over thickness of the leaves, Q: above pi they buckle, above 3.195 they are bistable",
     ),
     "linear_start": ("length", "travel at which the leaves buckle"),

@@ -56,7 +56,7 @@ _DIMENSIONS = (
     Dimension("density", "kg/m^3", "mass per volume", "1240 kg/m^3"),
     Dimension("time", "s", "time, duration", "0.5 s"),
     Dimension("velocity", "mm/s", "speed", "10 mm/s", up=1e3),
-    Dimension("acceleration", "m/s^2", "acceleration", "9.81 m/s^2"),
+    Dimension("acceleration", "m/s^2", "acceleration", "9.80665 m/s^2"),
     Dimension("frequency", "Hz", "cycles per time", "2 Hz"),
     Dimension("line_load", "N/mm", "force per length of a line", "0.3 N/mm", down=1e3),
     Dimension("area", "mm^2", "area", "12 mm^2", up=1e6),

@@ -92,6 +92,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=target_of(spec),
         reference=solution.reference,
         closed=ClosedFormEffort(solution.character),
+        effort_error=solution.effort_error,
+        part_efforts=solution.part_efforts,
         tables=listed(parts_of(spec)),
         state=solution,
     )

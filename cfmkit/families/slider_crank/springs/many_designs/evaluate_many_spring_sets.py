@@ -32,7 +32,7 @@ from cfmkit.families.slider_crank.springs.model import (
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.metrics.branch_views import MeasuringFrame
+from cfmkit.metrics.branch_views import ZERO, MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.metrics.continuous_means_and_extremes import extremes, mean
 from cfmkit.metrics.ranges_many import (
@@ -44,8 +44,9 @@ from cfmkit.metrics.ranges_many import (
     usable_interval,
     usable_stroke,
 )
-from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
+from cfmkit.metrics.spread import STATIC_BALANCE, ManyWindows, metric_of, metrics_of, static_balance
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone, sharpened
+from cfmkit.results import ROUND_OFF
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS
 
 if TYPE_CHECKING:
@@ -58,10 +59,6 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
-
-
-BALANCED = 1e-12
-"""A mean so small, as a share of the largest effort, is rounding: such a design is left to the model of one."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +141,7 @@ class Base:
             return self.bounded
         if name.startswith("usable_") and self.spec.target_curve is not None:
             return False  # the band lies about the curve: the model of one mechanism knows it
-        known = self.spreads(name) or name in BAND_RANGES or name == RMS or (name in PLACES and self.bounded)
+        known = self.spreads(name) or name in (*BAND_RANGES, RMS, STATIC_BALANCE) or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def spreads(self, name: str) -> bool:
@@ -232,7 +229,8 @@ class Slab:
     def level(self) -> FloatArray:
         """Efforts at the reference; NaN where they are zero but for rounding."""
         level = self.rates @ self.base.assembly.units(np.array([self.base.reference])).effort[:, 0]
-        return np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
+        known = np.abs(level) > np.maximum(self.error, ZERO * np.abs(self.sharp).max(axis=1))
+        return np.where(known, level, np.nan)
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
@@ -268,15 +266,39 @@ class Slab:
         if name in BAND_RANGES:
             low, high = self.within(BAND_RANGES[name])
             return high - low
+        if name == STATIC_BALANCE:
+            return self._static_balance(measure.window)
         return metric_of(name, self.inside(measure.window), target_of(self.base.spec))
+
+    @cached_property
+    def error(self) -> FloatArray:
+        """Rounding of the sums of springs' efforts, (m,): as `results.round_off` has it."""
+        sizes = np.abs(self.shares(self.base.units.effort)).sum(axis=1)
+        return np.asarray(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes)))
+
+    def shares(self, units: FloatArray) -> FloatArray:
+        """Return the efforts of the springs at some places, (m, 4, k), from those of unit springs (4, k)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.where(self.rates[:, :, None] > 0.0, self.rates[:, :, None] * units, 0.0))
+
+    def _static_balance(self, window: tuple[float, float] | None) -> FloatArray:
+        """Return the largest effort in a window over that of one spring of one leg, (m,)."""
+        places, units = self.base.samples_and_grid(window)
+
+        def largest(at: FloatArray) -> FloatArray:
+            unit = self.base.assembly.forces(at.ravel()).reshape(4, *at.shape)
+            return np.asarray(np.abs(self.rates[:, :, None] * unit.swapaxes(0, 1)).max(axis=1))
+
+        part, _ = extremes(largest, places[None, :], np.abs(self.shares(units)).max(axis=1))
+        return np.asarray(static_balance(self.inside(window).spread, part / self.legs))
 
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the efforts in a window."""
         if window not in self.cut:
             motion = self.base.motion_inside(window)
             effort = self.effort if window is None else self.rates @ self.base.inside(window)
-            self.cut[window] = ManyWindows(motion[None, :], effort, partial(self._extremes, window))
-            self.balance(self.cut[window].mean, effort)
+            self.cut[window] = ManyWindows(motion[None, :], effort, partial(self._extremes, window), self.error)
+            self.balance(self.cut[window].mean)
         return self.cut[window]
 
     def _extremes(
@@ -292,10 +314,9 @@ class Slab:
         """Which designs have a mean effort of rounding in some window that was looked at: its sign decides metrics."""
         return np.zeros(len(self.rates), dtype=bool)
 
-    def balance(self, mean: FloatArray, effort: FloatArray) -> None:
-        """Note which means, (m,), are rounding beside the efforts they are of, (m, n)."""
-        nothing = np.abs(mean) <= BALANCED * np.abs(effort).max(axis=1)
-        np.logical_or(self.balanced, nothing, out=self.balanced)
+    def balance(self, mean: FloatArray) -> None:
+        """Note which means, (m,), are rounding: such designs are left to the model of one."""
+        np.logical_or(self.balanced, np.abs(mean) <= self.error, out=self.balanced)
 
     @cached_property
     def cut(self) -> dict[tuple[float, float] | None, ManyWindows]:
@@ -353,7 +374,7 @@ class Slab:
             count, ends = len(self.rates), window or (self.base.low, self.base.high)
             low, high, pose = (np.full(count, end) for end in (*ends, self.base.reference))
             place, value = self.curves.place, self.curves.value
-            self.known[window] = ManyBranches(place, value, low, high, self.somewhere, pose=pose)
+            self.known[window] = ManyBranches(place, value, low, high, self.somewhere, pose=pose, error=self.error)
         return self.known[window]
 
     def usable(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
@@ -367,7 +388,7 @@ class Slab:
             valid = np.full(len(self.rates), base.low)
             start, end = usable_interval([many], level, base.band, valid)
             self.usables[window] = start, end
-            self.balance(level, self.curves.value)
+            self.balance(level)
         return self.usables[window]
 
     def _unit(self, joint: int) -> Callable[[FloatArray], FloatArray]:
