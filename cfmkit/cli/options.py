@@ -81,6 +81,10 @@ Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Pr
 Timeout = Annotated[
     float | None, option("--timeout-per-point", metavar="S", text="Stop the computation of a point after S seconds.")
 ]
+NoLock = Annotated[
+    bool,
+    flag("--no-lock", text="Do not lock the output folder: no other run may use it (for file systems without locks)."),
+]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
 Tables = Annotated[
     str,
@@ -178,6 +182,7 @@ class OneSpec(Changing):
         str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", shell_completion.specs)
     ]
     out: Out = None
+    no_lock: NoLock = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
+from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
 
@@ -53,6 +53,7 @@ class MeasureOptions(Measuring, FigureChoice):
     one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording without a return stroke.")] = False
     as_recorded: Annotated[bool, flag("--as-recorded", text="Keep spikes and the points next to reversals.")] = False
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:
