@@ -253,7 +253,7 @@ class _ClusterRun:
             If the scheduler has gone, or there has been no worker for too long.
         """
         with self._connected():
-            threads = sum(self.client.nthreads().values())
+            threads = int(sum(self.client.nthreads().values()))
         if threads:
             self.last_worker = time.monotonic()
         elif time.monotonic() - self.last_worker > WORKERS_WITHIN:
