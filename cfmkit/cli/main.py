@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +25,7 @@ from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from contextlib import AbstractContextManager
     from types import FrameType
 
 TEXT = (
@@ -113,7 +115,8 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
         _tell_more()
     Stopped.began = False
     try:
-        answer = call.run(call.options, wishes)
+        with _locks_of(call.options):
+            answer = call.run(call.options, wishes)
     except Stopped as stop:
         if hasattr(call.options, "fresh") and not Stopped.began:
             stop.nothing_begun()
@@ -125,6 +128,15 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     elif not wishes.quiet:
         wishes.show(*answer.page)
     return answer.exit_code
+
+
+def _locks_of(options: Any) -> AbstractContextManager[None]:
+    """Return the context of a verb: in it folders are locked, unless an option says otherwise."""
+    if not getattr(options, "no_lock", False):
+        return nullcontext()
+    from cfmkit.store.lock import without_locks
+
+    return without_locks()
 
 
 def _tell_more() -> None:

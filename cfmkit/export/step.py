@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import GeometryError, OutputError, UsageError
+from cfmkit.errors import CfmError, GeometryError, OutputError, UsageError
 from cfmkit.numerics.arc_chain import arcs_through, points_on
 from cfmkit.specs.units import to_border
 
@@ -44,7 +44,16 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
     if sheet.thickness is None:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
-    cut = [_with_arcs(one) for one in drawn if one.layer == "cut" and one.closed]
+    try:
+        return _step(kernel, name, [_with_arcs(one) for one in drawn if one.layer == "cut" and one.closed], sheet)
+    except CfmError:
+        raise
+    except Exception as error:  # the kernel has dozens of its own
+        reported = " ".join(f"{type(error).__name__}: {error}".split())
+        raise GeometryError(f"the CAD kernel cannot make a body from the outline ({reported})") from error
+
+
+def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes:
     wires = [(one, kernel.Wire(_edges(kernel, one))) for one in cut]
     faces = [kernel.Face(wire) for one, wire in wires if not one.hole]
     holes = [kernel.Face(wire) for one, wire in wires if one.hole]

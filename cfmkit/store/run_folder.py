@@ -144,6 +144,11 @@ class RunFolder:
         self._require_open()
         return self.path / JOURNAL
 
+    @property
+    def lock_file(self) -> str:
+        """The name of the file that is the lock; "" if the folder is not locked."""
+        return self._lock.name
+
     def commit(self, info: Mapping[str, Any]) -> Manifest:
         """Put the files and a manifest in place of those of the run before, all or none; once.
 
@@ -269,6 +274,10 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _alive(process: int) -> bool:
+    """Return whether a process lives; of Windows False, where a signal to find out would reach it, and where no file
+    is removed that a process has open."""
+    if os.name == "nt":
+        return False
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -43,6 +43,7 @@ _REASONS = {
     errno.ENOLCK: "the file system has no locks",
 }
 _NO_LINKS = {errno.EPERM, errno.EACCES, errno.EXDEV, errno.EMLINK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+_NO_LINKS |= {errno.EINVAL}  # what Windows says of a drive without links
 _NO_FOLDER_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
 
 
@@ -151,7 +152,9 @@ def discard(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Bring the names in a folder down to the disk."""
+    """Bring the names in a folder down to the disk; Windows opens no folders and does this by itself."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
     descriptor = system.open(path, os.O_RDONLY)
     try:
         system.fsync(descriptor)
@@ -160,6 +163,12 @@ def sync_folder(path: Path) -> None:
             raise
     finally:
         system.close(descriptor)
+
+
+def read_at(descriptor: int, count: int, place: int) -> bytes:
+    """Return up to `count` bytes from a place of an open file; Windows has no `os.pread`. The position changes."""
+    os.lseek(descriptor, place, os.SEEK_SET)
+    return os.read(descriptor, count)
 
 
 def make_folders(path: Path) -> list[Path]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
+from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode
@@ -63,6 +63,7 @@ class MeasureOptions(Measuring, FigureChoice):
         ),
     ] = None
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:

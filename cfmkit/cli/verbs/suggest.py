@@ -14,6 +14,7 @@ from cfmkit.cli.options import (
     Common,
     Fresh,
     Jobs,
+    NoLock,
     NoPlots,
     Out,
     Quiet,
@@ -115,6 +116,7 @@ class SuggestOptions(Common):
     no_plots: NoPlots = False
     report: WithReport = False
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 KEYS = (
