@@ -99,7 +99,7 @@ def _file(name: str, ending: str) -> str:
 
 
 def _found(name: str, ending: str) -> Iterator[Path]:
-    """Yield the files of a door that only this user, or the system's owner, can have written, as they are to be opened."""
+    """Yield the files of a door, links resolved, that only this user or the system's owner can have written."""
     for folder in _places():
         path = folder / _file(name, ending)
         if not os.path.exists(path):  # a folder that may not be looked into holds nothing for us; Path.exists() raises
