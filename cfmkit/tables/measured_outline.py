@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, reason_of
 from cfmkit.tables.lab_file import TextBlock, block_of, decoded, header_cells, refuse_group, split_header
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[
     try:
         text, _ = decoded(path.read_bytes(), name)
     except OSError as error:
-        raise DataError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise DataError(f"{name}: cannot be read: {reason_of(error)}") from None
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     block = block_of(lines, name)
     columns = _columns(lines, block, name)
