@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
-from cfmkit.errors import DataError, UsageError
+from cfmkit.errors import DataError, UsageError, reason_of, visible
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.tables.lab_columns import column_named, read_units, roles_of
@@ -343,7 +343,7 @@ def _content(path: Path) -> bytes:
     except FileNotFoundError:
         raise UsageError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}".lower()) from None
+        raise UsageError(f"{visible(str(path))} cannot be read: {reason_of(error)}") from None
     if len(data) > LARGEST:
         raise DataError(f"{path.name}: is larger than {LARGEST // 1_000_000} MB; thin it out or split it")
     return data

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from cfmkit.errors import OutputError
+from cfmkit.errors import OutputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -71,7 +71,7 @@ def reporting(path: str | os.PathLike[str], doing: str = "write") -> Iterator[No
 
 def reason(error: OSError) -> str:
     """Return why an operation of the system failed, for a message."""
-    return _REASONS.get(error.errno or 0) or (error.strerror or str(error)).lower()
+    return _REASONS.get(error.errno or 0) or reason_of(error)
 
 
 def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:

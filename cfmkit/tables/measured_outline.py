@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, reason_of
 from cfmkit.tables.lab_file import decoded, lines_of, tables_in
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _points(path: Path) -> tuple[FloatArray, LabTable]:
     try:
         text, _ = decoded(path.read_bytes(), name)
     except OSError as error:
-        raise DataError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise DataError(f"{name}: cannot be read: {reason_of(error)}") from None
     tables = tables_in(lines_of(text), name)
     if len(tables) > 1:
         raise DataError(f"{name}: there are {len(tables)} tables, where one is needed; split the file")

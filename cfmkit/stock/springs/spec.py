@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
 
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
@@ -446,7 +446,7 @@ def _lines(source: DataSource) -> list[str]:
     try:
         text = source.path.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        raise DataError(f"{source}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise DataError(f"{source}: cannot be read: {reason_of(error)}") from None
     except UnicodeDecodeError as error:
         raise DataError(f"{source}: byte {error.start + 1} is not UTF-8") from None
     return text.splitlines(keepends=True)
