@@ -402,7 +402,7 @@ def _simplest(edge: Smooth, near: float) -> Edge:
         return edge
     way = middle - z[0]  # the centre of the circle through the first, a middle and the last point
     twice = 2.0 * (way.conjugate() * chord).imag
-    center = z[0] + 1j * (way * abs(chord) ** 2 - chord * abs(way) ** 2) / -twice
+    center = z[0] + 1j * (way * abs(chord) ** 2 - chord * abs(way) ** 2) / twice
     spokes = z - center
     if np.abs(np.abs(spokes) - abs(spokes[0])).max() > near:
         return edge

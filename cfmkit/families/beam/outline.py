@@ -61,7 +61,7 @@ ON = 1e-6
 EXACT = 1e-5
 """How far lines may be from the edges of the outline when it is measured, in thicknesses of the thinnest beam."""
 
-LEAST = 1e-3
+LEAST = 0.1
 """Pads of which less than this share is behind all beams are none."""
 
 SWEPT = 25
