@@ -41,6 +41,8 @@ SPECK = 1e-3
 """Holes and parts smaller than the square of this are rounding, in the same sizes."""
 SMOOTH = 1e-6
 """Where the direction turns by less than this edges are tangent [rad]."""
+TANGENT = 1e-3
+"""Edges that cross at less than this angle [rad] are cut where their polygons cross: where they overlap, anywhere."""
 CHUNK = 0.5 * math.pi
 """By how much a band beside an edge may turn in one polygon [rad]: it cannot overlap itself then."""
 
@@ -368,11 +370,12 @@ def _meeting(one: _Run, other: _Run) -> _Meeting:
     """
     u, v, a, b = one.last, other.first, one.track, other.track
     step = 1e-4
-    for _ in range(30):
+    crossing = abs((a.ahead(u).conjugate() * b.ahead(v)).imag) > TANGENT
+    for _ in range(30 if crossing else 0):
         gap = b.at(v) - a.at(u)
         p, q = ((track.at(w + step) - track.at(w - step)) / (2 * step) for track, w in ((a, u), (b, v)))
         cross = (p.conjugate() * q).imag
-        if abs(cross) < 1e-3 * abs(p) * abs(q):
+        if abs(cross) < TANGENT * abs(p) * abs(q):
             break
         by = (gap.conjugate() * q).imag / cross, (gap.conjugate() * p).imag / cross
         u, v = u + by[0], v + by[1]
@@ -402,7 +405,7 @@ def _simplest(edge: Smooth, near: float) -> Edge:
         return edge
     way = middle - z[0]  # the centre of the circle through the first, a middle and the last point
     twice = 2.0 * (way.conjugate() * chord).imag
-    center = z[0] + 1j * (way * abs(chord) ** 2 - chord * abs(way) ** 2) / -twice
+    center = z[0] + 1j * (way * abs(chord) ** 2 - chord * abs(way) ** 2) / twice
     spokes = z - center
     if np.abs(np.abs(spokes) - abs(spokes[0])).max() > near:
         return edge

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -203,14 +204,16 @@ def test_the_edges_of_a_curved_beam_hold_the_tolerance(tolerance, sweep):
     away = edge_points(contours, tolerance) - center
     angle = np.abs(np.angle((away @ [1, 1j]) / (-1j * np.sign(half))))
     distance = np.hypot(*away[angle < 0.8 * abs(half)].T) - radius
-    assert len(distance) > 300
+    assert len(distance) > 100
     assert np.abs(np.abs(distance) - 4 * MM).max() <= tolerance
 
 
 def test_the_eyes_of_pins_hold_the_tolerance():
     for tolerance in TOLERANCES:
         contours = cfmkit.drawing(config("beam_lee_frame"), tolerance).contours
-        holes = [edge_points([one], tolerance) for one in contours if one.layer == "cut" and one.hole]
+        holes = [
+            edge_points([replace(one, hole=False)], tolerance) for one in contours if one.layer == "cut" and one.hole
+        ]
         assert len(holes) == 2
         for points in holes:
             distance = np.hypot(*(points - points.mean(axis=0)).T)
@@ -219,15 +222,16 @@ def test_the_eyes_of_pins_hold_the_tolerance():
 
 def test_a_finer_tolerance_gives_another_contour_and_a_coarser_one_the_same_as_ever():
     spec = cantilever(("end: tip}", "end: tip, shape: {kind: cosine, rise: 40 mm}}"))
-    count = [sum(len(one.edges) for one in cfmkit.drawing(spec, each).contours) for each in TOLERANCES]
+    drawn = [outlines(cfmkit.drawing(spec, each), each) for each in TOLERANCES]
+    count = [sum(len(one.chain.bulges) for one in each) for each in drawn]
     assert count[0] <= count[1] < count[2] < count[3]
-    assert cfmkit.drawing(spec).contours[0].edges == cfmkit.drawing(spec, 2e-4 * MM).contours[0].edges
+    assert files(cfmkit.drawing(spec)) == files(cfmkit.drawing(spec, 2e-4 * MM), tolerance=2e-4 * MM)
 
 
 @pytest.mark.parametrize("turns", [1.6, 2.6, 10.25])
 def test_windings_on_one_circle_become_a_ring(turns):
     radius, thickness = 20 * MM, 2 * MM
-    angle = np.linspace(0.0, 2 * np.pi * turns, 8000)
+    angle = np.linspace(0.0, 2 * np.pi * turns, 1500)
     points = radius * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
     full = np.full(len(angle), 1.0)
     strip = strip_module.BeamStrip(points, angle, thickness * full, full / radius, 0.0 * full)

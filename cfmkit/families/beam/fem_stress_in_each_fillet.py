@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.model.network_under_drive import Layout
-from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.fem_results import FilletRow, with_nominal
@@ -34,7 +33,7 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     spec = assembly.spec
     beams, nodes = _named(assembly)
     rows = []
-    for one in stressed_fillets(solved, (spec.mechanism.part or PartSpec()).fillet):
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
         joined = one.arc.touched(beams)
         node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
         if (found := one.largest(*window)) is not None:

@@ -27,7 +27,7 @@ from cfmkit.families.beam.network_elements_spec import (
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import format_short
-from cfmkit.stock.material_and_part_spec import SafetyFactor
+from cfmkit.stock.material_and_part_spec import SafetyFactor, fillet_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -261,6 +261,17 @@ class Mechanism(Model):
         """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of all beams [m]."""
+        given = self.of_beams("thickness").values()
+        return min(one if isinstance(one, float) else min(value for _, value in one) for one in given)
+
+    @property
+    def fillet(self) -> float:
+        """Radius of the inside corners of the part [m]."""
+        return fillet_of(self.part, self.thinnest)
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

@@ -61,7 +61,7 @@ ON = 1e-6
 EXACT = 1e-5
 """How far lines may be from the edges of the outline when it is measured, in thicknesses of the thinnest beam."""
 
-LEAST = 1e-3
+LEAST = 0.1
 """Pads of which less than this share is behind all beams are none."""
 
 SWEPT = 25
@@ -232,10 +232,10 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     solid = _drawn_parts(assembly, beams, SHARE * tolerance)
     frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
-    part = spec.mechanism.part or PartSpec()
+    part, fillet = spec.mechanism.part or PartSpec(), spec.mechanism.fillet
     pieces = [*solid.pieces, *map(Piece.polygon, frame)]
-    contours = merged(pieces, fine / FINE, part.fillet, solid.holes)
-    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, part.fillet)
+    contours = merged(pieces, fine / FINE, fillet, solid.holes)
+    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
@@ -245,7 +245,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
-    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, part.fillet))
+    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, fillet))
     return Drawing(
         "beams",
         (*contours, *paths, *marks),
@@ -254,7 +254,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
         _sheet(assembly, beams),
         dimensions=dimensions,
         facts=facts,
-        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, solid.blocks, contours, part.fillet)),
+        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, solid.blocks, contours, fillet)),
         tolerance=fine,
         sections=sections,
     )

@@ -23,7 +23,14 @@ from cfmkit.specs.spec import (
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
+from cfmkit.stock.material_and_part_spec import (
+    MaterialSpec,
+    PositiveStress,
+    SafetyFactor,
+    fillet_of,
+    material_input,
+    sheet_faults,
+)
 from cfmkit.stock.springs.spec import Catalogue, Life
 
 if TYPE_CHECKING:
@@ -191,6 +198,17 @@ class Mechanism(Model):
         if self.positive is None:
             raise TypeError("the springs of this mechanism are bought")
         return self.positive
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of all leaves that are cut [m]."""
+        cut = [one for one in (self.bistable, self.positive) if one is not None]
+        return min(one.thickness for one in cut)
+
+    @property
+    def fillet(self) -> float:
+        """Radius of the inside corners of both parts [m]."""
+        return fillet_of(self.part, self.thinnest)
 
     @property
     def kinds(self) -> tuple[str, str]:

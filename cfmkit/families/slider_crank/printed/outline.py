@@ -182,17 +182,17 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
 
     part = spec.mechanism.part or PaddedPart()
     outline, *others = drawn.contours
-    rounded, sharp = filleted(outline, part.fillet)
+    rounded, sharp = filleted(outline, spec.mechanism.fillet)
     frame = _frame(spec, drawn)
     made: tuple[Contour, ...] = (rounded,)
     if frame:
         thinnest = float(drawn.tables[0].columns["thickness"][0].min())
         check_simple(rounded.points(SAGITTA * thinnest), "the outline of the leg")  # the union would hide it
-        made = merged([Piece.within(rounded), *map(Piece.polygon, frame)], thinnest, part.fillet)
+        made = merged([Piece.within(rounded), *map(Piece.polygon, frame)], thinnest, spec.mechanism.fillet)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True)]
     marks += [mark(one, driven=False) for one in frame]
-    return replace(drawn, contours=(*made, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
+    return replace(drawn, contours=(*made, *holes, *others, *marks), notes=sharp_notes(sharp, spec.mechanism.fillet))
 
 
 def _frame(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, ...]:
