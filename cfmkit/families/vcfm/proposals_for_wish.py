@@ -224,7 +224,8 @@ def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes
         return None
     promise = across * (stands + min(one.free_length or 0.0 for one in springs))
     promise = promise if wish.good_parts is None else -float(leaf.thickness)
-    listed = spec.replace({"design.catalogue": tuple(springs)})
+    # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
+    listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": wish.depth})
     return Candidate(called("2 Vs, catalogue springs", wish, block), listed, True, FINISH, float(promise))
 
 
