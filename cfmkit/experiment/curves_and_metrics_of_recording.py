@@ -426,7 +426,8 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     # Passages at reversals are left out of one branch or the other of every recording.
     allowed = LARGEST_HOLE * (widest[1] - widest[0]) + source.passage
     late, early = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
-    cut = [late] * (common.lo - widest[0] > allowed) + [early] * (widest[1] - common.hi > allowed)
+    missing = {late: common.lo - widest[0], early: widest[1] - common.hi}
+    cut = [key for key, length in missing.items() if length > allowed]
     if not cut:
         return ()
     (branch, number), (low, high) = cut[0], extents[cut[0]]
