@@ -374,7 +374,7 @@ def numbers_of(
         return tuple(emptied(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
 
     covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
-    each = tuple(metrics | coverage for metrics, coverage in zip(all_metrics(source.raw), covered_by, strict=True))
+    each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = emptied(repeatability(source.raw, window), large, kind)
     raw = _mean(each) | least(covered_by) | repeated

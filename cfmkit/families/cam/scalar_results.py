@@ -430,9 +430,9 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "loop_area_per_friction": loop_area_per_friction(built),
     }
     unknown = OF_THE_FORCE if large_holes(built) else ()
-    found = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    known = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
     why = "a part of the flanks was not measured"
-    return found | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
+    return known | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
 
 
 OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_friction")
