@@ -234,7 +234,8 @@ def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter])
         except CfmError:
             return nothing  # the solver then takes a shorter step
         zeros = _zeros(parameters, values)
-        return root * np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
+        errors: FloatArray = root * np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
+        return errors
 
     effect = float(np.mean(weight**2) / np.mean(weight) ** 2)
     return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level, effect)

@@ -11,8 +11,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
-from cfmkit.experiment.coverage import holes_of
-from cfmkit.experiment.curves_and_metrics_of_recording import elapsed, emptied, large_holes
+from cfmkit.experiment.coverage import emptied, holes_of, large_holes
+from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop

@@ -7,18 +7,20 @@ is known of what the force did: a hole. What holds over a window with a large ho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
+from cfmkit.metrics.metric_definitions import split_name
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, STEPS, holes_between
+from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics import Window
@@ -58,6 +60,65 @@ def holes_of(curves: Sequence[Curve], window: Window) -> tuple[Hole, ...]:
 def share_covered(holes: Sequence[Hole], window: Window) -> float:
     """Return which part of a window one branch of one cycle covers."""
     return 1.0 - sum(hole.width for hole in holes) / (window.hi - window.lo)
+
+
+def number_of(curve: Curve) -> int | None:
+    """Return the number of a curve's cycle; None where there is one only."""
+    return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
+
+
+def of_cycle(holes: Sequence[Hole], curve: Curve) -> list[Hole]:
+    """Return the holes of the cycle that is a curve."""
+    return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
+
+
+UNKNOWN = "not recorded"
+"""Begins the reason why a metric over a hole has no value."""
+
+
+def large_holes(holes: Sequence[Hole], window: Window, largest: float = LARGEST_HOLE) -> tuple[Hole, ...]:
+    """Return the holes that are larger than a part of a window."""
+    return tuple(hole for hole in holes if hole.width > largest * (window.hi - window.lo))
+
+
+def hole_finding(large: Sequence[Hole], window: Window, kind: Kind, cure: str = "") -> Finding:
+    """Return what is said of large holes in a window."""
+    named = ", ".join(hole.text(kind) for hole in large[:4]) + (f" and {len(large) - 4} more" if len(large) > 4 else "")
+    share = max(hole.width for hole in large) / (window.hi - window.lo)
+    reported = (
+        f"{UNKNOWN}: {named} (up to {100 * share:.0f} % of the window): numbers over the window "
+        f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
+    )
+    return Finding("holes", reported)
+
+
+def emptied(metrics: Mapping[str, Quantity], large: Sequence[Hole], kind: Kind) -> dict[str, Quantity]:
+    """Return metrics, without a value for branches with a large hole and for what needs all branches."""
+    branches = {hole.branch: hole for hole in reversed(large)}
+    found = dict(metrics)
+    for name, item in metrics.items():
+        branch = split_name(name)[1]
+        hole = branches.get(branch) if branch is not None else next(iter(large), None)
+        if hole is not None and item.value is not None:
+            found[name] = replace(item, value=None, reason=f"{UNKNOWN}: {hole.text(kind)}")
+    return found
+
+
+_COVERAGE = "part of the window that was recorded, from steps of more than {} usual ones; of several cycles the least"
+
+
+def coverage(curve: Curve, holes: Sequence[Hole], window: Window) -> dict[str, Quantity]:
+    """Return which part of the window each branch of a curve covers, and the least of them."""
+    definition = _COVERAGE.format(f"{STEPS:g}")
+    shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
+    named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
+    found = {"coverage": min(shares.values()), **named}
+    return {name: Quantity(value, "ratio", definition) for name, value in found.items()}
+
+
+def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+    """Return the least value of each quantity."""
+    return {name: min((item[name] for item in each), key=lambda one: one.value or 0.0) for name in each[0]}
 
 
 def read_largest_hole(text: str | float | None) -> float:

@@ -21,19 +21,29 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
-from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Cycles, Stroke, Strokes, choose, covered, read_cycles, split
-from cfmkit.experiment.coverage import Hole, holes_of, share_covered
+from cfmkit.experiment.branches import LOAD, UNLOAD, Cycles, Stroke, Strokes, choose, read_cycles, split
+from cfmkit.experiment.coverage import (
+    Hole,
+    coverage,
+    emptied,
+    hole_finding,
+    holes_of,
+    large_holes,
+    least,
+    number_of,
+    of_cycle,
+)  # fmt: skip
+from cfmkit.experiment.findings import FINDINGS, passages_left_out, spikes_left_out, warnings_of
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import settled
 from cfmkit.experiment.zeros_and_signs import corrected
-from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name, split_name
+from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, STEPS
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
-from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     import os
@@ -43,29 +53,12 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.reversal_transitions import Settled
 
 LEFT_OUT = ("reversals", "spikes")
 """What verbs leave out of a recording unless it is to count as recorded."""
 
 CYCLES_PER_STROKE = 60.0
 """Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
-
-FINDINGS = {
-    "one_branch": "the recording has no return branch: there is no loop",
-    "unfinished_cycle": "strokes that belong to no complete cycle are left out",
-    "seating_cycles": "first cycles that cover less of the travel than the others are left out: they seat the parts",
-    "short_cycles": "cycles that cover less of the travel than others are left out",
-    "window_cut": "one branch of one cycle covers less than the others: the numbers hold over what all of them cover",
-    "holes": "a part of the travel was not recorded: what holds over a window with a large hole in it is not known",
-    "pauses": "points at which the machine stood are left out",
-    "spikes": "points far off their neighbours are left out",
-    "reversals": "points next to reversals, where the force passes from one branch to the other, are left out",
-    "window_at_reversal": "the window reaches into points that are left out next to reversals: it was shortened",
-    "not_filtered": "there are too few points for the filter",
-    "negative_force": "the mean force is negative: the sign of the sensor may be reversed",
-    "negative_loop": "the mechanism would deliver energy in every cycle: a sign may be reversed",
-}
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,7 +131,7 @@ def measured(
     _check_words(low_pass, leave_out)
     strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
     each = strokes.measured
-    warnings = (*_warnings(recording, strokes), *left_out)
+    warnings = (*warnings_of(recording, strokes), *left_out)
     chosen = _default(recording) if low_pass == "default" else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in each)
     if turned_loop(raw):
@@ -204,11 +197,11 @@ def _strokes(
     """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
     strokes = choose(_without(recording, spiky), cycles, recording.name)
-    reached, reported = _reached(recording, strokes), _spikes_left_out(recording, spiky)
+    reached, reported = _reached(recording, strokes), spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
         return strokes, reached, 0.0, reported
     found = settled(recording, strokes)
-    return found.strokes, reached, found.length, (*reported, *_passages_left_out(recording, found))
+    return found.strokes, reached, found.length, (*reported, *passages_left_out(recording, found))
 
 
 def _spiky(recording: Recording) -> NDArray[np.bool_]:
@@ -260,24 +253,6 @@ def _reached(recording: Recording, strokes: Strokes) -> Window:
     return Window(max(low for low, _ in ends), min(high for _, high in ends))
 
 
-def _spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Finding, ...]:
-    """Return what is said of spikes."""
-    count = int(spiky.sum())
-    if not count:
-        return ()
-    return (Finding("spikes", f"{count} of {len(recording)} points are far from their neighbours and are omitted"),)
-
-
-def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:
-    """Return what is said of the points next to reversals."""
-    if not found.length:
-        return ()
-    length = format_short(found.length, recording.motion_dimension, 3)
-    points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
-    reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
-    return (Finding("reversals", reported),)
-
-
 def _default(recording: Recording) -> LowPass:
     cutoff = CYCLES_PER_STROKE / recording.travel
     return LowPass(cutoff, recording.motion_dimension, DEFAULT_ORDER)
@@ -327,53 +302,6 @@ def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
     strokes = [stroke for cycle in source.strokes.measured for stroke in cycle if stroke.branch == branch]
     passed: FloatArray = np.concatenate([clock[stroke.points[_by_motion(recording, stroke)]] for stroke in strokes])
     return passed
-
-
-def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
-    found = []
-    cycles = strokes.cycles
-    if not cycles:
-        only = strokes.measured[0][0].branch
-        found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
-    left = len(strokes.strokes) - (2 * len(strokes.complete) or 1)
-    if cycles and covered(cycles[0]) < WHOLE:
-        reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
-        found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
-    if left:
-        found.append(
-            Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
-        )
-    if strokes.shorter:
-        found.append(_shorter(recording, strokes))
-    if strokes.pauses:
-        reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
-        found.append(Finding("pauses", reported))
-    if float(recording.effort.mean()) < 0:
-        reported = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
-        found.append(Finding("negative_force", reported))
-    return tuple(found)
-
-
-def _shorter(recording: Recording, strokes: Strokes) -> Finding:
-    """Return what is said of cycles that cover less than others."""
-    first = strokes.cycles[0][0].cycle
-    numbers = [cycle[0].cycle for cycle in strokes.shorter]
-    seating = max(numbers) < first
-
-    def span(cycle: tuple[Stroke, Stroke]) -> str:
-        ends = recording.motion[int(cycle[0].points[0]) : int(cycle[1].points[-1]) + 1]
-        return span_text(float(ends.min()), float(ends.max()), recording.kind)
-
-    each = ", ".join(f"{cycle[0].cycle} ({span(cycle)})" for cycle in strokes.shorter[:4])
-    more = f" and {len(numbers) - 4} more" if len(numbers) > 4 else ""
-    there = [cycle[0].cycle for cycle in strokes.complete]
-    cycles, verb = ("cycles", "are") if len(numbers) > 1 else ("cycle", "is")
-    what = "seating " if seating else ""
-    reported = (
-        f"{what}{cycles} {each}{more} {verb} left out, as others cover {span(strokes.cycles[0])}; "
-        f"--cycles {there[0]}:{there[-1]} keeps all"
-    )
-    return Finding("seating_cycles" if seating else "short_cycles", reported)
 
 
 @dataclass(frozen=True)
@@ -443,13 +371,13 @@ def numbers_of(
 
     def all_metrics(curves: Sequence[Curve]) -> tuple[Mapping[str, Quantity], ...]:
         each = ((curve, measure(curve, frame, window, _over_motion(kind))) for curve in curves)
-        return tuple(emptied(metrics, _of_cycle(large, curve), kind) for curve, metrics in each)
+        return tuple(emptied(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
 
-    covered_by = tuple(_coverage(curve, _of_cycle(holes, curve), window) for curve in source.raw)
-    each = tuple(metrics | coverage for metrics, coverage in zip(all_metrics(source.raw), covered_by, strict=True))
+    covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
+    each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
     smooth = all_metrics(source.filtered)
     repeated = emptied(repeatability(source.raw, window), large, kind)
-    raw = _mean(each) | _least(covered_by) | repeated
+    raw = _mean(each) | least(covered_by) | repeated
     return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings, large)
 
 
@@ -459,65 +387,6 @@ def _over_motion(kind: Kind) -> tuple[Definition, ...]:
     known = metrics_by_name(kind)
     how = "over the {motion} in the window, each sample weighted by the way that it stands for (trapezoids)"
     return tuple(replace(known[name], definition=f"{words} {how}") for name, words in own.items())
-
-
-def _number(curve: Curve) -> int | None:
-    """Return the number of a curve's cycle; None where there is one only."""
-    return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
-
-
-def _of_cycle(holes: Sequence[Hole], curve: Curve) -> list[Hole]:
-    """Return the holes of the cycle that is a curve."""
-    return [hole for hole in holes if hole.cycle in (None, _number(curve))]
-
-
-UNKNOWN = "not recorded"
-"""Begins the reason why a metric over a hole has no value."""
-
-
-def large_holes(holes: Sequence[Hole], window: Window, largest: float = LARGEST_HOLE) -> tuple[Hole, ...]:
-    """Return the holes that are larger than a part of a window."""
-    return tuple(hole for hole in holes if hole.width > largest * (window.hi - window.lo))
-
-
-def hole_finding(large: Sequence[Hole], window: Window, kind: Kind, cure: str = "") -> Finding:
-    """Return what is said of large holes in a window."""
-    named = ", ".join(hole.text(kind) for hole in large[:4]) + (f" and {len(large) - 4} more" if len(large) > 4 else "")
-    share = max(hole.width for hole in large) / (window.hi - window.lo)
-    reported = (
-        f"{UNKNOWN}: {named} (up to {100 * share:.0f} % of the window): numbers over the window "
-        f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
-    )
-    return Finding("holes", reported)
-
-
-def emptied(metrics: Mapping[str, Quantity], large: Sequence[Hole], kind: Kind) -> dict[str, Quantity]:
-    """Return metrics, without a value for branches with a large hole and for what needs all branches."""
-    branches = {hole.branch: hole for hole in reversed(large)}
-    found = dict(metrics)
-    for name, item in metrics.items():
-        branch = split_name(name)[1]
-        hole = branches.get(branch) if branch is not None else next(iter(large), None)
-        if hole is not None and item.value is not None:
-            found[name] = replace(item, value=None, reason=f"{UNKNOWN}: {hole.text(kind)}")
-    return found
-
-
-_COVERAGE = "part of the window that was recorded, from steps of more than {} usual ones; of several cycles the least"
-
-
-def _coverage(curve: Curve, holes: Sequence[Hole], window: Window) -> dict[str, Quantity]:
-    """Return which part of the window each branch of a curve covers, and the least of them."""
-    definition = _COVERAGE.format(f"{STEPS:g}")
-    shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
-    named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
-    found = {"coverage": min(shares.values()), **named}
-    return {name: Quantity(value, "ratio", definition) for name, value in found.items()}
-
-
-def _least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
-    """Return the least value of each quantity."""
-    return {name: min((item[name] for item in each), key=lambda one: one.value or 0.0) for name in each[0]}
 
 
 def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
@@ -548,7 +417,7 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     """Return what is said where one branch makes the window much shorter than the others would."""
     kind = source.recording.kind
     extents = {
-        (branch, _number(curve)): (float(part.min()), float(part.max()))
+        (branch, number_of(curve)): (float(part.min()), float(part.max()))
         for curve in source.raw
         for branch in curve.branches
         for part in [curve.on(branch).motion]
@@ -557,7 +426,8 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     # Passages at reversals are left out of one branch or the other of every recording.
     allowed = LARGEST_HOLE * (widest[1] - widest[0]) + source.passage
     late, early = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
-    cut = [late] * (common.lo - widest[0] > allowed) + [early] * (widest[1] - common.hi > allowed)
+    missing = {late: common.lo - widest[0], early: widest[1] - common.hi}
+    cut = [key for key, length in missing.items() if length > allowed]
     if not cut:
         return ()
     (branch, number), (low, high) = cut[0], extents[cut[0]]
@@ -615,6 +485,6 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed", "emptied",
-    "hole_finding", "large_holes", "measured", "numbers_of", "read_measured", "require_loop",
+    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed", "measured",
+    "numbers_of", "read_measured", "require_loop",
 ]  # fmt: skip

@@ -14,7 +14,8 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
 from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
-from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, hole_finding, numbers_of
+from cfmkit.experiment.coverage import hole_finding
+from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text

@@ -208,7 +208,7 @@ def read_recordings(
     if key in ("", ONE):
         found = None if key else _specimens(table, roles)
         if found is not None:
-            values = list(dict.fromkeys(table.texts(found)))
+            values = list(dict.fromkeys(_labels(table, found)))
             raise DataError(
                 f"{name}: {shown(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
                 f"choose {_options(found.name, values)}, or --group {ONE} if all rows are of one"
@@ -235,6 +235,9 @@ _NO_SPECIMEN = re.compile(
     r"|judg|state|status|mode|unit|remark|comment|note|event|flag|error|date|datum|time|zeit).*"
 )
 """Columns of such names tell parts of one recording apart, or say something of its points."""
+
+
+_SPECIMEN = re.compile(r"(?i).*(specimen|sample|probe|pr\u00fcfling|muster|teil|part|piece|serial|\bid\b).*")
 
 
 def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, name: str) -> dict[str, Recording]:
@@ -267,16 +270,25 @@ MOST_LISTED = 6
 """So many values are listed to choose from."""
 
 
+def _labels(table: LabTable, column: ColumnInfo) -> list[str]:
+    """Return the cells of a column; an empty one is as the one above it, as spreadsheets merge them."""
+    found: list[str] = []
+    for text in table.texts(column):
+        found.append(text or (found[-1] if found else ""))
+    return found
+
+
 def _parts(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:
     """Return the rows of each value of a column."""
-    texts = table.texts(column)
-    return {item: table.only(text == item for text in texts) for item in dict.fromkeys(texts)}
+    labels = _labels(table, column)
+    return {item: table.only(label == item for label in labels) for item in dict.fromkeys(labels)}
 
 
 def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo | None:
     """Return the column that tells specimens apart; None where none does.
 
-    It has words or whole numbers without a unit, each in rows that follow each other and cover much of the travel.
+    It has words or whole numbers without a unit, each over much of the travel, and in rows that follow each other
+    unless its name says what it is.
     """
     filled = table.with_values(list(roles.values()))
     motion = filled.numbers(roles.get("displacement") or roles["angle"])
@@ -284,15 +296,23 @@ def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo |
     for column in table.columns:
         if column in roles.values() or column.unit or column.index in units or _NO_SPECIMEN.fullmatch(column.name):
             continue
-        texts = np.array(filled.texts(column))
-        starts = np.flatnonzero(texts[1:] != texts[:-1]) + 1
-        values = set(texts.tolist())
-        if not 2 <= len(values) == len(starts) + 1 or "" in values or any("." in text for text in values):
+        labels = np.array(_labels(filled, column))
+        values, runs = set(labels.tolist()), 1 + int((labels[1:] != labels[:-1]).sum())
+        named = _SPECIMEN.fullmatch(column.name) is not None
+        if len(values) < 2 or "" in values or (runs > len(values) and not named):
             continue
-        parts = np.split(motion, starts)
+        if any(_is_fraction(value, table) for value in values) or len(values) > len(labels) // FEWEST:
+            continue
+        parts = [motion[labels == value] for value in values]
         if all(len(part) >= FEWEST and np.ptp(part) > 0.5 * np.ptp(motion) for part in parts):
             return column
     return None
+
+
+def _is_fraction(text: str, table: LabTable) -> bool:
+    """Return whether a text is a number that is not whole: something was measured there."""
+    number = table.shape.dialect.number(text)
+    return number is not None and not number[0].is_integer()
 
 
 def _recording(

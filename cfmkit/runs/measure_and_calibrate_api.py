@@ -90,7 +90,7 @@ def measure(
 
 
 def measure_each(
-    data: str | os.PathLike[str], units: str | None, group: str, how: MeasureOptions
+    data: str | os.PathLike[str], units: str | None, group: str | None, how: MeasureOptions
 ) -> dict[str, MeasureReport]:
     """Return what the measured curve of each specimen of a file says, by specimen."""
     from cfmkit.experiment.reading import read_recordings

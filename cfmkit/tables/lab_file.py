@@ -88,7 +88,8 @@ class Dialect:
 
     def is_number(self, cell: str) -> bool:
         """Return whether a cell is a number in this dialect, perhaps with a unit."""
-        return self.number(cell) is not None
+        match = _NUMBERS[self.decimal].fullmatch(cell)
+        return match is not None and (not match[2] or dimension_of(match[2]) is not None)
 
 
 @dataclass(frozen=True)
@@ -106,11 +107,19 @@ class Shape:
         return cells + [""] * (self.width - len(cells))
 
     def numbers_in(self, line: str) -> int:
-        """Return how many of the columns with numbers have one in a line; 0 where it labels itself."""
+        """Return how many of the columns with numbers have one in a line."""
         cells = self.row(line)
-        if any(cells[column] for column in self.blank):
-            return 0
         return sum(self.dialect.is_number(cells[column]) for column in self.numeric)
+
+    def is_row(self, line: str) -> bool:
+        """Return whether a line has what every row has, and no word where rows have nothing."""
+        cells = self.row(line)
+        full = len(self.dialect.cells(line)) == self.width and self.numbers_in(line) == len(self.numeric)
+        return full and not any(cells[column] for column in self.blank)
+
+    def labels_itself(self, line: str) -> bool:
+        """Return whether a word stands where the first number is to be, as in ``Rate; 20`` above a table."""
+        return self.row(line)[self.numeric[0]][:1].isalpha()
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,21 +276,18 @@ def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = Non
         raise DataError(f"{name}: line {long + 1} has {len(lines[long])} characters; at most {LONGEST_LINE} are read")
     shape = _shape(lines, filled, name)
     runs = _runs(lines, filled, shape)
-    longest = max(runs, key=len)
-    chosen = [run for run in runs if len(run) >= FEWEST_ROWS] or [longest]
+    enough = min(2, len(shape.numeric))
+    long_ones = [run for run in runs if sum(shape.numbers_in(lines[index]) >= enough for index in run) >= FEWEST_ROWS]
+    chosen = long_ones or [max(runs, key=len)]
     for run in runs:
         most = max(shape.numbers_in(lines[index]) for index in run)
-        if run not in chosen and (most > 1 if run[0] > chosen[0][0] else _is_all_numbers(lines[run[-1]], shape)):
+        if run not in chosen and (most > 1 if run[0] > chosen[0][0] else shape.is_row(lines[run[-1]])):
             raise DataError(
                 f"{name}: line {max(run[0], chosen[0][0]) + 1}: numbers go on here after a text that interrupts them; "
                 "remove the text, or the numbers that do not belong to the table"
             )
     starts = [0, *(run[-1] + 1 for run in chosen)]
     return [_table(lines, shape, run, start, units or {}, name) for run, start in zip(chosen, starts, strict=False)]
-
-
-def _is_all_numbers(line: str, shape: Shape) -> bool:
-    return shape.numbers_in(line) == len(shape.numeric) and len(shape.dialect.cells(line)) == shape.width
 
 
 def _shape(lines: list[str], filled: list[int], name: str) -> Shape:
@@ -331,7 +337,7 @@ def _runs(lines: list[str], filled: list[int], shape: Shape) -> list[list[int]]:
         count = shape.numbers_in(lines[index])
         if count and runs and runs[-1][-1] == before and (before == index - 1 or count == len(shape.numeric)):
             runs[-1].append(index)
-        elif count:
+        elif count and not (count < 2 and shape.labels_itself(lines[index])):
             runs.append([index])
         before = index
     return runs

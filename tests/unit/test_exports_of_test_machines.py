@@ -32,10 +32,7 @@ LVM = (
 
 EXPORTS = {
     "Mark-10": 'Reading,"Load [lbF]","Travel [in]","Time [sec.]"\n'
-    + "".join(
-        f"{n},{f / LBF:.7f},{s / INCH:.7f},{t:.2f}\n"
-        for n, (t, s, f) in enumerate(POINTS, 1)
-    ),
+    + "".join(f"{n},{f / LBF:.7f},{s / INCH:.7f},{t:.2f}\n" for n, (t, s, f) in enumerate(POINTS, 1)),
     "Imada": "No.,Force,Unit,Displacement,Unit,Judge\n" + lines("{n},{f},kgf,{s},mm,OK", KGF),
     "Imada, unit before": "No.;Unit;Force;Unit;Travel\n" + lines("{n};N;{f};mm;{s}"),
     "Instron": 'Specimen 1\n\n"Time","Extension","Load"\n"(s)","(mm)","(N)"\n' + lines('"{t}","{s}","{f}"'),
@@ -65,6 +62,9 @@ EXPORTS = {
     "rows of spaces": "s [mm],F [N]\n" + lines("{s},{f}") + "   ,   \n" * 50,
     "decimal comma between spaces": "Weg [mm] Kraft [N]\n" + lines("{s}   {f}", 1, ","),
     "a line that names the separator": "sep=;\ns [mm];F [N]\n" + lines("{s};{f}"),
+    "a long preamble of names and values": "".join(f"Setting {k};{k}\n" for k in range(12))
+    + "s [mm];F [N]\n"
+    + lines("{s};{f}"),
     "sums below": "s [mm];F [N]\n" + lines("{s};{f}") + "\nMean;50.5\nStandard deviation\n",
     "a remark that not every line has": "s [mm];F [N];note\n" + lines("{s};{f}").replace("\n", ";start\n", 1),
     "other spellings": "Travel [Millimeters],Load [Newtons]\n" + lines("{s},{f}"),
@@ -74,8 +74,7 @@ EXPORTS = {
     "ozF": "s [mm];F [ozF]\n" + lines("{s};{f}", LBF / 16),
     "gF": "s [mm];F [gF]\n" + lines("{s};{f}", KGF / 1e3),
     "kp": "s [mm];F [kp]\n" + lines("{s};{f}", KGF),
-    "micrometres": "s [µm];F [mN]\n"
-    + "".join(f"{1e3 * s:.3f};{1e3 * f:.3f}\n" for _, s, f in POINTS),
+    "micrometres": "s [µm];F [mN]\n" + "".join(f"{1e3 * s:.3f};{1e3 * f:.3f}\n" for _, s, f in POINTS),
 }
 
 
@@ -164,6 +163,9 @@ def two(header, form, second=1.4):
 SPECIMENS = {
     "numbers": ("Specimen", two("Specimen,s [mm],F [N]\n", "{k},{s},{f}\n"), ("1", "2")),
     "words": ("Probe", two("s [mm];F [N];Probe\n", "{s};{f};P-{k}\n"), ("P-1", "P-2")),
+    "numbers with a point": ("Sample", two("Sample,s [mm],F [N]\n", "{k}.0,{s},{f}\n"), ("1.0", "2.0")),
+    "merged cells": ("Specimen", two("Specimen;s [mm];F [N]\n", ";{s};{f}\n").replace("\n;0.0000;", "\nA;0.0000;", 1)
+        .replace("\n;0.0000;70", "\nB;0.0000;70", 1), ("A", "B")),
     "of the same force": ("Teil", two("Teil;s [mm];F [N]\n", "{k};{s};{f}\n", 1.0), ("1", "2")),
     "tables": ("table", two("", "") + "\n".join(
         f"Specimen {k}\ns [mm];F [N]\n" + "".join(f"{s:.4f};{k * f:.4f}\n" for s, f in zip(MOTION, FORCE, strict=True))
@@ -188,6 +190,14 @@ def test_several_specimens_are_refused_with_the_choices_and_each_can_be_chosen(t
     assert each[values[0]].effort == pytest.approx(FORCE, abs=1e-4)
     with pytest.raises(DataError, match=f'choose|there are --group "{column}={values[0]}"'):
         read_recording(path, None, f"{column}=9")
+
+
+def test_specimens_that_take_turns_are_told_apart_by_the_name_of_their_column(tmp_path):
+    body = "".join(f"{k},{s:.4f},{x * f:.4f}\n" for _, s, f in POINTS for k, x in (("A", 1.0), ("B", 1.4)))
+    (tmp_path / "data.csv").write_text("Specimen,s [mm],F [N]\n" + body)
+    with pytest.raises(DataError, match='choose --group "Specimen=A" or --group "Specimen=B"'):
+        read_recording(tmp_path / "data.csv")
+    assert read_recording(tmp_path / "data.csv", None, "Specimen=B").effort == pytest.approx(1.4 * FORCE, abs=1e-4)
 
 
 def test_all_rows_are_of_one_specimen_if_the_user_says_so(tmp_path):

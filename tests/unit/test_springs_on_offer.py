@@ -147,9 +147,11 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, reported):
         (b"name,stiffness [N/mm]\nA,1\nA,2\n", "csv:3: there are two springs 'A' with different values"),
         (b"name,stiffness [N/mm]\n", "lists no spring"),
         (b"", "lists no spring"),
-        (b"\xff\xfen\x00", "byte 1 is not UTF-8"),
-        (b"name;stiffness [N/mm]\nA;0,4\n", "cells are separated by commas"),
+        (b"\x00\x01\x02name", "is not a text file"),
+        (b"name;stiffness [N/mm]\nA;1.000,4\n", "csv:2: stiffness: '1.000,4' has a comma"),
         (b"name,stiffness [N/mm],fatigue\nA,1,x\n", "'fatigue' is not a column"),
+        (b"name,stifness,price\nA,1,x\n", "'stifness' is not a column of a list of springs; did you mean 'stiffness'?"),
+        (b"name,stiffness [N/mm],limit [mm]\nA,1,3\n", "'limit' is not a column of a list of springs; columns are"),
         (b"stiffness [N/mm]\n1\n", "csv:2: name: missing"),
     ],
 )
@@ -159,6 +161,23 @@ def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data
         offers(DataSource("springs.csv", tmp_path), "extension")
     assert reported in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("name;stiffness [N/mm];max_elongation [mm];Preis [€]\nFeder-1;0,55;165;2,80\n", "utf-8"),
+        ("name;stiffness [N/mm];max_elongation [mm];Händler\nFeder-1;0,55;165;Müller\n", "latin-1"),
+        ("\n;;\nName;Stiffness (N/mm);Max elongation (mm)\nFeder-1;0,55;165\n", "utf-8-sig"),
+        ("name\tstiffness [N/mm]\tmax_elongation [mm]\nFeder-1\t0.55\t165\n", "utf-16"),
+        ("name|stiffness [N/mm]|max_elongation [mm]|price\nFeder-1|0.55|165|3\n", "utf-8"),
+        ("name,stiffness [N/mm],max_load [N],initial_tension [N]\nFeder-1,0.55,92.75,2\n", "utf-8"),
+    ],
+)
+def test_lists_of_springs_as_makers_and_spreadsheets_write_them(tmp_path, text, encoding):
+    (tmp_path / "springs.csv").write_bytes(text.encode(encoding))
+    (one,) = offers(DataSource("springs.csv", tmp_path), "extension")
+    assert (one.name, one.rate, one.largest) == ("Feder-1", pytest.approx(550.0), pytest.approx(0.165))
 
 
 def test_cells_of_a_file_have_the_units_of_its_header(tmp_path):

@@ -150,7 +150,7 @@ def _numbers(report: MeasureReport) -> CellGrid:
 
 
 def _shown(report: MeasureReport) -> list[str]:
-    from cfmkit.experiment.curves_and_metrics_of_recording import UNKNOWN
+    from cfmkit.experiment.coverage import UNKNOWN
 
     curve = report.source.raw[0]
     stems = ("mean", "sd", "max", "min")

@@ -41,14 +41,13 @@ from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
     curve_cut_for,
     design_values,
-    large_holes,
     largest,
     pressure_of,
-    requested_travel,
     target_force,
     values_of_built,
 )
 from cfmkit.families.cam.solution import Assembly, Built, Sides
+from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between

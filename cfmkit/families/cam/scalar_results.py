@@ -13,8 +13,8 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
+from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.metrics.continuous_means_and_extremes import extremes
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.evaluable_target_curve import TargetCurve
 from cfmkit.specs.units import between
@@ -22,8 +22,6 @@ from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, 
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
@@ -437,58 +435,19 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "loop_area_per_friction": loop_area_per_friction(built),
     }
     unknown = OF_THE_FORCE if large_holes(built) else ()
-    found = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    known = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
     why = "a part of the flanks was not measured"
-    return found | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
+    return known | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
 
 
 OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_friction")
 """What needs the force everywhere in the window."""
 
 
-def _window_of(built: Built) -> tuple[float, float]:
-    """Return the window in travels, by default all of them [m]."""
-    window = built.assembly.spec.analysis.window
-    if window is None:
-        return float(built.travel[0]), float(built.travel[-1])
-    low, high = between(window, requested_travel(built))
-    return low - built.origin, high - built.origin
-
-
-def large_holes(built: Built) -> tuple[tuple[float, float], ...]:
-    """Return the travels in the window at which the force is not known [m]."""
-    start, stop = _window_of(built)
-    inside = ((max(low, start), min(high, stop)) for low, high in built.unmeasured)
-    return tuple((low, high) for low, high in inside if high - low > LARGEST_HOLE * (stop - start))
-
-
-def profile_coverage(built: Built) -> float:
-    """Return which part of the window is known."""
-    start, stop = _window_of(built)
-    missing = sum(max(min(high, stop) - max(low, start), 0.0) for low, high in built.unmeasured)
-    return 1.0 - missing / (stop - start)
-
-
 def pressure_of(built: Built, way: float) -> FloatArray:
     """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
     track, forces = built.assembly.track, built.forces(way)
     return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
-
-
-def window_mask(built: Built) -> NDArray[np.bool_]:
-    """Return which travels lie in ``analysis.window``."""
-    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
-    if window is None:
-        return np.ones(len(place), dtype=bool)
-    low, high = between(window, requested_travel(built))
-    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
-    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
-
-
-def requested_travel(built: Built) -> tuple[float, float]:
-    """Return where the displacement starts and where it was to end [m]."""
-    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
-    return start + built.origin, end + built.origin
 
 
 def loop_area_per_friction(built: Built) -> float:

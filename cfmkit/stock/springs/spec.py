@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
@@ -13,10 +14,13 @@ from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
+from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.material_and_part_spec import Fatigue
 from cfmkit.stock.springs.helical_spring_formulas import Seats, Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireName, WireOutOfRange
+from cfmkit.tables.lab_columns import split_header
+from cfmkit.tables.lab_file import decoded, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -216,6 +220,9 @@ class CatalogueSpring(WireLimits, SpringSupport):
     max_elongation: Annotated[Length, Positive] | None = Field(
         None, description="largest elongation (or compression) allowed"
     )
+    max_load: Annotated[Force, Positive] | None = Field(
+        None, description="or the largest force allowed, initial tension included"
+    )
     max_angle: Annotated[Angle, Positive] | None = Field(None, description="largest angle of a torsion spring")
     max_torque: Annotated[Torque, Positive] | None = Field(None, description="or its largest torque")
     life: Life | None = None
@@ -304,6 +311,8 @@ class CatalogueSpring(WireLimits, SpringSupport):
         stated = self.rate if self.kind == "torsion" else self.stiffness
         rate = stated if stated is not None else wound.rate if wound is not None else 0.0
         ends = [self.max_elongation]
+        if self.max_load is not None:
+            ends.append(max(self.max_load - self.initial_tension, 0.0) / rate)
         if self.kind == "torsion":
             ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
         body = self.body_length or (wound.body_length if wound else None)
@@ -405,12 +414,14 @@ def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[
 
 
 _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*(?:\[(?P<unit>[^\[\]]+)\])?\s*")
+_COMMA = re.compile(r"([+-]?[0-9]*),([0-9]+)")
 
 
 def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
     """Yield the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
-    rows = csv.reader(_lines(source), strict=True)
+    lines = _lines(source)
+    separator = max(";\t|,", key=lines[0].count) if lines else ","
+    rows = csv.reader(lines, delimiter=separator, strict=True)
     try:
         heads = _heads(next(rows, []), source)
         found: list[CatalogueSpring] = []
@@ -420,9 +431,9 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
             if len(cells) != len(heads):
                 raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
             block = {
-                name: _cell(name, cell.strip(), unit)
-                for (name, unit), cell in zip(heads, cells, strict=True)
-                if cell.strip()
+                head[0]: _cell(head[0], cell.strip(), head[1], separator)
+                for head, cell in zip(heads, cells, strict=True)
+                if head and cell.strip()
             }
             try:
                 found.append(CatalogueSpring.model_validate(block))
@@ -442,37 +453,38 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
 
 
 def _lines(source: DataSource) -> list[str]:
-    """Return the lines of a file."""
+    """Return the lines of a file, without the empty ones before the header."""
     try:
-        text = source.path.read_bytes().decode("utf-8-sig")
+        text, _ = decoded(source.path.read_bytes(), str(source))
     except OSError as error:
         raise DataError(f"{source}: cannot be read: {reason_of(error)}") from None
-    except UnicodeDecodeError as error:
-        raise DataError(f"{source}: byte {error.start + 1} is not UTF-8") from None
-    return text.splitlines(keepends=True)
+    return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)
 
 
-def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None]]:
-    """Return name and unit of each column."""
+def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None] | None]:
+    """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
-    found: list[tuple[str, str | None]] = []
+    found: list[tuple[str, str | None] | None] = []
     for cell in cells:
-        head = _HEADER.fullmatch(cell)
-        name = head["name"] if head else cell.strip()
-        if name not in allowed:
-            hint = "; cells are separated by commas" if ";" in name else ""
+        title, unit = split_header(cell)
+        name = title.strip().lower().replace(" ", "_")
+        if name in [head[0] for head in found if head]:
+            raise DataError(f"{source}:1: the column {name!r} appears twice")
+        near = get_close_matches(name, allowed, n=1, cutoff=0.75)
+        if name not in allowed and (near or (unit and is_unit(unit)) or not found or name == "fatigue"):
+            hint = f"; did you mean {near[0]!r}?" if near else ""
             listed = ", ".join(allowed)
             raise DataError(f"{source}:1: {name!r} is not a column of a list of springs{hint}; columns are {listed}")
-        if name in dict(found):
-            raise DataError(f"{source}:1: the column {name!r} appears twice")
-        found.append((name, head["unit"] if head else None))
+        found.append((name, unit) if name in allowed else None)
     return found
 
 
-def _cell(name: str, cell: str, unit: str | None) -> object:
+def _cell(name: str, cell: str, unit: str | None, separator: str) -> object:
     """Return a cell as a specification would say it."""
     if name == "counts":
         return tuple(int(one) if one.isdigit() else one for one in cell.split())
+    if separator != "," and name not in ("name", "kind"):
+        cell = _COMMA.sub(r"\1.\2", cell) if _COMMA.fullmatch(cell.split(" ")[0]) else cell
     if name in ("turns", "life") and _NUMBER.fullmatch(cell):
         return float(cell)
     return cell if unit is None else f"{cell} {unit}"
