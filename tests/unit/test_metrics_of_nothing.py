@@ -1,22 +1,22 @@
 """Efforts that are zero up to rounding: what is relative to them has no value; `static_balance` judges balancers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from metrics_support import curve
 
 import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.elastica.outcome import member_efforts
 from cfmkit.errors import ExitCode, SpecError
+from cfmkit.families import family
+from cfmkit.families.base import Block, Measure
 from cfmkit.families.beam.model import solve
-from cfmkit.metrics import MeasuringFrame, Window, measure
+from cfmkit.metrics import MeasuringFrame, Window, known_metrics, measure, validate_requirements
 from cfmkit.metrics.ranges_many import ManyBranches, band_range, range_95, range_95_fraction
 from cfmkit.metrics.spread import Spread, deviation_from_mean, half_band, ripple
 from cfmkit.results import Result, Status, round_off
-from cfmkit.studies.engine import Work
-from cfmkit.studies.choose_metrics_to_note import metrics_of
-from cfmkit.studies.plan import grid
-from cfmkit.studies.point_evaluation import Study
-from tests.support.metrics_support import curve
 
 RELATIVE = (
     *("ripple", "half_band", "deviation_from_mean", "range_95", "range_95_fraction"),
@@ -130,8 +130,6 @@ def test_a_truss_that_ends_without_force_misses_its_range(tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("name", ["beam_lan2010", "beam_end_effector"])
 def test_the_efforts_of_all_members_are_that_of_the_drive(name):
-    from dataclasses import replace
-
     solution = solve(cfmkit.load(f"configs/{name}.yaml"))
     path, keep = solution.path, solution.keep[1::10]
     here = replace(path, points=path.points.take(keep), branch=path.branch[keep])
@@ -153,10 +151,12 @@ def test_the_balance_of_many_designs_is_that_of_each(config, path, values):
     spec = cfmkit.load(f"configs/{config}.yaml")
     if "vcfm" in config:
         spec = spec.replace({"analysis.fidelity": "analytic"})
-    plan = grid({path: values})
-    work = Work(Study(spec, plan.paths, metrics_of(spec, ["static_balance"])), plan)
     single = [cfmkit.analyze(spec.replace({path: value})).metrics["static_balance"].value for value in values]
-    many = work.rows(0, len(values)).values[:, 0]
+    measure_of_balance = Measure("static_balance", spec.analysis.window)
+    block = Block({path: np.array(values, dtype=float)}, (measure_of_balance,), len(values))
+    answer = family(spec.family).analyze_block(spec, block)
+    assert answer.done.all()
+    many = answer.values[0]["load"]
     np.testing.assert_allclose(many, single, rtol=1e-6)
 
 
@@ -175,8 +175,9 @@ def test_a_curve_without_parts_has_no_balance():
     ],
 )
 def test_a_share_above_1_is_no_bound(requirement, said):
+    spec = cfmkit.load("configs/beam_lan2010.yaml").replace({"requirements": [requirement]})
     with pytest.raises(SpecError, match="did you mean") as caught:
-        cfmkit.analyze(cfmkit.load("configs/beam_lan2010.yaml").replace({"requirements": [requirement]}))
+        validate_requirements(spec, known_metrics("force"))
     assert said in str(caught.value)
 
 
