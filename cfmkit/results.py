@@ -101,12 +101,13 @@ class Finding(ShortRepr):
 
     `name` is stable (scripts match it); `message` holds the numbers that decide
     and, where there is one, the cure. `cures` are changes of the specification that
-    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``.
+    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``; several that only
+    work together are a tuple.
     """
 
     name: str
     message: str
-    cures: tuple[str, ...] = ()
+    cures: tuple[str | tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -394,7 +394,8 @@ def _width(solution: Solution) -> Iterator[Finding]:
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)
     if reported := too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"):
-        yield finding("wide_beam", reported, "mechanism.wide_beams=true")
+        wide, narrow = "mechanism.wide_beams=true", solution.spec.analysis.modes  # frequencies are of narrow beams only
+        yield finding("wide_beam", reported, (wide, "analysis.modes=0") if narrow else wide)
 
 
 def _gaps(solution: Solution) -> Iterator[Finding]:

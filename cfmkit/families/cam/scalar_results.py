@@ -386,7 +386,7 @@ def largest_pressure(flank: FlankSamples) -> tuple[float | None, float]:
 
 def _half_gap(flank: FlankSamples) -> float | None:
     up, down = flank.up.slider, flank.down.slider
-    usable = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
+    usable = np.isfinite(up) & np.isfinite(down) & (up + down > flank.solution.effort_error)
     return largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
 
 

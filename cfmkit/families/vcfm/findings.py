@@ -337,12 +337,11 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 def _width(solution: Solution) -> Iterator[Finding]:
     exact = solution.spec.analysis.fidelity == "exact"
-    cures, hint = (
-        (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' accounts for it")
-    )
+    wide, hint = "mechanism.wide_beams=true", "; only 'analysis.fidelity: exact' accounts for it"
+    cure = wide if exact else (wide, "analysis.fidelity=exact")
     for name, share, place in solution.hindered_curling:
         if reported := too_soft(share, f"in the {name} at {mm(place)}"):
-            yield finding("wide_beam", reported + hint, *cures)
+            yield finding("wide_beam", reported + ("" if exact else hint), cure)
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:

@@ -127,7 +127,7 @@ def _mismatch(solution: Solution) -> dict[str, float | None]:
     one, alone, span = solution.character, solution.spring_alone, solution.window[1] - solution.window[0]
     difference = abs(one.positive_stiffness - one.negative_stiffness)
     return {
-        "stiffness_mismatch": difference * span / alone if alone else None,
+        "stiffness_mismatch": difference * span / alone if alone and abs(alone) > solution.effort_error else None,
         "allowable_stress": solution.spec.mechanism.allowable_stress,
     }
 

@@ -179,6 +179,7 @@ _WHY = {
     "second_stable_travel": "there is no second stable equilibrium in the motion",
     "constant_angle": "the reference is outside the motion, or the torque there is zero",
     "constant_travel": "the reference is outside the motion, or the force there is zero",
+    "stiffness_drop": "the effort is zero within its numerical error",
     "bistable_factor": "it needs torsion springs and a spring at the slider",
     "positive_factor": "it needs torsion springs and a spring at the slider",
     "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
@@ -196,7 +197,7 @@ def _positions(solution: Solution) -> Pairs:
     found, place = solution.character, solution.assembly.motion_name
     unstable, stable = solution.nearest(False), solution.nearest(True)
     return (
-        ("stiffness_drop", found.drop),
+        ("stiffness_drop", found.drop if float(np.abs(solution.effort).max()) > solution.effort_error else None),
         ("stable_positions", float(found.classified.stable[0])),
         ("unstable_positions", float(found.classified.unstable[0])),
         (f"snap_through_{place}", None if unstable is None else unstable.motion),

@@ -141,7 +141,7 @@ class Base:
             return self.bounded
         if name.startswith("usable_") and self.spec.target_curve is not None:
             return False  # the band lies about the curve: the model of one mechanism knows it
-        known = self.spreads(name) or name in (*BAND_RANGES, RMS, STATIC_BALANCE) or (name in PLACES and self.bounded)
+        known = self.spreads(name) or name in (*BAND_RANGES, RMS) or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def spreads(self, name: str) -> bool:
@@ -229,8 +229,7 @@ class Slab:
     def level(self) -> FloatArray:
         """Efforts at the reference; NaN where they are zero but for rounding."""
         level = self.rates @ self.base.assembly.units(np.array([self.base.reference])).effort[:, 0]
-        known = np.abs(level) > np.maximum(self.error, ZERO * np.abs(self.sharp).max(axis=1))
-        return np.where(known, level, np.nan)
+        return np.where(np.abs(level) > np.maximum(self.error, ZERO * np.abs(self.sharp).max(axis=1)), level, np.nan)
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
@@ -266,30 +265,22 @@ class Slab:
         if name in BAND_RANGES:
             low, high = self.within(BAND_RANGES[name])
             return high - low
-        if name == STATIC_BALANCE:
-            return self._static_balance(measure.window)
         return metric_of(name, self.inside(measure.window), target_of(self.base.spec))
 
     @cached_property
     def error(self) -> FloatArray:
         """Rounding of the sums of springs' efforts, (m,): as `results.round_off` has it."""
-        sizes = np.abs(self.shares(self.base.units.effort)).sum(axis=1)
-        return np.asarray(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes)))
+        return np.asarray(ROUND_OFF * (self.rates @ np.abs(self.base.units.effort)).max(axis=1))
 
-    def shares(self, units: FloatArray) -> FloatArray:
-        """Return the efforts of the springs at some places, (m, 4, k), from those of unit springs (4, k)."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.where(self.rates[:, :, None] > 0.0, self.rates[:, :, None] * units, 0.0))
-
-    def _static_balance(self, window: tuple[float, float] | None) -> FloatArray:
+    def static_balance(self, window: tuple[float, float] | None) -> FloatArray:
         """Return the largest effort in a window over that of one spring of one leg, (m,)."""
         places, units = self.base.samples_and_grid(window)
 
         def largest(at: FloatArray) -> FloatArray:
-            unit = self.base.assembly.forces(at.ravel()).reshape(4, *at.shape)
-            return np.asarray(np.abs(self.rates[:, :, None] * unit.swapaxes(0, 1)).max(axis=1))
+            unit = self.base.assembly.forces(at.ravel()).reshape(4, *at.shape).swapaxes(0, 1)
+            return np.asarray(np.abs(self.rates[:, :, None] * unit).max(axis=1))
 
-        part, _ = extremes(largest, places[None, :], np.abs(self.shares(units)).max(axis=1))
+        part, _ = extremes(largest, places[None, :], np.abs(self.rates[:, :, None] * units).max(axis=1))
         return np.asarray(static_balance(self.inside(window).spread, part / self.legs))
 
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
@@ -436,15 +427,15 @@ EACH: dict[str, Callable[[Solution], float | None]] = {
 }
 """Values that are found design by design, on the curves that are known of all."""
 
-
 PLACES: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
+    STATIC_BALANCE: lambda slab, window: slab.static_balance(window),
     "range_95": lambda slab, window: range_95(slab.everywhere(window)),
     "range_95_fraction": lambda slab, window: range_95_fraction(slab.everywhere(window)),
     "usable_stroke": lambda slab, window: usable_stroke(*slab.usable(window)),
     "usable_start": lambda slab, window: slab.usable(window)[0],
     "usable_end": lambda slab, window: slab.usable(window)[1],
 }
-"""Metrics that are places, on curves that are known at every place."""
+"""Metrics that are places, and a balance, on curves that are known at every place."""
 
 
 def _rms_to_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
@@ -476,7 +467,7 @@ OTHER_DRIVE: dict[str, tuple[str, ...]] = {
 
 VALUES: dict[str, Callable[[Slab], Any]] = {
     "stiffness_class": lambda slab: slab.classified.kind.astype(np.float64),
-    "stiffness_drop": lambda slab: slab.classified.drop,
+    "stiffness_drop": lambda s: np.where(np.abs(s.effort).max(axis=1) > s.error, s.classified.drop, np.nan),
     "stable_positions": lambda slab: slab.classified.stable.astype(np.float64),
     "unstable_positions": lambda slab: slab.classified.unstable.astype(np.float64),
     "constant_angle": _width,
