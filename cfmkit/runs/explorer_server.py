@@ -1,8 +1,8 @@
-"""The explorer of a specification on a port of this computer: reachable from this computer only, and only with its token.
+"""The explorer of a specification on a port of this computer, which only this computer reaches, and only with its token.
 
-The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the name
-by which it was reached (a page elsewhere that lets its own name point here is refused), the page that sent it, the
-token, the size. The number of connections is limited, and the time in which a request must have arrived.
+The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
+name by which it was reached (a page elsewhere that lets its own name point here is refused), the page that sent it,
+the token, the size. The number of connections is limited, and the time in which a request must have arrived.
 """
 
 from __future__ import annotations
