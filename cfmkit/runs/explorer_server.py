@@ -1,4 +1,4 @@
-"""The explorer of a specification on a port of this computer, which only this computer reaches, and only with its token.
+"""The explorer of a specification on a port that only this computer reaches, and only with the explorer's token.
 
 The server of the standard library does: one person asks, one answer at a time. What is checked on every request: the
 name by which it was reached (a page elsewhere that lets its own name point here is refused), the page that sent it,
@@ -25,12 +25,11 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from cfmkit.errors import CfmError, lines_of
-from cfmkit.runs.explorer import Explorer, suggested_name
+from cfmkit.runs.explorer import Explorer as Explorer  # noqa: TC001 (programs import both from here)
+from cfmkit.runs.explorer import suggested_name as suggested_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-__all__ = ["Explorer", "ExplorerServer", "suggested_name"]
 
 HOST = "127.0.0.1"
 MAX_BODY_BYTES = 200_000

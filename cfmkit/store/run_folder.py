@@ -279,8 +279,13 @@ def _undisturbed() -> Iterator[None]:
         yield
         return
     came: list[int] = []
+
+    def deliver() -> None:
+        for number in came:
+            signal.raise_signal(number)
+
     with ExitStack() as afterwards:
-        afterwards.callback(lambda: [signal.raise_signal(number) for number in came])
+        afterwards.callback(deliver)
         for number in (signal.SIGINT, signal.SIGTERM):
             if (usual := signal.getsignal(number)) is not None:  # None: of another language, it could not be put back
                 afterwards.callback(signal.signal, number, usual)
