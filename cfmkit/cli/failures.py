@@ -30,9 +30,12 @@ class Stopped(StoppedBySignal):
     ----------
     began : bool
         Whether the command has opened a journal, in which it keeps what it has finished; the same for all signals.
+    last : Stopped or None
+        The signal that came; libraries that are not written in Python make other exceptions of the one it raises.
     """
 
     began: ClassVar[bool] = False
+    last: ClassVar[Stopped | None] = None
 
     def __init__(self, number: int) -> None:
         """Keep the signal's number."""

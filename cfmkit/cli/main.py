@@ -78,9 +78,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     streams.prepare()
     try:
-        return int(_run(given))
-    finally:
-        streams.settle()
+        try:
+            return int(_run(given))
+        finally:
+            streams.settle()
+    except Stopped as stop:  # while it was told how the command has ended
+        return int(stop.exit_code)
 
 
 def _run(given: list[str]) -> ExitCode:
@@ -94,7 +97,7 @@ def _run(given: list[str]) -> ExitCode:
     except Stopped as stop:
         return fail(stop, terminal)
     except Exception as error:
-        return _failed(error, terminal)
+        return _failed(Stopped.last or error, terminal)
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
@@ -149,7 +152,7 @@ def _tell_more() -> None:
     log.setLevel(logging.INFO)
 
 
-def _failed(error: Exception, terminal: Terminal) -> ExitCode:
+def _failed(error: BaseException, terminal: Terminal) -> ExitCode:
     """Tell of an error; a signal may arrive while that is done."""
     try:
         return fail(error, terminal)
@@ -164,8 +167,10 @@ def _listen() -> None:
 
     def stop(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
-        raise Stopped(number)
+        Stopped.last = Stopped(number)
+        raise Stopped.last
 
+    Stopped.last = None
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, stop)

@@ -98,8 +98,8 @@ def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
     temporary = target.parent / TEMPORARY.format(pid=os.getpid(), count=next(_counter))
     with reporting(path):
         _refuse_special(target)
-        record = write_new(temporary, data)
         try:
+            record = write_new(temporary, data)
             system.replace(temporary, target)
         except BaseException:
             discard(temporary)

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.runs.explorer_server import Explorer, ExplorerServer
+from cfmkit.runs.explorer import Explorer
+from cfmkit.runs.explorer_server import ExplorerServer
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -19,7 +19,8 @@ from cfmkit.cli.output import Terminal
 from cfmkit.cli.verbs.explore import ExploreOptions, run
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.runs import explorer_server
-from cfmkit.runs.explorer_server import Explorer, ExplorerServer, suggested_name
+from cfmkit.runs.explorer import Explorer, suggested_name
+from cfmkit.runs.explorer_server import ExplorerServer
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

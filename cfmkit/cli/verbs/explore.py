@@ -39,7 +39,8 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     or written. Ctrl-C ends the server.
     """
     from cfmkit.errors import UsageError
-    from cfmkit.runs.explorer_server import Explorer, ExplorerServer
+    from cfmkit.runs.explorer import Explorer
+    from cfmkit.runs.explorer_server import ExplorerServer
     from cfmkit.runs.specfile import STDIN
 
     if options.spec == STDIN:
