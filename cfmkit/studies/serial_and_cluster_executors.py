@@ -95,8 +95,9 @@ def garbage_collector() -> Iterator[Callable[[], None]]:
     counts objects and not their size, so that in a long study it would begin to collect them too late, or never. What
     is there before the study (all modules) is not looked through each time.
     """
-    ours = not gc.get_freeze_count()
-    gc.freeze()
+    freezes = not gc.get_freeze_count()  # else the program around this does it
+    if freezes:
+        gc.freeze()
     ended, took = time.monotonic(), 0.0
 
     def collect() -> None:
@@ -111,7 +112,7 @@ def garbage_collector() -> Iterator[Callable[[], None]]:
     try:
         yield collect
     finally:
-        if ours:
+        if freezes:
             gc.unfreeze()
 
 
