@@ -19,6 +19,8 @@ import warnings
 from queue import SimpleQueue
 from typing import IO, Any
 
+from cfmkit.studies.serial_and_cluster_executors import garbage_collector
+
 START = (
     "import json, sys; given = json.loads(sys.argv[1]); sys.path[:] = given['path']; "
     "from cfmkit.studies.worker_process import main; main(given['parent'])"
@@ -80,10 +82,12 @@ def _pipes() -> tuple[IO[bytes], IO[bytes]]:
 
 def _serve(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]) -> None:
     send(outlet, READY)
-    while True:
-        job = pickle.loads(received.get())
-        send(outlet, STARTED)
-        send(outlet, _outcome(work, job))
+    with garbage_collector() as collect:
+        while True:
+            job = pickle.loads(received.get())
+            send(outlet, STARTED)
+            send(outlet, _outcome(work, job))
+            collect()
 
 
 def _outcome(work: Any, job: Any) -> bytes:

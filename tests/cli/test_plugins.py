@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 import subprocess
@@ -259,3 +260,24 @@ def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, 
     monkeypatch.setattr("cfmkit.cli.verbs.doctor.os.access", lambda _path, _mode: False)
     assert main(["doctor"]) == 0
     assert "cannot be written to" in capsys.readouterr().out
+
+
+def test_the_doctor_compares_what_is_installed_with_what_is_needed(monkeypatch, capsys):
+    """A minimum that pip was told to ignore: typer 0.18 said 'cfmkit: 1 is not allowed here, only 1 is'."""
+    versions = {"numpy": "1.26.4", "typer": "0.18.0"}
+    real = importlib.metadata.version
+    needed = ["numpy>=2.0", "typer>=0.26.8", "scipy>=1.14", "distributed>=2999.1; extra == 'cluster'"]
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: versions.get(name) or real(name))
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: needed)
+    assert main(["doctor", "--json"]) == 0
+    told = [one["message"] for one in json.loads(capsys.readouterr().out)["warnings"]]
+    assert "numpy 1.26.4 does not work with this cfmkit: pip install 'numpy>=2.0'" in told
+    assert "typer 0.18.0 does not work with this cfmkit: pip install 'typer>=0.26.8'" in told
+    assert not any("scipy" in one for one in told)
+
+
+def test_the_doctor_knows_of_a_folder_without_file_locks(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("cfmkit.store.lock._try", lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    assert main(["doctor"]) == 0
+    assert f"no file locks in {tmp_path}: .cfmkit.softlock marks a live run" in " ".join(capsys.readouterr().out.split())

@@ -1,8 +1,10 @@
 """Drawings as bodies: closed surfaces with the volume of the drawing, and files that say so."""
 
 import io
+import json
 import sys
 import zipfile
+from importlib import import_module
 from xml.etree import ElementTree
 
 import numpy as np
@@ -126,6 +128,35 @@ def test_step_has_cylinders_where_the_outline_has_arcs(tmp_path):
 def test_without_its_library_step_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "build123d", None)
     with pytest.raises(UsageError, match=r"--format step needs build123d: pip install 'cfmkit\[step\]'"):
+        cfmkit.export("configs/vcfm_pla.yaml", format="step")
+
+
+def test_a_format_that_fails_does_not_stop_the_others(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "build123d", None)
+    with pytest.warns(UserWarning, match=r"step is not made: --format step needs build123d"):
+        found = cfmkit.export("configs/vcfm_pla.yaml", tmp_path, format="step,dxf,stl")
+    assert sorted(found) == ["vcfm.dxf", "vcfm.stl"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["manifest.json", "vcfm.dxf", "vcfm.stl"]
+    assert json.loads((tmp_path / "manifest.json").read_bytes())["exit_code"] == 6
+
+
+def test_an_exception_of_the_cad_kernel_is_one_line(monkeypatch):
+    class Kernel:
+        class Wire:
+            def __init__(self, _edges):
+                raise RuntimeError("StdFail_NotDone:\nBRep_API")
+
+        def __getattr__(self, _name):
+            return lambda *_: self
+
+        make_circle = make_line = make_three_point_arc = Plane = lambda *_: None
+        Edge = Vector = Location = None
+
+    Kernel.Edge = Kernel
+    monkeypatch.setattr(import_module("cfmkit.export.step"), "_kernel", Kernel)
+    with pytest.raises(
+        GeometryError, match=r"cannot make a body from the outline \(RuntimeError: StdFail_NotDone: BRep"
+    ):
         cfmkit.export("configs/vcfm_pla.yaml", format="step")
 
 
