@@ -211,11 +211,11 @@ class Study:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
         if not self.design or record.design is None:
-            return windows_judged(record.analyze(spec, run))
+            return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
         design = self.deliver(spec, record.design, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
-        result = windows_judged(record.analyze(design.spec, run))
+        result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 
     def row(self, result: Result) -> Row:
