@@ -108,6 +108,12 @@ class Springs(Model):
         return self.pivot, self.crank_pin, self.slider_pin, self.slider
 
 
+class Links(Model):
+    """Crank and coupler as bars with round ends, cut from the sheet of `part`."""
+
+    width: PositiveLength = Field(description="across their length, at the eyes, too")
+
+
 class Limits(Model):
     """How far each spring may be moved from the unloaded position, either way."""
 
