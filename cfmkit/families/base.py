@@ -426,14 +426,7 @@ class Family:
         """Return a result with the sizes of its box among its values, if one of some names asks for them."""
         if ENVELOPE.keys().isdisjoint(names) or not self.room:
             return result
-        space = self.envelope(result)
-        sides = (None, None, None) if space is None else space.sides
-        reason = "" if space is None else space.assumed
-        found = {
-            name: Quantity(value, *about, "" if value is not None else reason or "the box is not known")
-            for (name, about), value in zip(ENVELOPE.items(), sides, strict=True)
-        }
-        return replace(result, values={**result.values, **found})
+        return sized(result, self.envelope(result))
 
     def envelope(self, result: Result) -> Room | None:
         """Return the box that a solved mechanism stays in; None where it is not known."""
@@ -450,6 +443,17 @@ class Family:
         name = self.elastic_networks
         found: tuple[DrivenNetwork, ...] = function_named(name)(spec) if name else ()
         return found
+
+
+def sized(result: Result, space: Room | None) -> Result:
+    """Return a result with the sizes of its box among its values; without a value where the box is not known."""
+    sides = (None, None, None) if space is None else space.sides
+    reason = (space.assumed if space else "") or "the box is not known"
+    found = {
+        name: Quantity(value, *about, "" if value is not None else reason)
+        for (name, about), value in zip(ENVELOPE.items(), sides, strict=True)
+    }
+    return replace(result, values={**result.values, **found})
 
 
 def packaged(name: str) -> str:

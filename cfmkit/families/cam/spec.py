@@ -5,13 +5,21 @@ from __future__ import annotations
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
-from cfmkit.stock.material_and_part_spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
+from cfmkit.stock.material_and_part_spec import (
+    Friction,
+    Guide,
+    MaterialField,
+    MaterialSpec,
+    Pins,
+    ProcessField,
+    SafetyFactor,
+)
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
 
 Positive = Field(gt=0)
@@ -43,8 +51,8 @@ class Springs(Model):
     life: Life | None = None
 
     @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, "extension")
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, "extension", info)
         return self
 
     @model_validator(mode="after")
@@ -120,6 +128,9 @@ class Plate(Model):
     )
     thickness: PositiveLength | None = Field(
         None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if stated"
+    )
+    process: ProcessField | None = Field(
+        None, description="manufacturing process: laser, wire-edm, fdm, sls or mill, or your own values; default: laser"
     )
 
 

@@ -45,7 +45,7 @@ class Mechanism(Printed):
     pins: Pins | None = Field(None, description="at pivot, crank pin and slider pin: their friction")
     links: Links | None = Field(
         None,
-        description="width of crank and coupler where springs are at the joints; with 'material' and 'part.sheet' their "
+        description="width of crank and coupler between springs at joints; with 'material' and 'part.sheet' their "
         "strength is known; default: 0.16 of the shorter one's length",
     )
     guide: Guide | None = Field(None, description="of the slider: its friction")

@@ -229,8 +229,8 @@ def sheets_of_links(wish: Wish) -> tuple[float, ...]:
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     """Return a linkage with the springs that hold the torque or the force best, and with links that bear them.
 
-    The window is as long as is wished. The thinnest links that bear the springs' loads are taken: thicker ones leave less
-    depth for the springs.
+    The window is as long as is wished. The thinnest links that bear the springs' loads are taken: thicker ones leave
+    less depth for the springs.
 
     Raises
     ------

@@ -22,7 +22,9 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
+from cfmkit.families.flattest_window import INSIDE
 from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.spec import VcfmSpec
@@ -84,6 +86,12 @@ OFFERED = 28
 FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
 """What finishes what the family's design has made."""
 
+CORRECT = "cfmkit.families.vcfm.proposals_for_wish:correct"
+"""What corrects a mechanism by its solids."""
+
+NEARBY = np.linspace(0.9, 1.1, 21)
+"""Middles of windows of a solid that are looked at, over that of its beams."""
+
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
     """Return mechanisms that the closed forms say are worth designing, the smallest first, for a yield the thickest."""
@@ -103,7 +111,7 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
                 thick = min(sizes.leaf.thickness, sizes.side.thickness)
                 promise = over["across"] * over["along"] if wish.good_parts is None else -thick
-                found.append(Candidate(variant, spec, True, FINISH, float(promise)))
+                found.append(Candidate(variant, spec, True, FINISH, float(promise), correct=CORRECT))
             if (coiled := _coiled(wish, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
@@ -225,7 +233,8 @@ def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes
     promise = across * (stands + min(one.free_length or 0.0 for one in springs))
     promise = promise if wish.good_parts is None else -float(leaf.thickness)
     listed = spec.replace({"design.catalogue": tuple(springs)})
-    return Candidate(called("2 Vs, catalogue springs", wish, block), listed, True, FINISH, float(promise))
+    variant = called("2 Vs, catalogue springs", wish, block)
+    return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT)
 
 
 def _springs_beside(wish: Wish, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:
@@ -295,18 +304,70 @@ def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     return _over_flattest(spec, wish, _preloads(spec, wish), float(window[1]) if window else wish.travel)
 
 
-def _preloads(spec: VcfmSpec, wish: Wish, per_force: float | None = None) -> tuple[float, ...]:
+def _preloads(
+    spec: VcfmSpec, wish: Wish, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
+) -> tuple[float, ...]:
     """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
 
     `per_force` is the preload for a change of the force [m/N]; None: that of the design, or of its bought springs.
+    `known` are those of a mechanism that has them already: without an adjustment they stay.
     """
     design, bought = spec.design, spec.mechanism.springs
-    if wish.adjustable is None or design is None or not design.adjustment:
-        return (0.0,)
+    if wish.adjustable is None or (len(known) == 1 and (design is None or not design.adjustment)):
+        return known
     if per_force is None:
-        per_force = design.preload_stroke / design.adjustment if bought is None else 1.0 / coils(bought).stiffness
+        stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
+        per_force = stroke if bought is None else 1.0 / coils(bought).stiffness
     low, high = wish.adjustable
     return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
+
+
+def correct(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a mechanism with the window, the widths and, where the stress needs it, the lengths of its solids.
+
+    The force is linear in both widths: of windows around the present one that is taken in which the widths that fit the
+    force best leave the least of it. Longer leaves of the same rise are stressed less, as one over the length squared;
+    their force falls with its cube.
+    """
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.vcfm.exact_model import analyze
+    from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
+
+    wish = aim_below_stiffening(spec, wish, analyze)
+    solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
+    window = solid.analysis.window
+    middle = 0.5 * (float(window[0]) + float(window[1])) if window else 0.5 * spec.travel
+    ends = [share * middle + 0.5 * wish.travel for share in NEARBY if share * middle > 0.5 * wish.travel]
+    if not ends:
+        return solid
+    free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
+    sampler = SolidSampler(solid.replace(free), max(ends), 0.0, Run())
+    tried = [_in_window(sampler, end - 0.5 * wish.travel, wish.target, wish.travel) for end in ends]
+    known = [one for one in tried if one is not None]
+    if not known:
+        return solid
+    _, at, wide, stiff = min(known)
+    last = at + 0.5 * wish.travel
+    leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
+    preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)
+    force, stress = sampler.spring(np.array([last - wish.travel, last]))
+    side = float(np.max(stress)) * float(parts(solid).spring.stress(last + largest) / parts(solid).spring.stress(last))
+    rate = stiff * float(force[1] - force[0]) / wish.travel
+    strength = wish.strength_used * (solid.mechanism.material.allowable(1.0) or np.inf)
+    longer = [max(1.0, sqrt(1.02 * one / strength)) for one in (leaf, side)]
+    made = solid
+    if solid.mechanism.springs is None:
+        made = _longer(solid, longer)
+        preloads = _preloads(spec, wish, 1.0 / rate, solid.analysis.preloads)
+    else:
+        made = _longer(solid, [longer[0], 1.0])
+    made = _wider(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
+    begin = last - wish.travel * (1.0 + INSIDE)
+    changes = {
+        "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,
+        "analysis.preloads": preloads,
+    }  # fmt: skip
+    return _opened(made.replace(changes), last, preloads)
 
 
 def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
@@ -314,20 +375,26 @@ def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end:
     from cfmkit.families.flattest_window import flattest
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.exact_model import analyze
-    from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 
     wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
     made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
-    closing = wide + max(preloads) - spring_room(made)
-    if closing > 0.0:
-        # higher corners, so that the spring stays open: a rigid part, which no force depends on
-        made = made.replace({"mechanism.frame.corner": made.mechanism.frame.corner + 1.1 * closing})
+    made = _opened(made, wide, preloads)
     result = analyze(made, Run())
     found = flattest(result, wish.travel)
     if found is None:
         return made
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
+
+
+def _opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
+    """Return a mechanism whose corners are so high that its spring stays open: a rigid part, which no force needs."""
+    from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
+
+    closing = travel + max(preloads) - spring_room(spec)
+    if closing <= 0.0:
+        return spec
+    return spec.replace({"mechanism.frame.corner": spec.mechanism.frame.corner + 1.1 * closing})
 
 
 STRUCTURES: dict[str, dict[str, Any]] = {
@@ -402,7 +469,7 @@ def with_structure(
             break
         made = _longer(made, [max(1.0, sqrt(1.02 * one)) for one in over])
         found = _fitted(made, forces, travel)
-    made = _wider(made, found)
+    made = _wider(made, found.wide, found.stiff)
     return made, found.end, found.stiffness
 
 
@@ -448,32 +515,32 @@ def _in_window(
     columns = np.column_stack([sampler.leaves(places).force, sampler.spring(places)[0]])
     if not np.isfinite(columns).all():
         return None
-    (wide, stiff), *_ = np.linalg.lstsq(columns, np.full(len(places), force), rcond=None)
+    if sampler.coils is None:
+        (wide, stiff), *_ = np.linalg.lstsq(columns, np.full(len(places), force), rcond=None)
+    else:  # bought springs are as they are
+        stiff = 1.0
+        (wide,), *_ = np.linalg.lstsq(columns[:, :1], force - columns[:, 1], rcond=None)
     if not (wide > 0.0 and stiff > 0.0):
         return None
     left = np.abs(columns @ np.array([wide, stiff]) / force - 1.0).max()
     return float(left), at, float(wide), float(stiff)
 
 
-def _wider(spec: VcfmSpec, fit: _Fit) -> VcfmSpec:
-    parts = spec.mechanism
-    return spec.replace(
-        {
-            "mechanism.bistable.width": parts.bistable.width * fit.wide,
-            "mechanism.positive.width": parts.flexures.width * fit.stiff,
-        }
-    )
+def _wider(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
+    """Return a mechanism whose leaves, and whose spring unless it is bought, are wider by factors."""
+    changes = {"mechanism.bistable.width": spec.mechanism.bistable.width * leaves}
+    if spec.mechanism.springs is None:
+        changes["mechanism.positive.width"] = spec.mechanism.flexures.width * spring
+    return spec.replace(changes)
 
 
 def _longer(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
     """Return a mechanism whose leaves of the same rise, and whose spring, are longer by factors."""
-    leaf, spring = spec.mechanism.bistable, spec.mechanism.flexures
+    leaf = spec.mechanism.bistable
     rise, length = leaf.length * sin(leaf.angle), leaf.length * factors[0]
-    changes = {
-        "mechanism.bistable.length": length,
-        "mechanism.bistable.angle": asin(rise / length),
-        "mechanism.positive.length": spring.length * factors[1],
-    }
+    changes = {"mechanism.bistable.length": length, "mechanism.bistable.angle": asin(rise / length)}
+    if spec.mechanism.springs is None:
+        changes["mechanism.positive.length"] = spec.mechanism.flexures.length * factors[1]
     if leaf.flexure_length is not None:
         changes["mechanism.bistable.flexure_length"] = leaf.flexure_length * factors[0]
     return spec.replace(changes)

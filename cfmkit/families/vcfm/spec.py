@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import radians, sin
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -110,8 +110,8 @@ class BoughtSprings(Model):
     life: Life | None = None
 
     @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, self.kind)
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, self.kind, info)
         if self.initial_tension and self.kind == "compression":
             raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
         return self

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, mode
 
 from cfmkit.errors import DataError
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.spec import AS_MADE, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
 from cfmkit.stock.material_and_part_spec import Fatigue
 from cfmkit.stock.springs.helical_spring_formulas import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
@@ -82,14 +82,22 @@ def _disagree(times: float) -> str:
     )
 
 
-def settle_rate(springs: Any, kind: Kind) -> None:
-    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated."""
+def is_made(info: ValidationInfo) -> bool:
+    """Return True if the values are those of one manufactured part."""
+    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
+
+
+def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
+    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
+
+    The rate of a manufactured spring is not checked: its tolerance comes on top of what stated values differ by.
+    """
     if springs.stiffness is None:
         if springs.wound is None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
         # past the frozen model, and not counted as set: another wire then has another rate
         object.__setattr__(springs, "stiffness", springs.wound.wound(kind).rate)
-    elif springs.wound is not None:
+    elif springs.wound is not None and not is_made(info):
         for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
             springs.wound.check_rate(kind, one)
 

@@ -1,0 +1,46 @@
+"""By how much the force of a part rises because its beams are too wide to curl across their width.
+
+A planar solid is in plane stress: its beams curl freely. Beam models know both: with `mechanism.wide_beams` they are as
+stiff as the curvature makes them. The ratio of both means over the window is what a solid misses; what clamped ends
+add is left out (docs/beam.md, wide beams).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import CfmError
+from cfmkit.families.run_control import Run
+from cfmkit.metrics import evaluate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.families.wishes import Wish
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+
+WIDE = "mechanism.wide_beams"
+
+
+def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
+    """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
+    try:
+        means = [_mean(model(spec.replace({WIDE: wide, "requirements": ()}), Run())) for wide in (False, True)]
+    except CfmError:
+        return 0.0
+    narrow, wide = means
+    return 0.0 if not narrow or not wide else max(wide / narrow - 1.0, 0.0)
+
+
+def aim_below_stiffening(spec: Spec, wish: Wish, model: Callable[[Spec, Run], Result]) -> Wish:
+    """Return a wish whose force is between that without and that with the stiffening of a part."""
+    return replace(wish, target=wish.target / (1.0 + 0.5 * stiffening(spec, model)))
+
+
+def _mean(result: Result) -> float | None:
+    if not result.curves:
+        return None
+    name = f"{result.curve.kind}_mean"
+    return evaluate(result, [name])[name].value
