@@ -150,7 +150,7 @@ def message(found: Suggestions) -> str:
 
 
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
-    if out_of_reach or any(one.family == name for one in found.proposals):
+    if out_of_reach or any(one.family == name for one in found.listed):
         return out_of_reach
     untried = sum(len(one.offer.candidates) for one in found.answers if one.family == name and not one.made)
     if untried:
@@ -329,13 +329,14 @@ def page(
         (one, [_cell(one, name, unit) for name in columns], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
         for one in (*record["proposals"], *record["unjudged"])
     ]
+    named = {one["family"] for one in (*record["proposals"], *record["unjudged"])}
     text: str = template("suggestions.html.j2").render(
         reported=record,
         tone=TONES.get(record["status"], "bad"),
         wish=_listed(record["wish"]),
         heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],
         rows=rows,
-        silent=[(one, _listed(one["nearest"])) for one in record["families"] if not one["proposals"]],
+        silent=[(one, _listed(one["nearest"])) for one in record["families"] if one["family"] not in named],
         pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
         command=command,
         style=part("report.css"),

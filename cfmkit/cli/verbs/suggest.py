@@ -253,6 +253,7 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     yield TextLine((Span("suggest", LABEL), Span(f"  {head}")), f"{written.seconds:.1f} s")
     if rest:
         yield Paragraph("", rest)
+    listed = [*data["proposals"], *data["unjudged"]]
     if data["proposals"]:
         yield BLANK
         yield from _rows(data["proposals"], data, 1)
@@ -265,7 +266,8 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield line("near misses: one requirement not met", LABEL)
         near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
         yield CellGrid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
-    silent = [one for one in data["families"] if not one["proposals"]]
+    named = {one["family"] for one in listed}
+    silent = [one for one in data["families"] if one["family"] not in named]
     if silent:
         yield BLANK
         yield line("no proposals from these families", LABEL)
@@ -274,7 +276,6 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
     yield BLANK
     yield written.block(everything)
-    listed = [*data["proposals"], *data["unjudged"]]
     if bare := [one["folder"] for one in listed if not _complete(one["folder"], written.files)]:
         yield Paragraph(
             "note",

@@ -108,6 +108,8 @@ class Proposal:
         Names of what its analysis warns of, with the number that counts.
     seconds : float
         That its analysis took.
+    own : str
+        The model that its family designs with, where another one judged it: its yield is by that one.
     """
 
     family: str
@@ -123,6 +125,7 @@ class Proposal:
     pending: str = ""
     warnings: tuple[str, ...] = ()
     seconds: float = 0.0
+    own: str = ""
 
     @property
     def passes(self) -> bool:
@@ -161,7 +164,7 @@ class Proposal:
             "family": self.family, "variant": self.variant, "text": self.text, "missed": list(self.missed),
             "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes), "movable": self.movable,
             "unjudged": list(self.unjudged), "model": self.model, "pending": self.pending,
-            "warnings": list(self.warnings), "seconds": self.seconds,
+            "warnings": list(self.warnings), "seconds": self.seconds, "own": self.own,
         }  # fmt: skip
 
     @classmethod
@@ -229,16 +232,9 @@ FIDELITY = "analysis.fidelity"
 
 
 def by_own_model(proposal: Proposal) -> Spec:
-    """Return a proposal's specification with the finest model but solids: as exact for pictures, and much faster."""
-    spec, models = proposal.spec, list(family(proposal.family).models)
-    if spec.fidelity not in models[1:]:
-        return spec
-    for coarser in reversed(models[: models.index(spec.fidelity)]):
-        try:
-            return spec.replace({FIDELITY: coarser})
-        except CfmError:  # of other parts
-            continue
-    return spec
+    """Return a proposal's specification with the model of its design: faster, and enough for pictures."""
+    spec = proposal.spec
+    return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY: proposal.own})
 
 
 def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
@@ -250,7 +246,7 @@ def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
         made = function_named(correct)(spec, job.wish) if correct else spec.replace({FIDELITY: near.pending})
         if clock.late():
             break
-        found = judged(job.family, near.variant, made, job.wish, job.seed, clock, near.numbers.get("yield"))
+        found = judged(job.family, near.variant, made, job.wish, job.seed, clock, near)
         if best is None or (found.text and len(found.missed) <= len(best.missed)):
             best = found
         if found.passes or not found.text:
@@ -338,7 +334,7 @@ def judged(
     wish: Wish,
     seed: int = 0,
     clock: Clock = NEVER,
-    share: float | None = None,
+    near: Proposal | None = None,
 ) -> Proposal:
     """Return a specification as a proposal: it is written with the wish as its requirements, read, analysed, judged.
 
@@ -356,8 +352,9 @@ def judged(
         Of random parts.
     clock : Clock
         Late, no more parts are drawn.
-    share : float, optional
-        Of good parts, where they were drawn already: a solid takes too long to be solved a hundred times.
+    near : Proposal, optional
+        What its family's own model made of it, where another one is to judge it. Its share of good parts is kept: a
+        solid takes too long to be solved a hundred times.
     """
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
@@ -381,13 +378,14 @@ def judged(
     pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, wish), False
     warnings = [one.name for one in result.warnings]
-    if "wide_beam" in warnings:
-        coarser = by_own_model(Proposal(name, variant, text))
+    if "wide_beam" in warnings and not pending:
+        coarser = written if near is None else written.replace({FIDELITY: near.model})
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
-        warnings[warnings.index("wide_beam")] = f"wide_beam {100.0 * raised:+.2g} %"
-        missed += [] if pending else _raised_out(wish, result, raised)
-    if wish.good_parts is not None and share is not None:
-        numbers["yield"] = share
+        warnings = [f"wide_beam {100.0 * raised:+.2g} %" if one == "wide_beam" else one for one in warnings]
+        missed += _raised_out(wish, result, raised)
+    if near is not None:
+        numbers["yield"] = near.numbers.get("yield")
+        warnings += [f"yield by the {near.model} model"] if wish.good_parts is not None else []
     elif wish.good_parts is not None and len(missed) <= 1:
         parts: GoodParts = good_parts(replace(result, spec=written), wish, clock, draw=not missed)
         if parts.late:
@@ -396,9 +394,9 @@ def judged(
         missed += [parts.missed] if parts.missed else []
         numbers["yield"] = parts.share
     return Proposal(
-        name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result, share)), movable,
+        name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable,
         tuple(unjudged(wish, result)), model_of(name, written), pending, tuple(dict.fromkeys(warnings)),
-        seconds,
+        seconds, near.model if near else "",
     )  # fmt: skip
 
 
@@ -534,7 +532,7 @@ def _life(found: Mapping[str, Any]) -> float | None:
     return min(known, default=None)
 
 
-def _notes(space: Room | None, result: Result, share: float | None) -> Iterator[str]:
+def _notes(space: Room | None, result: Result) -> Iterator[str]:
     """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed
@@ -544,8 +542,6 @@ def _notes(space: Room | None, result: Result, share: float | None) -> Iterator[
         yield f"friction assumed: {', '.join(rubs)}"
     elif getattr(mechanism, "pins", None) is not None:
         yield "friction of pins and guide is not counted: wish for 'hysteresis' to have it judged"
-    if share is not None:
-        yield "yield by the model of beams, before the correction by the solid"
     for finding in result.warnings:
         yield f"{finding.name}: {finding.message}"
 

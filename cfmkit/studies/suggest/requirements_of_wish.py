@@ -2,7 +2,8 @@
 
 Every number of a wish becomes a requirement on a metric, so that `cfmkit analyze` of the file says the same as the
 search. What a wish asks for and nothing is known of, as the life of a material without fatigue data, is no
-requirement: the proposal says that it was not judged, and is no mechanism that meets the wish.
+requirement: the proposal says that it was not judged, and is no mechanism that meets the wish. A yield is that of many
+parts: it stands in the block `sensitivity`, as `min_yield`.
 """
 
 from __future__ import annotations
@@ -63,7 +64,6 @@ def demanded(
         *_of_loss(wish, result),
         *_of_lives(wish, result, found),
         *_of_adjustment(wish, found),
-        *(({"metric": "yield", "min": _share(wish.good_parts)},) if wish.good_parts is not None else ()),
     )
 
 
@@ -96,8 +96,8 @@ def pressed(wish: Wish, spec: Spec) -> tuple[str, str]:
     return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
 
 
-def _share(value: float | None) -> str:
-    return f"{100.0 * float(value or 0.0):.12g} %"
+def _share(value: float) -> str:
+    return f"{100.0 * value:.12g} %"
 
 
 def _known(found: Mapping[str, Quantity], name: str) -> float | None:
