@@ -155,6 +155,8 @@ def _unknown_lives(result: Result, found: Mapping[str, Quantity]) -> Iterator[st
     links = "link_safety_factor" in found
     if (_bends(result) or links) and getattr(_block(result.spec), "fatigue", None) is None:
         yield f"life not judged: no S-N data for {_material(result)}"
+    elif _bends(result) and "fatigue_life" not in found:
+        yield "life not judged: no model of the fatigue of its contact"
     if wired and _known(found, "spring_life") is None:
         yield "life not judged: no S-N data for the wire of its springs"
     if not (_bends(result) or links or wired):
@@ -173,7 +175,9 @@ def _has_springs(spec: Spec) -> bool:
 
 
 def _block(spec: Spec) -> Any:
-    return getattr(spec.at("mechanism"), "material", None)
+    """Return the material of a mechanism, or of its contact."""
+    mechanism = spec.at("mechanism")
+    return getattr(mechanism, "material", None) or getattr(getattr(mechanism, "contact", None), "material", None)
 
 
 def _material(result: Result) -> str:
