@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 WIDE = "mechanism.wide_beams"
 
+WITHIN = 1.002
+"""How far inside its band a force is aimed at: the next solution is that of a part a little wider."""
+
 
 def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
     """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
@@ -35,8 +38,10 @@ def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
 
 
 def aim_below_stiffening(spec: Spec, wish: Wish, model: Callable[[Spec, Run], Result]) -> Wish:
-    """Return a wish whose force is between that without and that with the stiffening of a part."""
-    return replace(wish, target=wish.target / (1.0 + 0.5 * stiffening(spec, model)))
+    """Return a wish whose force is in the band without and with the stiffening of a part, or as near as can be."""
+    share = stiffening(spec, model)
+    lowest, highest = WITHIN * wish.low, wish.high / (WITHIN * (1.0 + share))
+    return replace(wish, target=max(min(wish.target / (1.0 + 0.5 * share), highest), lowest))
 
 
 def _mean(result: Result) -> float | None:

@@ -249,7 +249,8 @@ def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
     }  # fmt: skip
     reported = {
         "status": "complete", "message": "1 meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
-        "proposals": [one], "unjudged": [], "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
+        "proposals": [one], "unjudged": [],
+        "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip

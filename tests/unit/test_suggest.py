@@ -12,7 +12,6 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
-from cfmkit.curves import Curve
 from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
@@ -23,7 +22,7 @@ from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_spri
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
 from cfmkit.families.wishes import FamilyOffer
-from cfmkit.results import Result, Status
+from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
