@@ -27,6 +27,19 @@ WITHIN = 1.002
 """How far inside its band a force is aimed at: the next solution is that of a part a little wider."""
 
 
+PER_SQUARE = 0.007
+"""Stiffening over 2 (b/t)^2 sigma/E, b^2 K/t at the largest stress: 0.0026 to 0.0075 of POM leaves and networks
+whose stiffening was computed; the real one ends at 1/(1 - nu^2) - 1."""
+
+
+def is_too_wide(wish: Wish, width: float, thickness: float, strain: float) -> bool:
+    """Return True if leaves of a width and a thickness [m] probably stiffen by more than the band of a wish.
+
+    `strain`: the largest bending strain. An estimate, by which candidates are put in order; `stiffening` decides.
+    """
+    return PER_SQUARE * 2.0 * (width / thickness) ** 2 * strain > wish.high / wish.low - 1.0
+
+
 def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
     """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
     try:

@@ -25,7 +25,7 @@ from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
 from cfmkit.families.run_control import Run
-from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
@@ -58,6 +58,9 @@ FLAT = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
 OFFERED = 14
+
+WIDE_LAST = 100.0
+"""Promise of shapes whose beams are too wide to curl: they come after all others."""
 
 SAYS_LESS = 1e3
 """Times by which a shape that cannot travel so far misses more: the reason is that of one that can, if there is any."""
@@ -192,6 +195,8 @@ def _sized(
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if wish.good_parts is None else -thicker * thin
+    strain = wish.strength_used * strength / material.modulus
+    promise += WIDE_LAST * is_too_wide(wish, wide, thicker * thin, strain)
     variant = called(f"shape {kept.name}", wish, block)
     here = "cfmkit.families.beam.proposals_for_wish"
     free = "mechanism.thickness", "mechanism.width"

@@ -24,12 +24,13 @@ from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.flattest_window import INSIDE
 from cfmkit.families.no_mechanism import Infeasible
-from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.offer_type_and_generic_series import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
@@ -78,6 +79,9 @@ TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid", "2 Vs, c
 SOFTEST = 0.9
 """Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
 
+WIDE_LAST = 100.0
+"""Promise of designs whose leaves are too wide to curl: they come after all others."""
+
 APART = 1.2
 """Room across that a helical spring takes, over its diameter: as they are drawn."""
 
@@ -111,11 +115,14 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
                 thick = min(sizes.leaf.thickness, sizes.side.thickness)
                 promise = over["across"] * over["along"] if wish.good_parts is None else -thick
+                promise += WIDE_LAST * _is_too_wide(wish, block, sizes)
                 found.append(Candidate(variant, spec, True, FINISH, float(promise), correct=CORRECT))
             if (coiled := _coiled(wish, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
         plain = sorted(found, key=lambda one: one.promise)
+        narrow = [one for one in plain if one.promise < 0.5 * WIDE_LAST]
+        plain = narrow or plain
         return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
     if closest is None:
         return FamilyOffer(
@@ -123,6 +130,14 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
             "this travel, force and adjustment within the stress"
         )
     return _out_of_reach(wish, *closest)
+
+
+def _is_too_wide(wish: Wish, block: MaterialBlock, sizes: DesignSizes) -> bool:
+    """Return True if the Vs or the spring probably cannot curl, and stiffen by more than the band of the wish."""
+    material = MaterialSpec.model_validate(dict(block))
+    strain = wish.strength_used * (material.allowable(1.0) or 0.0) / material.modulus
+    strips = sizes.leaf, sizes.side
+    return any(is_too_wide(wish, float(one.width), float(one.thickness), strain) for one in strips)
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
