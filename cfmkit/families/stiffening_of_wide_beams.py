@@ -8,7 +8,7 @@ add is left out (docs/beam.md, wide beams).
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError
 from cfmkit.families.run_control import Run
@@ -40,7 +40,7 @@ def is_too_wide(wish: Wish, width: float, thickness: float, strain: float) -> bo
     return PER_SQUARE * 2.0 * (width / thickness) ** 2 * strain > wish.high / wish.low - 1.0
 
 
-def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
+def stiffening(spec: Spec, model: Callable[[Any, Run], Result]) -> float:
     """Return by what share the mean force over the window rises, by a model of beams; 0 if that does not know it."""
     try:
         means = [_mean(model(spec.replace({WIDE: wide, "requirements": ()}), Run())) for wide in (False, True)]
@@ -50,7 +50,7 @@ def stiffening(spec: Spec, model: Callable[[Spec, Run], Result]) -> float:
     return 0.0 if not narrow or not wide else max(wide / narrow - 1.0, 0.0)
 
 
-def aim_below_stiffening(spec: Spec, wish: Wish, model: Callable[[Spec, Run], Result]) -> Wish:
+def aim_below_stiffening(spec: Spec, wish: Wish, model: Callable[[Any, Run], Result]) -> Wish:
     """Return a wish whose force is in the band without and with the stiffening of a part, or as near as can be."""
     share = stiffening(spec, model)
     lowest, highest = WITHIN * wish.low, wish.high / (WITHIN * (1.0 + share))

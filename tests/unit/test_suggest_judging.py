@@ -16,12 +16,13 @@ from cfmkit.errors import SpecError
 from cfmkit.families import family, stiffening_of_wide_beams
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
-from cfmkit.families.slider_crank.springs.link_strength import Link, LinkLoads, links_that_bear
+from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, links_that_bear
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
+from cfmkit.studies.suggest.misses_in_words import raised_out
 from cfmkit.studies.suggest.proposal_making_and_judging import Proposal, ProposalJob, judged, made
 from cfmkit.studies.suggest.search import Suggestions, _Making, _Times, offer_of
 from cfmkit.studies.yield_by_assumed_tolerances import first_order_shares
@@ -186,8 +187,8 @@ def test_what_cannot_be_judged_is_said_and_meets_nothing():
 
 def test_a_mean_that_the_stiffening_of_wide_beams_takes_out_of_the_band_is_a_miss():
     asked = wish()
-    assert judging._raised_out(asked, 10.1, 0.014) == []
-    (reported,) = judging._raised_out(asked, 10.1, 0.02)
+    assert raised_out(asked, 10.1, 0.014) == []
+    (reported,) = raised_out(asked, 10.1, 0.02)
     assert reported == "wide_beam: the force is between 10.1 N and 10.3 N, allowed <= 10.25 N"
 
 
@@ -278,7 +279,7 @@ def loads(axial=0.0, moment=0.0, pin=0.0, rate=0.0, length=0.03):
 
 
 def test_links_bear_what_the_formulas_of_a_bar_with_holes_say():
-    link = Link(width=8e-3, sheet=2e-3, hole=2e-3, modulus=2e9)
+    link = LinkBar(width=8e-3, sheet=2e-3, hole=2e-3, modulus=2e9)
     assert link.stress(loads(axial=-12.0)) == pytest.approx(12.0 / (6e-3 * 2e-3))
     inertia = 2e-3 * ((8e-3) ** 3 - (2e-3) ** 3) / 12.0
     assert link.stress(loads(moment=0.1)) == pytest.approx(0.1 * 4e-3 / inertia)

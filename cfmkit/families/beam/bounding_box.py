@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,7 +31,8 @@ def room(result: Result) -> Room | None:
     A part that was solved as a solid moves as its beams do, to a fraction of a thickness.
     """
     if hasattr(result.state, "fine"):
-        result = analyze(result.spec.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
+        given: Any = result.spec
+        result = analyze(given.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
     if result.state is None:
         return None
     solution: Solution = result.state

@@ -333,9 +333,10 @@ def _scaled(spec: SliderCrankSpec, thinner: float, wider: float) -> dict[str, An
         thick = strip.thickness
         many = tuple(thinner * one for one in thick) if isinstance(thick, tuple) else thinner * thick
         return {"mechanism.beam.thickness": many, "mechanism.beam.width": wider * strip.width}
-    sizes = {name: getattr(spec.mechanism.flexures, name) for name in ("pivot", "crank_pin", "slider_pin")}
-    thick = {f"mechanism.flexures.{name}.thickness": thinner * one.thickness for name, one in sizes.items()}
-    return thick | {f"mechanism.flexures.{name}.width": wider * one.width for name, one in sizes.items()}
+    names = "pivot", "crank_pin", "slider_pin"
+    sizes: dict[str, Any] = {name: getattr(spec.mechanism.flexures, name) for name in names}
+    thicknesses = {f"mechanism.flexures.{name}.thickness": thinner * one.thickness for name, one in sizes.items()}
+    return thicknesses | {f"mechanism.flexures.{name}.width": wider * one.width for name, one in sizes.items()}
 
 
 def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:

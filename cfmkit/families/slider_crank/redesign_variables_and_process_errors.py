@@ -54,8 +54,7 @@ def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple
 
 
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
-    """Return which values err: how thick a strip comes out everywhere; of links, where holes lie, and springs'
-    rates."""
+    """Return which values err: the thickness of a strip, everywhere; of links, where holes lie; rates of springs."""
     mechanism = spec.mechanism
     if mechanism.beam is not None:
         return {"mechanism.beam.offset": "thickness"} if spec.fidelity == "beam" else {}

@@ -22,9 +22,8 @@ import numpy as np
 
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
-from cfmkit.families.flattest_window import INSIDE
 from cfmkit.families.no_mechanism import Infeasible
-from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
+from cfmkit.families.stiffening_of_wide_beams import is_too_wide
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
 from cfmkit.families.vcfm.spec import VcfmSpec
@@ -90,11 +89,8 @@ OFFERED = 28
 FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
 """What finishes what the family's design has made."""
 
-CORRECT = "cfmkit.families.vcfm.proposals_for_wish:correct"
+CORRECT = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
 """What corrects a mechanism by its solids."""
-
-NEARBY = np.linspace(0.9, 1.1, 21)
-"""Middles of windows of a solid that are looked at, over that of its beams."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -310,16 +306,16 @@ def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
     raised = 0.0 if wish.adjustable is None or design is None or not design.adjustment else max(wish.adjustable)
     forces = wish.target, max(raised, wish.target)
     made, end, stiffness = with_structure(spec, name, forces, wish.travel, strength)
-    return _over_flattest(made, wish, _preloads(spec, wish, 1.0 / stiffness), end)
+    return _over_flattest(made, wish, preloads_for(spec, wish, 1.0 / stiffness), end)
 
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
     window = spec.analysis.window
-    return _over_flattest(spec, wish, _preloads(spec, wish), float(window[1]) if window else wish.travel)
+    return _over_flattest(spec, wish, preloads_for(spec, wish), float(window[1]) if window else wish.travel)
 
 
-def _preloads(
+def preloads_for(
     spec: VcfmSpec, wish: Wish, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
 ) -> tuple[float, ...]:
     """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
@@ -337,54 +333,6 @@ def _preloads(
     return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
 
 
-def correct(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
-    """Return a mechanism with the window, the widths and, where the stress needs it, the lengths of its solids.
-
-    The force is linear in both widths: of windows around the present one that is taken in which the widths that fit the
-    force best leave the least of it. Longer leaves of the same rise are stressed less, as one over the length squared;
-    their force falls with its cube.
-    """
-    from cfmkit.families.run_control import Run
-    from cfmkit.families.vcfm.exact_model import analyze
-    from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
-
-    wish = aim_below_stiffening(spec, wish, analyze)
-    solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
-    window = solid.analysis.window
-    middle = 0.5 * (float(window[0]) + float(window[1])) if window else 0.5 * spec.travel
-    ends = [share * middle + 0.5 * wish.travel for share in NEARBY if share * middle > 0.5 * wish.travel]
-    if not ends:
-        return solid
-    free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
-    sampler = SolidSampler(solid.replace(free), max(ends), 0.0, Run())
-    tried = [_in_window(sampler, end - 0.5 * wish.travel, wish.target, wish.travel) for end in ends]
-    known = [one for one in tried if one is not None]
-    if not known:
-        return solid
-    _, at, wide, stiff = min(known)
-    last = at + 0.5 * wish.travel
-    leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
-    preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)
-    force, stress = sampler.spring(np.array([last - wish.travel, last]))
-    side = float(np.max(stress)) * float(parts(solid).spring.stress(last + largest) / parts(solid).spring.stress(last))
-    rate = stiff * float(force[1] - force[0]) / wish.travel
-    strength = wish.strength_used * (solid.mechanism.material.allowable(1.0) or np.inf)
-    longer = [max(1.0, sqrt(1.02 * one / strength)) for one in (leaf, side)]
-    made = solid
-    if solid.mechanism.springs is None:
-        made = _longer(solid, longer)
-        preloads = _preloads(spec, wish, 1.0 / rate, solid.analysis.preloads)
-    else:
-        made = _longer(solid, [longer[0], 1.0])
-    made = _wider(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
-    begin = last - wish.travel * (1.0 + INSIDE)
-    changes = {
-        "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,
-        "analysis.preloads": preloads,
-    }  # fmt: skip
-    return _opened(made.replace(changes), last, preloads)
-
-
 def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.flattest_window import flattest
@@ -394,7 +342,7 @@ def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end:
     wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
     made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
-    made = _opened(made, wide, preloads)
+    made = opened(made, wide, preloads)
     result = analyze(made, Run())
     found = flattest(result, wish.travel)
     if found is None:
@@ -402,7 +350,7 @@ def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end:
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
 
 
-def _opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
+def opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
     """Return a mechanism whose corners are so high that its spring stays open: a rigid part, which no force needs."""
     from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 
@@ -482,9 +430,9 @@ def with_structure(
         over = [stress / strength for stress in found.stresses]
         if max(over) <= 1.0:
             break
-        made = _longer(made, [max(1.0, sqrt(1.02 * one)) for one in over])
+        made = lengthened(made, [max(1.0, sqrt(1.02 * one)) for one in over])
         found = _fitted(made, forces, travel)
-    made = _wider(made, found.wide, found.stiff)
+    made = widened(made, found.wide, found.stiff)
     return made, found.end, found.stiffness
 
 
@@ -508,7 +456,7 @@ def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
         sampler = ExactSampler(spec, end, 0.0)
     if sampler.problem:
         raise SolutionError(sampler.problem)
-    tried = [one for one in (_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
+    tried = [one for one in (fit_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
     if not tried:
         raise SolutionError("no widths of this structure give the force over the travel")
     _, at, wide, stiff = min(tried)
@@ -522,7 +470,7 @@ def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
     return _Fit(wide, stiff, (leaf, more * float(stresses[1])), last, stiffness)
 
 
-def _in_window(
+def fit_in_window(
     sampler: ExactSampler, at: float, force: float, travel: float
 ) -> tuple[float, float, float, float] | None:
     """Return what is left of the force around a place, the place and both factors; None where one is not above zero."""
@@ -541,7 +489,7 @@ def _in_window(
     return float(left), at, float(wide), float(stiff)
 
 
-def _wider(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
+def widened(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
     """Return a mechanism whose leaves, and whose spring unless it is bought, are wider by factors."""
     changes = {"mechanism.bistable.width": spec.mechanism.bistable.width * leaves}
     if spec.mechanism.springs is None:
@@ -549,7 +497,7 @@ def _wider(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
     return spec.replace(changes)
 
 
-def _longer(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
+def lengthened(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
     """Return a mechanism whose leaves of the same rise, and whose spring, are longer by factors."""
     leaf = spec.mechanism.bistable
     rise, length = leaf.length * sin(leaf.angle), leaf.length * factors[0]

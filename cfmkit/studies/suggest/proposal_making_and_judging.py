@@ -21,9 +21,9 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
-from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
 from cfmkit.stock.processes import PROCESSES
+from cfmkit.studies.suggest.misses_in_words import largest_force, outside, raised_out, too_short
 from cfmkit.studies.suggest.requirements_of_wish import LIVES, demanded, unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
@@ -55,9 +55,6 @@ MOST_ASKED = 0.9975
 
 CORRECTIONS = 2
 """How often a part is corrected by its finest model: what is still missed then is missed."""
-
-SLACK = 1e-9
-"""On lengths that are compared: what writing a number down does to its last digit."""
 
 
 @dataclass(frozen=True)
@@ -372,8 +369,8 @@ def judged(
     written = spec_of(name, text)
     outcomes = check(written.part_requirements, result, values)
     missed = [one.sentence for one in outcomes if not one.ok and one.metric not in ENVELOPE]
-    missed += _outside(wish, space)
-    missed += _too_short(wish, result)
+    missed += outside(wish, space)
+    missed += too_short(wish, result)
     pending = finest_of(name, written)
     pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, wish), False
@@ -383,7 +380,7 @@ def judged(
         numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
         warnings = [f"wide_beam {100.0 * raised:+.2g} %" if one == "wide_beam" else one for one in warnings]
         # what its finest model is still to correct may come down to the lower end of the band
-        missed += _raised_out(wish, wish.low if pending else _largest_force(wish, result), raised)
+        missed += raised_out(wish, wish.low if pending else largest_force(wish, result), raised)
     if near is not None:
         numbers["yield"] = near.numbers.get("yield")
         warnings += [f"yield by the {near.model} model"] if wish.good_parts is not None else []
@@ -431,67 +428,6 @@ def made_as_wished(spec: Spec, wish: Wish) -> Spec:
 
 ROUND = 0.5e-3
 """Radius of inside corners where none is stated [m]: the default of parts that are cut."""
-
-
-def _largest_force(wish: Wish, result: Result) -> float:
-    """Return the largest mean of all branches, or of a band the largest force [N or N m]."""
-    name = f"{wish.kind}_{'max' if wish.banded else 'mean'}"
-    values = [one.value for key, one in evaluate(result).items() if key.partition("[")[0] == name]
-    return max((value for value in values if value is not None), default=0.0)
-
-
-def _raised_out(wish: Wish, force: float, share: float) -> list[str]:
-    """Return whether the stiffening of wide beams takes a force out of its band, in a sentence if it does."""
-    most = (1.0 + share) * force
-    if most <= wish.high * (1.0 + SLACK):
-        return []
-    texts = [format_short(value, wish.kind) for value in (force, most, wish.high)]
-    return [f"wide_beam: the {wish.kind} is between {texts[0]} and {texts[1]}, allowed <= {texts[2]}"]
-
-
-def _outside(wish: Wish, space: Room | None) -> Iterator[str]:
-    """Yield by which sides a mechanism does not stay in the room; one that turns may lie either way in the plane."""
-    if space is None:
-        yield "the room that it needs is not known"
-        return
-    sides = [space.across, space.along]
-    given = list(wish.room[:2])
-    if wish.kind == "torque":
-        sides, given = sorted(sides), sorted(given)
-    for name, need, have in zip(("across the travel", "along the travel"), sides, given, strict=True):
-        if need > have * (1.0 + SLACK):
-            needed, given_side = _apart(need, have)
-            yield f"needs {needed} {name}: {given_side} given"
-    if wish.depth is not None and space.depth is None:
-        yield f"its depth is not known: {space.assumed}"
-    elif wish.depth is not None and space.depth is not None and space.depth > wish.depth * (1.0 + SLACK):
-        needed, given_depth = _apart(space.depth, wish.depth)
-        yield f"needs a depth of {needed}: {given_depth} given"
-
-
-def _apart(one: float, other: float) -> tuple[str, str]:
-    """Return two lengths that differ with as many digits as it takes to see that they do.
-
-    Examples
-    --------
-    >>> _apart(0.012, 0.010), _apart(0.01000004, 0.010)
-    (('12 mm', '10 mm'), ('10.00004 mm', '10 mm'))
-    """
-    for digits in range(4, 17):
-        texts = format_short(one, "length", digits), format_short(other, "length", digits)
-        if texts[0] != texts[1]:
-            break
-    return texts
-
-
-def _too_short(wish: Wish, result: Result) -> Iterator[str]:
-    """Yield whether the window that was judged is shorter than the travel that is wished."""
-    window: Any = result.spec.at("analysis.window")
-    length = 0.0 if window is None else float(window[1]) - float(window[0])
-    if length < wish.travel * (1.0 - SLACK):
-        dimension = "length" if wish.kind == "force" else "angle"
-        reported = format_short(length, dimension), format_short(wish.travel, dimension)
-        yield f"is constant over {reported[0]}: {reported[1]} wished"
 
 
 def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, float | None]:

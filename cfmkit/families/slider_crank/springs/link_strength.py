@@ -73,7 +73,7 @@ class LinkLoads:
 
 
 @dataclass(frozen=True)
-class Link:
+class LinkBar:
     """Section and material of crank and coupler."""
 
     width: float  # [m]
@@ -135,13 +135,13 @@ def link_loads(assembly: Assembly, motion: FloatArray, legs: int) -> LinkLoads:
     return LinkLoads(lengths, axial[:, there], moment[:, there], np.hypot(pulled, across)[there], springs)
 
 
-def link_of(spec: SliderCrankSpec) -> Link | None:
+def link_of(spec: SliderCrankSpec) -> LinkBar | None:
     """Return the links of a mechanism; None where their material or their thickness is not stated."""
     part, material = spec.mechanism.part, spec.mechanism.material
     if material is None or part is None or part.sheet is None:
         return None
     eye, hole = eye_and_hole(spec)
-    return Link(2.0 * eye, part.sheet, 2.0 * hole, material.modulus)
+    return LinkBar(2.0 * eye, part.sheet, 2.0 * hole, material.modulus)
 
 
 def values_of_links(spec: SliderCrankSpec, assembly: Assembly, motion: FloatArray) -> Mapping[str, Quantity]:
@@ -184,7 +184,7 @@ SPARE = 1.001
 
 def links_that_bear(
     loads: LinkLoads, sheet: float, modulus: float, allowable: float, least: float, widest_pin: float
-) -> Link | None:
+) -> LinkBar | None:
     """Return the narrowest links of a sheet that bear their loads and stay straight; None if there are none.
 
     Parameters
@@ -205,22 +205,22 @@ def links_that_bear(
     low, high = pin + 2.0 * max(least, 0.25 * pin), WIDEST_SHARE * min(loads.lengths)
 
     def bears(width: float) -> bool:
-        link = Link(width, sheet, pin, modulus)
+        link = LinkBar(width, sheet, pin, modulus)
         return link.safety(loads, allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE
 
     if low > high or not bears(high):
         return None
     if bears(low):
-        return Link(low, sheet, pin, modulus)
+        return LinkBar(low, sheet, pin, modulus)
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if bears(middle) else (middle, high)
-    return Link(high, sheet, pin, modulus)
+    return LinkBar(high, sheet, pin, modulus)
 
 
 def least_sheet(loads: LinkLoads, modulus: float, allowable: float) -> float:
     """Return a thickness below which not even the widest links stay straight and bear their bending [m]."""
-    widest = Link(WIDEST_SHARE * min(loads.lengths), 1.0, 0.0, modulus)  # both go with one over the thickness
+    widest = LinkBar(WIDEST_SHARE * min(loads.lengths), 1.0, 0.0, modulus)  # both go with one over the thickness
     return max(widest.turn_share(loads) / LARGEST_TURN_SHARE, widest.stress(loads) / allowable)
 
 
