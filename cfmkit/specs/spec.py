@@ -256,6 +256,10 @@ else:
     )
 
 
+AS_MADE = "as_made"
+"""Key of the context in which a manufactured part is validated: see `Spec.replace`."""
+
+
 class Spec(Model):
     """A complete specification of one mechanism; families narrow the blocks."""
 
@@ -367,10 +371,11 @@ class Spec(Model):
             value = _child(value, part, path)
         return value
 
-    def replace(self, changes: Mapping[str, Any]) -> Self:
+    def replace(self, changes: Mapping[str, Any], as_made: bool = False) -> Self:
         """Return a validated copy with the values at some dotted paths changed.
 
-        Values may be SI numbers or text with a unit (``"190 mm"``).
+        Values may be SI numbers or text with a unit (``"190 mm"``). `as_made`: the values are those of one manufactured
+        part, which need not agree with each other as stated ones do: a spring's rate is not exactly that of its wire.
 
         Raises
         ------
@@ -381,7 +386,7 @@ class Spec(Model):
         for path, value in changes.items():
             data = _with(data, path.split("."), value, path)
         try:
-            return type(self).model_validate(data)
+            return type(self).model_validate(data, context={AS_MADE: as_made})
         except ValidationError as error:
             from cfmkit.specs.yamlio import spec_error
 

@@ -34,6 +34,13 @@ if TYPE_CHECKING:
 FRICTION = 0.002
 """Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
 
+SLIDING = 0.1
+"""Friction of the plain slider pin, of the springs' hooks and of the guide where none is stated and hysteresis is
+wished: greased steel; assumed."""
+
+PIN_SHARE = 0.25
+"""Diameter of the slider pin and of the pins that springs hook on, over that of a roller: assumed."""
+
 DRAWN = 60_000
 """Proportions that are looked at."""
 
@@ -188,6 +195,11 @@ def _written(
         },
         "contact": {"width": thick, "material": material},
     }
+    if wish.hysteresis is not None:
+        mechanism |= {
+            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING},
+            "guide": {"friction": SLIDING},
+        }
     data = {
         "family": "cam",
         "name": "suggested",

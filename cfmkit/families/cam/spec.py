@@ -12,7 +12,15 @@ from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
-from cfmkit.stock.material_and_part_spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
+from cfmkit.stock.material_and_part_spec import (
+    Friction,
+    Guide,
+    MaterialField,
+    MaterialSpec,
+    Pins,
+    ProcessField,
+    SafetyFactor,
+)
 from cfmkit.stock.springs.spec import Catalogue, Life
 
 Positive = Field(gt=0)
@@ -57,6 +65,9 @@ class Plate(Model):
     )
     thickness: PositiveLength | None = Field(
         None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if stated"
+    )
+    process: ProcessField | None = Field(
+        None, description="manufacturing process: laser, wire-edm, fdm, sls or mill, or your own values; default: laser"
     )
 
 

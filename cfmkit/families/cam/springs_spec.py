@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Force, Stiffness
@@ -42,8 +42,8 @@ class Springs(Model):
     life: Life | None = None
 
     @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, "extension")
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, "extension", info)
         return self
 
     @model_validator(mode="after")

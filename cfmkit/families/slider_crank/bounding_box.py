@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Room
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.outline import drawing
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
@@ -25,8 +26,16 @@ PLATES = 3
 
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved."""
-    if result.state is None or result.spec.fidelity == "solid":
+    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved.
+
+    A part that was solved as a solid moves as its beams do, to a fraction of a thickness.
+    """
+    spec: Any = result.spec
+    if result.state is not None and spec.fidelity == "solid":
+        from cfmkit.families.slider_crank.printed.model import analyze
+
+        result = analyze(spec.replace({"analysis.fidelity": spec.piece, "requirements": ()}), Run())
+    if result.state is None:
         return None
     return _linkage(result) if result.spec.fidelity == "prb" else _part(result)
 

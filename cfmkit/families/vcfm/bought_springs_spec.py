@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import PositiveLength
 from cfmkit.specs.units import Force, Stiffness
@@ -45,8 +45,8 @@ class BoughtSprings(SpringSupport):
     life: Life | None = None
 
     @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, self.kind)
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, self.kind, info)
         if self.initial_tension and self.kind == "compression":
             raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
         self.check_guide(self.kind, self.coil, self.outer_diameter)

@@ -50,6 +50,9 @@ DEFINITIONS = {
     "rest_position": ("length", "rest position of the shuttle at the nominal preload, from the as-made position"),
     "rest_shift_max": ("length", "largest distance of a rest position from the as-made position, over all preloads"),
     "force_change_max": ("force", "largest change of the mean force due to a preload, relative to the nominal one"),
+    "adjusted_force_min": ("force", "smallest mean force over the window, of all preloads"),
+    "adjusted_force_max": ("force", "largest mean force over the window, of all preloads"),
+    "adjusted_ripple_max": ("ratio", "largest (max - min)/max of the force over the window, of all preloads"),
     "force_per_preload": (
         "stiffness",
         "largest change of the mean force due to a preload, over the change of the preload",
@@ -194,6 +197,17 @@ def _adjustment(solution: Solution) -> dict[str, float | None]:
     return {"force_change_max": change, "force_per_preload": change / preload}
 
 
+def _at_ends(solution: Solution) -> dict[str, float | None]:
+    """Return the means and the ripple of all preloads together; None where one of them has no force in the window."""
+    names = "adjusted_force_min", "adjusted_force_max", "adjusted_ripple_max"
+    curves = [forces(solution, push) for push in solution.pushes]
+    if not all(np.isfinite(force).all() and force.max() > 0.0 for force in curves):
+        return dict.fromkeys(names)
+    means = [float(force.mean()) for force in curves]
+    worst = max(1.0 - float(force.min() / force.max()) for force in curves)
+    return dict(zip(names, (min(means), max(means), worst), strict=True))
+
+
 _GROUPS: Mapping[tuple[str, ...], Callable[[Solution], dict[str, float | None]]] = {
     (
         "positive_stiffness",
@@ -211,6 +225,7 @@ _GROUPS: Mapping[tuple[str, ...], Callable[[Solution], dict[str, float | None]]]
     ("stiffness_mismatch", "allowable_stress"): _mismatch,
     ("spring_stress_max", "bistable_stress_max", "travel_stress_max", "travel_safety_factor"): _stresses,
     ("force_change_max", "force_per_preload"): _adjustment,
+    ("adjusted_force_min", "adjusted_force_max", "adjusted_ripple_max"): _at_ends,
 }
 """Values that are computed together, in the order of the page."""
 

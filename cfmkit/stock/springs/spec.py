@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, mode
 
 from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.spec import AS_MADE, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.material_and_part_spec import Fatigue
@@ -164,6 +164,11 @@ def _disagree(wound: Wound, stated: float) -> str:
     )
 
 
+def is_made(info: ValidationInfo) -> bool:
+    """Return True if the values are those of one manufactured part."""
+    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
+
+
 def check_initial_tension(wound: Wound | None, tension: float) -> None:
     """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
     if wound is None or not tension:
@@ -174,10 +179,11 @@ def check_initial_tension(wound: Wound | None, tension: float) -> None:
         raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
 
 
-def settle_rate(springs: Any, kind: Kind) -> None:
+def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
     """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
 
-    Their initial tension must be one that such a wire is wound with.
+    Their initial tension must be one that such a wire is wound with. The rate of a manufactured spring is not checked:
+    its tolerance comes on top of what stated values differ by.
     """
     if springs.wound is not None:
         check_initial_tension(springs.wound.wound(kind), springs.initial_tension)
@@ -186,7 +192,7 @@ def settle_rate(springs: Any, kind: Kind) -> None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
         # past the frozen model, and not counted as set: another wire then has another rate
         object.__setattr__(springs, "stiffness", springs.wound.wound(kind).rate)
-    elif springs.wound is not None:
+    elif springs.wound is not None and not is_made(info):
         for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
             springs.wound.check_rate(kind, one)
 

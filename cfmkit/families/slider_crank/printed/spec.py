@@ -113,7 +113,7 @@ class Printed(Model):
     """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
 
     material: MaterialField | None = Field(
-        None, description="of 'flexures' or 'beam': a name from `show materials`, or {youngs_modulus, ...}"
+        None, description="of 'flexures', 'beam' or links: a name from `show materials`, or {youngs_modulus, ...}"
     )
     safety_factor: SafetyFactor = 1.0
     flexures: Flexures | None = Field(

@@ -25,6 +25,7 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
+from cfmkit.families.slider_crank.springs.link_strength import values_of_links
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS, values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
@@ -37,14 +38,14 @@ from cfmkit.stock.parts_list import BoughtPart, listed
 from cfmkit.stock.springs.guides import guide_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
-    from cfmkit.results import Finding
+    from cfmkit.results import Finding, Quantity
 
 
 Ends = tuple[float, float]
@@ -77,9 +78,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         return no_result(spec, problem.finding)
     said, stuck = {item.name for item in shortfalls}, _held(solution)
     found = findings_of(spec, solution) if run.wanted is None else ()
-    values = (
-        {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution)} if run.wants(DEFINITIONS) else {}
-    )
+    values = dict(_values(spec, solution)) if run.wants(DEFINITIONS) else {}
     status = Status.PARTIAL if shortfalls or stuck else Status.COMPLETE
     return Result(
         spec=_as_run(spec, assembly),
@@ -97,6 +96,12 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         tables=listed(parts_of(spec)),
         state=solution,
     )
+
+
+def _values(spec: SliderCrankSpec, solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name: of the mechanism, of the springs' wires, and of the links."""
+    links = values_of_links(spec, solution.assembly, solution.character.grid)
+    return {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution), **links}
 
 
 def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
@@ -97,6 +98,7 @@ DEFINITIONS = {
     "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
     "guide_force_max": ("force", "largest transverse force of the slider of one leg on its guide"),
     **WIRE_DEFINITIONS,
+    **LINK_DEFINITIONS,
 }
 
 

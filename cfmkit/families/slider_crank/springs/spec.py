@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringSupport, SpringWire
+from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringSupport, SpringWire, is_made
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -85,7 +85,7 @@ class Springs(Model):
     bought: tuple[Bought, ...] = Field((), description="the bought springs, for the parts list")
 
     @model_validator(mode="after")
-    def _rates_are_those_of_the_wires(self) -> Self:
+    def _rates_are_those_of_the_wires(self, info: ValidationInfo) -> Self:
         """Take rates from the wires where none are stated, and refuse stated ones that contradict them."""
         for joint in dict.fromkeys(one.at for one in self.bought):
             parts = [one.rate for one in self.bought if one.at == joint]
@@ -97,7 +97,7 @@ class Springs(Model):
             if joint not in self.model_fields_set:
                 # past the frozen model, and not counted as set: another wire then has another rate
                 object.__setattr__(self, joint, total)
-            elif abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
+            elif not is_made(info) and abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
                 refuse(
                     "Springs",
                     {
@@ -128,6 +128,12 @@ class Springs(Model):
     def rates(self) -> tuple[float, float, float, float]:
         """Rates at pivot, crank pin, slider pin and slider [N m/rad, the last N/m]."""
         return self.pivot, self.crank_pin, self.slider_pin, self.slider
+
+
+class Links(Model):
+    """Crank and coupler as bars with round ends, cut from the sheet of `part`."""
+
+    width: PositiveLength = Field(description="across their length, at the eyes, too")
 
 
 class Limits(Model):
