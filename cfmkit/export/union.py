@@ -382,7 +382,8 @@ def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> lis
     reach = _united(areas, size, _area(rings, size))
     near = NEAR * GRID * size
     touched = (_touched(runs, radius, near) for runs in _traced(reach, ways, size))
-    return [ring for ring in touched if abs(_encloses(ring)) > (SPECK * size) ** 2]
+    closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= near)
+    return [ring for ring in closed if abs(_encloses(ring)) > (SPECK * size) ** 2]
 
 
 def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iterator[FloatArray]:
