@@ -364,7 +364,8 @@ def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
 def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
     """Return closed chains of edges with inside corners as a cutter of a radius [m] leaves them."""
     fine = SAGITTA * min(size, radius)
-    ways, areas = [], []
+    ways: list[Track] = []
+    areas: list[FloatArray] = []
     for ring in rings:
         tracks = [Track.of(edge, fine) for edge in ring]
         for track, following in zip(tracks, [*tracks[1:], tracks[0]], strict=True):

@@ -30,7 +30,7 @@ class VcfmPart(CutPart):
 
 
 class CutLeaves(RoundedCorners):
-    """What a mechanism of `bistable` leaves and a `positive` spring of leaves, unless that is bought, knows of its part."""
+    """What a mechanism of `bistable` leaves, and a `positive` spring unless that is bought, knows of its part."""
 
     @property
     def thinnest(self: Any) -> float:
