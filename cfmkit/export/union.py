@@ -14,14 +14,13 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
-from cfmkit.numerics.biarcs import cubic, slope
+from cfmkit.export.tracks import Track, pair, xy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -72,6 +71,14 @@ class Piece:
         return cls(tuple(Line(a, b) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True) if a != b))
 
     @classmethod
+    def around(cls, points: FloatArray) -> list[Piece]:
+        """Return the convex hull of points (n, 2) [m]; none if they are on one line."""
+        from shapely import MultiPoint
+
+        hull = MultiPoint(points).convex_hull
+        return [cls.polygon(np.asarray(hull.exterior.coords)[:-1])] if hull.geom_type == "Polygon" else []
+
+    @classmethod
     def disc(cls, center: tuple[float, float], radius: float) -> Piece:
         """Return a circle [m]."""
         return cls((Arc(center, radius, 0.0, 2.0 * math.pi),))
@@ -116,14 +123,14 @@ def merged(
         If nothing is left.
     """
     near = NEAR * GRID * size
-    tracks = [_Track.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
+    tracks = [Track.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
     whole = _united([area for piece in pieces for area in piece.covered(size)], size)
     rings = [_recognised(_ring(runs, near), near) for runs in _traced(whole, tracks, size)]
     if fillet > 0:
         rings = _rounded(rings, fillet, size)
     if holes:
-        tracks = [_Track.of(edge, SAGITTA * size) for ring in rings for edge in ring]
-        tracks += [_Track.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
+        tracks = [Track.of(edge, SAGITTA * size) for ring in rings for edge in ring]
+        tracks += [Track.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
         left = _area(rings, size).difference(_united([area for hole in holes for area in hole.covered(size)], size))
         rings = [_ring(runs, near) for runs in _traced(left, tracks, size)]
     if not rings:
@@ -150,123 +157,40 @@ def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
 
 
 def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
-    return np.concatenate([_Track.of(edge, SAGITTA * size).corners[:-1] for edge in ring])
+    return np.concatenate([Track.of(edge, SAGITTA * size).corners[:-1] for edge in ring])
 
 
 def _encloses(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
     found = 0.0
     for edge in ring:
-        z = _Track.of(edge, math.inf).z
+        z = Track.of(edge, math.inf).z
         found += 0.5 * float((np.conj(z[:-1]) * z[1:]).imag.sum())
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Track:
-    """An edge over a parameter that counts the lines of its polygon; or the edge moved into the waste on its right."""
-
-    edge: Edge
-    z: NDArray[np.complex128]
-    moved: float = 0.0
-
-    @classmethod
-    def of(cls, edge: Edge, sagitta: float) -> _Track:
-        if isinstance(edge, Line):
-            return cls(edge, np.array(edge.ends))
-        if isinstance(edge, Smooth):
-            return cls(edge, np.asarray(edge.points @ np.array([1, 1j])))
-        step = min(2.0 * math.acos(max(1.0 - sagitta / edge.radius, 0.0)), math.radians(10.0))
-        count = max(math.ceil(abs(edge.end - edge.start) / step), 2)
-        angle = np.linspace(edge.start, edge.end, count + 1)
-        return cls(edge, complex(*edge.center) + edge.radius * np.exp(1j * angle))
-
-    @property
-    def corners(self) -> FloatArray:
-        return _xy(self.z)
-
-    @cached_property
-    def tangents(self) -> NDArray[np.complex128]:
-        """Unit tangents at the corners."""
-        if isinstance(self.edge, Smooth):
-            return np.asarray(self.edge.tangents @ np.array([1, 1j]))
-        return np.array([self.ahead(float(k)) for k in range(len(self.z))])
-
-    def beside(self, distance: float) -> _Track:
-        """Return the curve that runs at a distance [m] on the right."""
-        return _Track(self.edge, self.z - 1j * distance * self.tangents, distance)
-
-    def at(self, u: float) -> complex:
-        """Return the point at a parameter, a little beyond the ends as well."""
-        return self.foot(u) - 1j * self.moved * self.ahead(u) if self.moved else self.foot(u)
-
-    def foot(self, u: float) -> complex:
-        """Return the point of the edge itself."""
-        edge, count = self.edge, len(self.z) - 1
-        if isinstance(edge, Line):
-            start, end = edge.ends
-            return start + u * (end - start)
-        if isinstance(edge, Arc):
-            angle = edge.start + (edge.end - edge.start) * u / count
-            return complex(*edge.center) + edge.radius * complex(math.cos(angle), math.sin(angle))
-        return complex(cubic(*self._between(u))[0])
-
-    def ahead(self, u: float) -> complex:
-        """Return the unit tangent."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            way = edge.ends[1] - edge.ends[0]
-        elif isinstance(edge, Arc):
-            angle = edge.start + (edge.end - edge.start) * u / (len(self.z) - 1)
-            way = complex(-math.sin(angle), math.cos(angle)) * (1.0 if edge.end > edge.start else -1.0)
-        elif u == int(u) and 0 <= u < len(self.z):
-            way = complex(*edge.tangents[int(u)])
-        else:
-            way = complex(slope(*self._between(u))[0])
-        return way / abs(way)
-
-    def _between(self, u: float) -> tuple[Any, ...]:
-        """Return ends and tangents of the piece of a smooth edge that holds a parameter, and the share there."""
-        assert isinstance(self.edge, Smooth)
-        k = min(max(int(u), 0), len(self.z) - 2)
-        (a, b), (s, t) = self.edge.points[k : k + 2] @ [1, 1j], self.edge.tangents[k : k + 2] @ [1, 1j]
-        return a, s, b, t, np.array([u - k])
-
-    def part(self, first: float, last: float, start: complex, end: complex) -> Edge:
-        """Return the edge between two parameters, from a place to a place that are there."""
-        edge = self.edge
-        if isinstance(edge, Line):
-            return Line(_pair(start), _pair(end))
-        if isinstance(edge, Arc):
-            count = len(self.z) - 1
-            low, high = (edge.start + (edge.end - edge.start) * u / count for u in (first, last))
-            if abs(high - low - (edge.end - edge.start)) < SMOOTH:
-                return edge
-            return Arc(edge.center, edge.radius, low, high)
-        inner = np.arange(math.floor(first) + 1, math.ceil(last))
-        inner = inner[(inner > first + 0.05) & (inner < last - 0.05)]
-        points = np.vstack([_pair(start), edge.points[inner], _pair(end)])
-        ends = [_pair(self.ahead(first)), _pair(self.ahead(last))]
-        return Smooth(points, np.vstack([ends[0], edge.tangents[inner], ends[1]]))
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
     """A piece of a track that bounds the part, from one parameter to another."""
 
-    track: _Track
+    track: Track
     first: float
     last: float
 
+    @property
+    def whole(self) -> Edge:
+        """The edge, of a ring that is nothing else."""
+        return self.track.part(self.first, self.last, self.track.foot(self.first), self.track.foot(self.last))
 
-def _traced(whole: Any, tracks: Sequence[_Track], size: float) -> Iterator[list[_Run]]:
+
+def _traced(whole: Any, tracks: Sequence[Track], size: float) -> Iterator[list[_Run]]:
     """Yield, ring by ring of a geometry of shapely, the runs of tracks that bound it, the material on their left."""
     from shapely import STRtree, linestrings, orient_polygons
 
     starts, ends = (np.concatenate([track.z[part] for track in tracks]) for part in (slice(-1), slice(1, None)))
     owner = np.repeat(np.arange(len(tracks)), [len(track.z) - 1 for track in tracks])
     number = np.concatenate([np.arange(len(track.z) - 1) for track in tracks])
-    lines = np.stack([_xy(starts), _xy(ends)], axis=1)
+    lines = np.stack([xy(starts), xy(ends)], axis=1)
     sources = _Sources(tracks, starts, ends - starts, owner, number, STRtree(linestrings(lines)), NEAR * GRID * size)
     for part in getattr(orient_polygons(whole), "geoms", [orient_polygons(whole)]):
         for ring in (part.exterior, *part.interiors) if part.geom_type == "Polygon" else ():
@@ -291,7 +215,7 @@ def _apart(corners: NDArray[np.complex128], near: float) -> NDArray[np.complex12
 class _Sources:
     """All lines of some tracks: where each begins, its vector, its track and its number on it; a tree of them."""
 
-    tracks: Sequence[_Track]
+    tracks: Sequence[Track]
     starts: NDArray[np.complex128]
     along: NDArray[np.complex128]
     owner: NDArray[np.int64]
@@ -304,7 +228,7 @@ class _Sources:
         from shapely import points
 
         a, b = corners, np.roll(corners, -1)
-        line, source = self.tree.query(points(_xy(0.5 * (a + b))), predicate="dwithin", distance=self.near)
+        line, source = self.tree.query(points(xy(0.5 * (a + b))), predicate="dwithin", distance=self.near)
         first, last = ((end[line] - self.starts[source]) / self.along[source] for end in (a, b))
         length = np.abs(self.along[source])
         off = np.maximum(np.abs(first.imag), np.abs(last.imag)) * length
@@ -324,7 +248,7 @@ class _Sources:
         runs: list[list[Any]] = []
         for k, candidates in enumerate(found):
             if candidates is None:  # a line that no edge explains stands for itself
-                runs.append([_Track(Line(_pair(a[k]), _pair(b[k])), np.array([a[k], b[k]])), 0.0, 1.0])
+                runs.append([Track(Line(pair(a[k]), pair(b[k])), np.array([a[k], b[k]])), 0.0, 1.0])
                 continue
             same = [one for one in candidates if runs and self._follows(runs[-1], one)]
             owner, first, last = min(same or candidates, key=lambda one: (one[0], one[1]))
@@ -344,8 +268,7 @@ class _Sources:
 def _ring(runs: Sequence[_Run], near: float) -> list[Edge]:
     """Return runs as edges that meet: each begins where the one before ends."""
     if len(runs) == 1:
-        run = runs[0]
-        return [run.track.part(run.first, run.last, run.track.foot(run.first), run.track.foot(run.last))]
+        return [runs[0].whole]
     meetings = [_meeting(one, other) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     for run, before, after in zip(runs, [meetings[-1], *meetings[:-1]], meetings, strict=True):
@@ -399,7 +322,7 @@ def _simplest(edge: Smooth, near: float) -> Edge:
     z = edge.points @ np.array([1, 1j])
     chord, middle = z[-1] - z[0], z[len(z) // 2]
     if np.abs(((z - z[0]) / chord).imag).max() * abs(chord) <= near:
-        return Line(_pair(z[0]), _pair(z[-1]))
+        return Line(pair(z[0]), pair(z[-1]))
     turns = np.angle(np.diff(z)[1:] / np.diff(z)[:-1])
     if len(z) < 4 or abs(turns.sum()) > 1.9 * math.pi:
         return edge
@@ -410,7 +333,7 @@ def _simplest(edge: Smooth, near: float) -> Edge:
     if np.abs(np.abs(spokes) - abs(spokes[0])).max() > near:
         return edge
     start, turn = float(np.angle(spokes[0])), float(np.angle(spokes[1:] / spokes[:-1]).sum())
-    return Arc(_pair(center), float(np.abs(spokes).mean()), start, start + turn)
+    return Arc(pair(center), float(np.abs(spokes).mean()), start, start + turn)
 
 
 def _straightened(edges: Sequence[Edge], near: float) -> list[Edge]:
@@ -441,9 +364,10 @@ def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
 def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
     """Return closed chains of edges with inside corners as a cutter of a radius [m] leaves them."""
     fine = SAGITTA * min(size, radius)
-    ways, areas = [], []
+    ways: list[Track] = []
+    areas: list[FloatArray] = []
     for ring in rings:
-        tracks = [_Track.of(edge, fine) for edge in ring]
+        tracks = [Track.of(edge, fine) for edge in ring]
         for track, following in zip(tracks, [*tracks[1:], tracks[0]], strict=True):
             beside = track.beside(radius)
             ways.append(beside)
@@ -451,12 +375,16 @@ def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> lis
             out, turn = -1j * track.tangents[-1], float(np.angle(following.tangents[0] / track.tangents[-1]))
             if turn > SMOOTH:  # an outside corner: the cutter turns about it
                 start = float(np.angle(out))
-                around = _Track.of(Arc(_pair(track.z[-1]), radius, start, start + turn), fine)
+                around = Track.of(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
                 ways.append(around)
-                areas.append(np.concatenate([_xy(track.z[-1:]), around.corners]))
+                areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
+            elif turn < -SMOOTH:  # an inside corner: beside edges shorter than the radius only it is near enough
+                areas.append(Track.of(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
     reach = _united(areas, size, _area(rings, size))
     near = NEAR * GRID * size
-    return [found for runs in _traced(reach, ways, size) if (found := _touched(runs, radius, near))]
+    touched = (_touched(runs, radius, near) for runs in _traced(reach, ways, size))
+    closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= near)
+    return [ring for ring in closed if abs(_encloses(ring)) > (SPECK * size) ** 2]
 
 
 def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iterator[FloatArray]:
@@ -468,20 +396,20 @@ def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iter
     cuts = [*np.searchsorted(turned, np.arange(0.0, turned[-1] + 1e-9, CHUNK)).tolist(), len(edge) - 1]
     for first, last in itertools.pairwise(dict.fromkeys(cuts)):
         band = np.concatenate([edge[first : last + 1], beside[first : last + 1][::-1]])
-        if is_valid(Polygon(_xy(band))):
-            yield _xy(band)
+        if is_valid(Polygon(xy(band))):
+            yield xy(band)
             continue
         for k in range(first, last):  # folded: the edge is curved more tightly than it is far from the other line
-            hull = MultiPoint(_xy(np.array([edge[k], edge[k + 1], beside[k], beside[k + 1]]))).convex_hull
+            hull = MultiPoint(xy(np.array([edge[k], edge[k + 1], beside[k], beside[k + 1]]))).convex_hull
             if hull.geom_type == "Polygon":
                 yield np.asarray(hull.exterior.coords)[:-1]
 
 
 def _touched(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
     """Return the edges that a cutter touches whose centre runs so, and the arcs that it leaves between them."""
+    runs = [run for run in runs if run.track.moved or isinstance(run.track.edge, Arc)]
     if len(runs) < 2:
-        run = runs[0]
-        return [run.track.part(run.first, run.last, run.track.foot(run.first), run.track.foot(run.last))]
+        return [run.whole for run in runs if run.track.moved]
     meetings = [_meeting(one, other) for one, other in zip(runs, [*runs[1:], runs[0]], strict=True)]
     edges: list[Edge] = []
     around = zip(runs, [*runs[1:], runs[0]], [meetings[-1], *meetings[:-1]], meetings, strict=True)
@@ -491,7 +419,7 @@ def _touched(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
             edges.append(run.track.part(before.last, after.first, start, end))
         if abs(beyond - end) > near:
             first, turn = float(np.angle(end - after.at)), float(np.angle((beyond - after.at) / (end - after.at)))
-            edges.append(Arc(_pair(after.at), radius, first, first - (-turn % (2 * math.pi))))
+            edges.append(Arc(pair(after.at), radius, first, first - (-turn % (2 * math.pi))))
     return _straightened(edges, near)
 
 
@@ -499,11 +427,3 @@ def _foot(run: _Run, u: float) -> complex:
     """Return where a cutter touches the part whose centre is at a parameter of a run."""
     edge = run.track.edge
     return run.track.foot(u) if run.track.moved or not isinstance(edge, Arc) else complex(*edge.center)
-
-
-def _pair(point: complex) -> tuple[float, float]:
-    return float(point.real), float(point.imag)
-
-
-def _xy(points: NDArray[np.complex128]) -> FloatArray:
-    return np.column_stack([points.real, points.imag])

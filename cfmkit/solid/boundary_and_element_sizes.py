@@ -59,11 +59,14 @@ class Ring:
     points: FloatArray
 
     @classmethod
-    def of(cls, points: FloatArray, hole: bool) -> Ring:
-        """Return the ring through closed points (n, 2) [m], turned so that the material is on its left."""
+    def of(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
+        """Return the ring through closed points (n, 2) [m], turned so that the material is on its left.
+
+        Of a `step` [m] or less, two opposite corners, one vertex is left.
+        """
         ring = np.asarray(points, float)
         ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-        found = cls(read_only(ring))
+        found = cls(read_only(_without_steps(ring, step)))
         return found if (found.area > 0) != hole else cls(read_only(found.points[::-1]))
 
     @property
@@ -117,6 +120,17 @@ class Ring:
         line = np.searchsorted(self.places, np.mod(arc, self.places[-1]), side="left" if behind else "right") - 1
         along = (np.roll(self.points, -1, axis=0) - self.points)[line] / self.lengths[line, None]
         return np.column_stack([-along[:, 1], along[:, 0]])
+
+
+def _without_steps(ring: FloatArray, least: float) -> FloatArray:
+    """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners `least` [m] apart."""
+    chain = Ring(ring)
+    corner, turns = np.abs(chain.turns) > CORNER, chain.turns
+    step = (chain.lengths <= least) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
+    if not step.any():
+        return ring
+    ring = np.where(step[:, None], 0.5 * (ring + np.roll(ring, -1, axis=0)), ring)
+    return np.asarray(ring[~np.roll(step, 1)])
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,8 @@ BULKY, COARSE = 2.0, 4.0
 """Area of a part, in that of strips of its thinnest size along its edges, from which on blocks have elements so many
 times as large: mechanisms of beams have 1.0 to 1.4, that of Lan 1.9 with fillets of 5 mm, 19 with fillets of 20 mm."""
 ON = 1e-3
-"""Nodes nearer to a pad or a hole than this belong to it, in thicknesses of the thinnest place."""
+"""Nodes nearer to a pad or a hole than this belong to it, and smaller steps of an edge are none: in thicknesses of the
+thinnest place."""
 RING = 2e-5
 """How far the lines of a boundary may be from its arcs, in the same: their bending stiffness is then within 1e-4."""
 
@@ -298,7 +299,8 @@ def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[R
         Thinnest place of the part [m]: rings are within `RING` of it from arcs; smooth edges are taken by their
         points.
     """
-    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole) for contour in contours)
+    step = ON * thinnest if math.isfinite(thinnest) else 0.0
+    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
 
 
 ALLOWED = 5e-4

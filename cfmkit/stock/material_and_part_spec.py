@@ -391,6 +391,15 @@ def fillet_of(part: CutPart | None, thinnest: float) -> float:
     return USUAL_FILLET * thinnest if part is None or part.fillet is None else part.fillet
 
 
+class RoundedCorners:
+    """What a mechanism that has `part` and `thinnest` knows of the inside corners of its part."""
+
+    @property
+    def fillet(self: Any) -> float:
+        """Radius of the inside corners of what is cut [m]."""
+        return fillet_of(self.part, self.thinnest)
+
+
 def usual_fillet(thinnest: float) -> str:
     """Return how a specification states the usual radius of inside corners, of a part with a smallest thickness [m].
 

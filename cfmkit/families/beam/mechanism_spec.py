@@ -27,7 +27,7 @@ from cfmkit.families.beam.network_elements_spec import (
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
 from cfmkit.specs.units import format_short
-from cfmkit.stock.material_and_part_spec import SafetyFactor, fillet_of
+from cfmkit.stock.material_and_part_spec import RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -220,7 +220,7 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
             yield ("nodes", name, "support"), "in stages in series, every support but the driven one is 'clamped'"
 
 
-class Mechanism(Model):
+class Mechanism(RoundedCorners, Model):
     """A planar network of slender beams, its loads and its drive."""
 
     material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
@@ -267,11 +267,6 @@ class Mechanism(Model):
         """Smallest thickness of all beams [m]."""
         given = self.of_beams("thickness").values()
         return min(one if isinstance(one, float) else min(value for _, value in one) for one in given)
-
-    @property
-    def fillet(self) -> float:
-        """Radius of the inside corners of the part [m]."""
-        return fillet_of(self.part, self.thinnest)
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

@@ -26,7 +26,7 @@ from cfmkit.families.beam.network_from_spec import (
     thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.outline import drawing, drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -458,6 +458,15 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
+def _sharp(spec: BeamSpec) -> str:
+    """Return what is wrong with fillets that the outline does not have; empty if it has them."""
+    fillet = spec.mechanism.fillet
+    if fillet > 0.0 == drawn_fillet(spec):
+        radius = format_short(fillet, "length")
+        return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
+    return sharp_inside(fillet, ())
+
+
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
     if reported := _ended(solution):
@@ -465,7 +474,7 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
-    if reported := sharp_inside(spec.mechanism.fillet, ()):
+    if reported := _sharp(spec):
         yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():

@@ -76,7 +76,7 @@ class BeamStrip:
         chords = [line[-1] - line[0] for line in self.sides]
         off = [np.abs(chord[0] * (line - line[0])[:, 1] - chord[1] * (line - line[0])[:, 0]).max() / np.hypot(*chord)
                for line, chord in zip(self.sides, chords, strict=True)]  # fmt: skip
-        return max(off) <= STRAIGHT * float(self.thickness.min())
+        return bool(max(off) <= STRAIGHT * float(self.thickness.min()))
 
     @property
     def length(self) -> float:

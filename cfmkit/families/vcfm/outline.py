@@ -49,6 +49,9 @@ GAP = 0.01
 FITS = 1.02
 """Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
 
+FINE = 2e-4
+"""How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
+
 POINTS = 201
 """Of the edge of a cosine arch."""
 
@@ -72,7 +75,8 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
     contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring, sizes))
     notes = (*_notes(spec), *frame_notes(spec, sizes), *notes)
-    return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts)
+    near = min(TOLERANCE, FINE * spec.mechanism.thinnest)
+    return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts, tolerance=near)
 
 
 def sharp_corners(spec: VcfmSpec) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
-from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
+from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import (
     Analysis,
@@ -23,14 +23,7 @@ from cfmkit.specs.spec import (
 )
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
-from cfmkit.stock.material_and_part_spec import (
-    MaterialSpec,
-    PositiveStress,
-    SafetyFactor,
-    fillet_of,
-    material_input,
-    sheet_faults,
-)
+from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life
 
 if TYPE_CHECKING:
@@ -150,7 +143,7 @@ class Frame(Model):
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
 
-class Mechanism(Model):
+class Mechanism(CutLeaves, Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
     material: Annotated[LeafMaterial, material_input(LeafMaterial)] = Field(
@@ -198,17 +191,6 @@ class Mechanism(Model):
         if self.positive is None:
             raise TypeError("the springs of this mechanism are bought")
         return self.positive
-
-    @property
-    def thinnest(self) -> float:
-        """Smallest thickness of all leaves that are cut [m]."""
-        cut = [one for one in (self.bistable, self.positive) if one is not None]
-        return min(one.thickness for one in cut)
-
-    @property
-    def fillet(self) -> float:
-        """Radius of the inside corners of both parts [m]."""
-        return fillet_of(self.part, self.thinnest)
 
     @property
     def kinds(self) -> tuple[str, str]:
