@@ -83,13 +83,24 @@ def large_holes(holes: Sequence[Hole], window: Window, largest: float = LARGEST_
 
 def hole_finding(large: Sequence[Hole], window: Window, kind: Kind, cure: str = "") -> Finding:
     """Return what is said of large holes in a window."""
-    named = ", ".join(hole.text(kind) for hole in large[:4]) + (f" and {len(large) - 4} more" if len(large) > 4 else "")
+    spans: dict[str, list[Hole]] = {}
+    for hole in large:
+        spans.setdefault(span_text(hole.low, hole.high, kind), []).append(hole)
+    named = [span + _whose(holes) for span, holes in spans.items()]
+    listed = ", ".join(named[:4]) + (f" and {len(named) - 4} more" if len(named) > 4 else "")
     share = max(hole.width for hole in large) / (window.hi - window.lo)
     reported = (
-        f"{UNKNOWN}: {named} (up to {100 * share:.0f} % of the window): numbers over the window "
+        f"{UNKNOWN}: {listed} (up to {100 * share:.0f} % of the window): numbers over the window "
         f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
     )
     return Finding("holes", reported)
+
+
+def _whose(holes: Sequence[Hole]) -> str:
+    """Return on which branch and in which cycle holes at one place are; nothing where it is not one."""
+    branches, cycles = {hole.branch for hole in holes}, {hole.cycle for hole in holes}
+    branch = f" on {holes[0].branch!r}" if len(branches) == 1 else ""
+    return branch + (f" of cycle {holes[0].cycle}" if len(cycles) == 1 and holes[0].cycle is not None else "")
 
 
 def emptied(metrics: Mapping[str, Quantity], large: Sequence[Hole], kind: Kind) -> dict[str, Quantity]:
