@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.experiment.coverage import Hole
+    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.metrics.curve_differences import Measure
     from cfmkit.results import Result
@@ -108,7 +108,7 @@ class Comparison(ShortRepr):
         Where they are compared.
     curve : Curve
         Of the model.
-    holes : tuple of Hole
+    holes : tuple of UnrecordedInterval
         Those of the recording in the window that are too large for numbers over it.
     branches : tuple of Samples
         The branches as measured, where the samples are their mean; else empty.
@@ -117,7 +117,7 @@ class Comparison(ShortRepr):
     samples: tuple[Samples, ...]
     window: Window
     curve: Curve
-    holes: tuple[Hole, ...] = ()
+    holes: tuple[UnrecordedInterval, ...] = ()
     branches: tuple[Samples, ...] = ()
 
     @property

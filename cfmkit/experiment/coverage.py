@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Hole:
+class UnrecordedInterval:
     """A part of the travel without samples [m or rad]."""
 
     low: float
@@ -46,18 +46,21 @@ class Hole:
         return span_text(self.low, self.high, kind) + (f" on {self.branch!r}{cycle}" if self.branch else "")
 
 
-def holes_of(curves: Sequence[Curve], window: Window) -> tuple[Hole, ...]:
+def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterval, ...]:
     """Return the holes of all branches of all cycles in a window, in their order."""
     found = []
     for curve in curves:
         cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
         for branch in curve.branches:
             places = np.sort(curve.on(branch).motion)
-            found += [Hole(low, high, branch, cycle) for low, high in holes_between(places, window.lo, window.hi)]
+            found += [
+                UnrecordedInterval(low, high, branch, cycle)
+                for low, high in holes_between(places, window.lo, window.hi)
+            ]
     return tuple(found)
 
 
-def share_covered(holes: Sequence[Hole], window: Window) -> float:
+def share_covered(holes: Sequence[UnrecordedInterval], window: Window) -> float:
     """Return which part of a window one branch of one cycle covers."""
     return 1.0 - sum(hole.width for hole in holes) / (window.hi - window.lo)
 
@@ -67,7 +70,7 @@ def number_of(curve: Curve) -> int | None:
     return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
 
 
-def of_cycle(holes: Sequence[Hole], curve: Curve) -> list[Hole]:
+def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
     """Return the holes of the cycle that is a curve."""
     return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
 
@@ -76,23 +79,36 @@ UNKNOWN = "not recorded"
 """Begins the reason why a metric over a hole has no value."""
 
 
-def large_holes(holes: Sequence[Hole], window: Window, largest: float = LARGEST_HOLE) -> tuple[Hole, ...]:
+def large_holes(
+    holes: Sequence[UnrecordedInterval], window: Window, largest: float = LARGEST_HOLE
+) -> tuple[UnrecordedInterval, ...]:
     """Return the holes that are larger than a part of a window."""
     return tuple(hole for hole in holes if hole.width > largest * (window.hi - window.lo))
 
 
-def hole_finding(large: Sequence[Hole], window: Window, kind: Kind, cure: str = "") -> Finding:
+def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind, cure: str = "") -> Finding:
     """Return what is said of large holes in a window."""
-    named = ", ".join(hole.text(kind) for hole in large[:4]) + (f" and {len(large) - 4} more" if len(large) > 4 else "")
+    spans: dict[str, list[UnrecordedInterval]] = {}
+    for hole in large:
+        spans.setdefault(span_text(hole.low, hole.high, kind), []).append(hole)
+    named = [span + _whose(holes) for span, holes in spans.items()]
+    listed = ", ".join(named[:4]) + (f" and {len(named) - 4} more" if len(named) > 4 else "")
     share = max(hole.width for hole in large) / (window.hi - window.lo)
     reported = (
-        f"{UNKNOWN}: {named} (up to {100 * share:.0f} % of the window): numbers over the window "
+        f"{UNKNOWN}: {listed} (up to {100 * share:.0f} % of the window): numbers over the window "
         f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
     )
     return Finding("holes", reported)
 
 
-def emptied(metrics: Mapping[str, Quantity], large: Sequence[Hole], kind: Kind) -> dict[str, Quantity]:
+def _whose(holes: Sequence[UnrecordedInterval]) -> str:
+    """Return on which branch and in which cycle holes at one place are; nothing where it is not one."""
+    branches, cycles = {hole.branch for hole in holes}, {hole.cycle for hole in holes}
+    branch = f" on {holes[0].branch!r}" if len(branches) == 1 else ""
+    return branch + (f" of cycle {holes[0].cycle}" if len(cycles) == 1 and holes[0].cycle is not None else "")
+
+
+def emptied(metrics: Mapping[str, Quantity], large: Sequence[UnrecordedInterval], kind: Kind) -> dict[str, Quantity]:
     """Return metrics, without a value for branches with a large hole and for what needs all branches."""
     branches = {hole.branch: hole for hole in reversed(large)}
     found = dict(metrics)
@@ -107,7 +123,7 @@ def emptied(metrics: Mapping[str, Quantity], large: Sequence[Hole], kind: Kind) 
 _COVERAGE = "part of the window that was recorded, from steps of more than {} usual ones; of several cycles the least"
 
 
-def coverage(curve: Curve, holes: Sequence[Hole], window: Window) -> dict[str, Quantity]:
+def coverage(curve: Curve, holes: Sequence[UnrecordedInterval], window: Window) -> dict[str, Quantity]:
     """Return which part of the window each branch of a curve covers, and the least of them."""
     definition = _COVERAGE.format(f"{STEPS:g}")
     shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}

@@ -23,7 +23,7 @@ from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.branches import LOAD, UNLOAD, Cycles, Stroke, Strokes, choose, read_cycles, split
 from cfmkit.experiment.coverage import (
-    Hole,
+    UnrecordedInterval,
     coverage,
     emptied,
     hole_finding,
@@ -318,7 +318,7 @@ class Measurement:
         Where they hold.
     warnings : tuple of Finding
         What the user must know of the window.
-    holes : tuple of Hole
+    holes : tuple of UnrecordedInterval
         Those so large that what they are in has no value.
     """
 
@@ -327,7 +327,7 @@ class Measurement:
     each: tuple[Mapping[str, Quantity], ...]
     window: Window
     warnings: tuple[Finding, ...] = ()
-    holes: tuple[Hole, ...] = ()
+    holes: tuple[UnrecordedInterval, ...] = ()
 
     @property
     def shortfall(self) -> str:
@@ -431,7 +431,7 @@ def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
     if not cut:
         return ()
     (branch, number), (low, high) = cut[0], extents[cut[0]]
-    where = Hole(low, high, branch, number).text(kind)
+    where = UnrecordedInterval(low, high, branch, number).text(kind)
     reported = f"the window ends where the shortest branch does, {where}; others cover {span_text(*widest, kind)}"
     return (Finding("window_cut", f"{reported}: choose with --window or --cycles"),)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.coverage import Hole
+    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
@@ -79,9 +79,9 @@ def _from_border(value: float, dimension: str) -> float:
     return float(from_border(value, dimension))
 
 
-def _named_holes(holes: Sequence[Hole]) -> dict[tuple[float, float], str]:
+def _named_holes(holes: Sequence[UnrecordedInterval]) -> dict[tuple[float, float], str]:
     """Return the text at each hole: on which branch and in which cycle, where it is not on all of them."""
-    found: dict[tuple[float, float], list[Hole]] = {}
+    found: dict[tuple[float, float], list[UnrecordedInterval]] = {}
     for hole in holes:
         found.setdefault((hole.low, hole.high), []).append(hole)
     alone = {ends: f"{here[0].branch}{f' of cycle {here[0].cycle}' if here[0].cycle else ''}"

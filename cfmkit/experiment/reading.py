@@ -191,7 +191,7 @@ def read_recordings(
     cfmkit.errors.UsageError
         If the file cannot be read, or `units` is malformed.
     cfmkit.errors.DataError
-        If it holds no curve, or those of several specimens and nobody says of which.
+        If it holds no curve, or those of several specimens and `group` does not say of which.
     """
     name = Path(path).name
     stated = read_units(units)

@@ -85,12 +85,14 @@ def measure(
     from cfmkit.experiment.reading import Recording, read_recording
 
     recording = data if isinstance(data, Recording) else read_recording(_file(data), units, group)
-    options = MeasureOptions(window, filter, target, tare, zero, _each(flip), as_recorded, one_branch, cycles, max_hole)
+    options = MeasurementSettings(
+        window, filter, target, tare, zero, _each(flip), as_recorded, one_branch, cycles, max_hole
+    )
     return options.report_on(recording)
 
 
 def measure_each(
-    data: str | os.PathLike[str], units: str | None, group: str | None, how: MeasureOptions
+    data: str | os.PathLike[str], units: str | None, group: str | None, how: MeasurementSettings
 ) -> dict[str, MeasureReport]:
     """Return what the measured curve of each specimen of a file says, by specimen."""
     from cfmkit.experiment.reading import read_recordings
@@ -99,7 +101,7 @@ def measure_each(
 
 
 @dataclass(frozen=True)
-class MeasureOptions:
+class MeasurementSettings:
     """How recordings are measured; the fields are as for `measure`."""
 
     window: str | tuple[float, float] | None = None

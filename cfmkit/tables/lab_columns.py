@@ -62,7 +62,7 @@ class ColumnInfo:
 
     index: int  # its place in the file, from 0
     name: str  # as in the header, without the unit; "column 1" where there is none
-    unit: str | None = None  # as cfmkit spells it; as in the file if it is none; None if nobody says
+    unit: str | None = None  # as cfmkit spells it; as in the file if it is none; None if it is not stated
     dimension: str | None = None  # of the unit; None if that is of no use here
     reported: bool = False  # whether --units names the column
     source: str = ""  # what says the unit, for messages

@@ -144,7 +144,7 @@ def test_units_that_contradict_each_other_are_refused(tmp_path, text, units, com
 
 
 @pytest.mark.parametrize(("shown", "force"), [("kg", "kgf"), ("g", "gf"), ("LB", "lbf"), ("lbs", "lbf"), ("OZ", "ozf")])
-def test_a_mass_is_no_force_until_somebody_says_so(tmp_path, shown, force):
+def test_a_mass_is_no_force_unless_units_say_so(tmp_path, shown, force):
     size = {"kgf": KGF, "gf": KGF / 1e3, "lbf": LBF, "ozf": LBF / 16}[force]
     (tmp_path / "data.csv").write_text(f"s [mm];F [{shown}]\n" + lines("{s};{f}", size))
     with pytest.raises(DataError, match=re.escape(f"is a mass; if the gauge shows the force of that mass, say so: "

@@ -69,12 +69,11 @@ class MeasureOptions(Measuring, FigureChoice):
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
     from cfmkit.experiment.measurement_and_calibration_outputs import data_of, files
-    from cfmkit.runs.measure_and_calibrate_api import MeasureOptions as How
-    from cfmkit.runs.measure_and_calibrate_api import measure_each
+    from cfmkit.runs.measure_and_calibrate_api import MeasurementSettings, measure_each
     from cfmkit.store import RunFolder
 
     out, form = _folder(options), options.form
-    how = How(
+    how = MeasurementSettings(
         options.window,
         options.filter or "default",
         options.target,
