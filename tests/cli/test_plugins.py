@@ -212,4 +212,5 @@ def test_the_doctor_knows_of_a_folder_without_file_locks(monkeypatch, capsys, tm
     monkeypatch.setattr("cfmkit.store.lock._try", lambda _: None)
     monkeypatch.chdir(tmp_path)
     assert main(["doctor"]) == 0
-    assert f"no file locks in {tmp_path}: .cfmkit.softlock marks a live run" in " ".join(capsys.readouterr().out.split())
+    page = " ".join(capsys.readouterr().out.split())
+    assert f"no file locks in {tmp_path}: .cfmkit.softlock marks a live run" in page
