@@ -214,8 +214,7 @@ def evaluate(
     names : iterable of str, optional
         Only these; ``[branch]`` picks a branch. Default: all.
     window : Window or str or tuple of float, optional
-        Where to measure: a text such as ``"40 mm:210 mm"``, or two numbers [m or rad]; default: ``analysis.window``,
-        else the full travel.
+        Where to measure: ``"40 mm:210 mm"``, or numbers [m or rad]; default: ``analysis.window``, else the full travel.
 
     Raises
     ------
