@@ -330,10 +330,10 @@ def suggest(
     *,
     seed: int = 0,
     jobs: int = 1,
-    time_budget: str | float | None = 60.0,
+    time_budget: str | float | None = 180.0,
     **keys: Any,
 ) -> Suggestions:
-    """Return mechanisms of every family that do what is wished, the best first.
+    """Return mechanisms of every family that do what is wished, the best first, and those not judged in full.
 
     Parameters
     ----------

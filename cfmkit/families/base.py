@@ -316,8 +316,8 @@ class Family:
         ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
         specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
     errors : str, optional
-        ``"module:function"`` with ``errors(spec) -> {path: "thickness" or "position"}``: which values of a part the
-        process that makes it errs in, and in what.
+        ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position" or "rate"}``: which values of a part
+        err, and in what: by the process that makes it, or as the rate of a spring.
     attribution : str, optional
         ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.

@@ -86,8 +86,7 @@ STATUSES = {
 
 
 def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 if a proposal was judged to do all that is wished, 70 if a bug ended all, 6 if not all was judged, else
-    4."""
+    """Return 0 if a proposal does all that is wished, 70 if a bug ended all, 6 if not all was judged, else 4."""
     if found.proposals:
         return ExitCode.OK
     reasons = [one.offer.reason for one in found.answers if one.offer.reason]

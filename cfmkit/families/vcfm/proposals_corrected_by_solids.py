@@ -13,7 +13,7 @@ from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
 from cfmkit.families.vcfm.exact_model import analyze
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
-from cfmkit.families.vcfm.proposals_for_wish import fit_in_window, lengthened, opened, preloads_for, widened
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
 from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:

@@ -23,9 +23,11 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import is_too_wide
 from cfmkit.families.vcfm.design import closed_form
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
@@ -36,10 +38,7 @@ from cfmkit.stock.springs.spec import CatalogueSpring
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.arrays import FloatArray
-    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.design import DesignSizes
-    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.wishes import MaterialBlock, Wish
 
 
@@ -87,10 +86,8 @@ APART = 1.2
 OFFERED = 28
 
 FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
-"""What finishes what the family's design has made."""
-
 CORRECT = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
-"""What corrects a mechanism by its solids."""
+"""What finishes what the family's design has made, and what corrects it by its solids."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -116,9 +113,8 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
             if (coiled := _coiled(wish, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
-        plain = sorted(found, key=lambda one: one.promise)
-        narrow = [one for one in plain if one.promise < 0.5 * WIDE_LAST]
-        plain = narrow or plain
+        ranked = sorted(found, key=lambda one: one.promise)
+        plain = [one for one in ranked if one.promise < 0.5 * WIDE_LAST] or ranked
         return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
     if closest is None:
         return FamilyOffer(
@@ -132,8 +128,7 @@ def _is_too_wide(wish: Wish, block: MaterialBlock, sizes: DesignSizes) -> bool:
     """Return True if the Vs or the spring probably cannot curl, and stiffen by more than the band of the wish."""
     material = MaterialSpec.model_validate(dict(block))
     strain = wish.strength_used * (material.allowable(1.0) or 0.0) / material.modulus
-    strips = sizes.leaf, sizes.side
-    return any(is_too_wide(wish, float(one.width), float(one.thickness), strain) for one in strips)
+    return any(is_too_wide(wish, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.side))
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
@@ -316,49 +311,19 @@ def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     return _over_flattest(spec, wish, preloads_for(spec, wish), float(window[1]) if window else wish.travel)
 
 
-def preloads_for(
-    spec: VcfmSpec, wish: Wish, per_force: float | None = None, known: tuple[float, ...] = (0.0,)
-) -> tuple[float, ...]:
-    """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
-
-    `per_force` is the preload for a change of the force [m/N]; None: that of the design, or of its bought springs.
-    `known` are those of a mechanism that has them already: without an adjustment they stay.
-    """
-    design, bought = spec.design, spec.mechanism.springs
-    if wish.adjustable is None or (len(known) == 1 and (design is None or not design.adjustment)):
-        return known
-    if per_force is None:
-        stroke = design.preload_stroke / design.adjustment if design and design.adjustment else 0.0
-        per_force = stroke if bought is None else 1.0 / coils(bought).stiffness
-    low, high = wish.adjustable
-    return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
-
-
 def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.flattest_window import flattest
-    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.exact_model import analyze
 
     wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
-    made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
-    made = opened(made, wide, preloads)
-    result = analyze(made, Run())
-    found = flattest(result, wish.travel)
+    free = {"analysis.window": None, "analysis.travel": wide, "requirements": ()}
+    made = opened(spec.replace(keys | free), wide, preloads)
+    found = flattest(analyze(made, Run()), wish.travel)
     if found is None:
         return made
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
-
-
-def opened(spec: VcfmSpec, travel: float, preloads: tuple[float, ...]) -> VcfmSpec:
-    """Return a mechanism whose corners are so high that its spring stays open: a rigid part, which no force needs."""
-    from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
-
-    closing = travel + max(preloads) - spring_room(spec)
-    if closing <= 0.0:
-        return spec
-    return spec.replace({"mechanism.frame.corner": spec.mechanism.frame.corner + 1.1 * closing})
 
 
 STRUCTURES: dict[str, dict[str, Any]] = {
@@ -469,42 +434,3 @@ def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
     law, preload = parts(spec).spring, (forces[1] - forces[0]) / stiffness
     more = float(law.stress(last + preload) / law.stress(last))
     return _Fit(wide, stiff, (leaf, more * float(stresses[1])), last, stiffness)
-
-
-def fit_in_window(
-    sampler: ExactSampler, at: float, force: float, travel: float
-) -> tuple[float, float, float, float] | None:
-    """Return what is left of the force around a place, the place and both factors; None where one is not above zero."""
-    places: FloatArray = np.linspace(at - 0.5 * travel, at + 0.5 * travel, 61)
-    columns = np.column_stack([sampler.leaves(places).force, sampler.spring(places)[0]])
-    if not np.isfinite(columns).all():
-        return None
-    if sampler.coils is None:
-        (wide, stiff), *_ = np.linalg.lstsq(columns, np.full(len(places), force), rcond=None)
-    else:  # bought springs are as they are
-        stiff = 1.0
-        (wide,), *_ = np.linalg.lstsq(columns[:, :1], force - columns[:, 1], rcond=None)
-    if not (wide > 0.0 and stiff > 0.0):
-        return None
-    left = np.abs(columns @ np.array([wide, stiff]) / force - 1.0).max()
-    return float(left), at, float(wide), float(stiff)
-
-
-def widened(spec: VcfmSpec, leaves: float, spring: float) -> VcfmSpec:
-    """Return a mechanism whose leaves, and whose spring unless it is bought, are wider by factors."""
-    changes = {"mechanism.bistable.width": spec.mechanism.bistable.width * leaves}
-    if spec.mechanism.springs is None:
-        changes["mechanism.positive.width"] = spec.mechanism.flexures.width * spring
-    return spec.replace(changes)
-
-
-def lengthened(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
-    """Return a mechanism whose leaves of the same rise, and whose spring, are longer by factors."""
-    leaf = spec.mechanism.bistable
-    rise, length = leaf.length * sin(leaf.angle), leaf.length * factors[0]
-    changes = {"mechanism.bistable.length": length, "mechanism.bistable.angle": asin(rise / length)}
-    if spec.mechanism.springs is None:
-        changes["mechanism.positive.length"] = spec.mechanism.flexures.length * factors[1]
-    if leaf.flexure_length is not None:
-        changes["mechanism.bistable.flexure_length"] = leaf.flexure_length * factors[0]
-    return spec.replace(changes)

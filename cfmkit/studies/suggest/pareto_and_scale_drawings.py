@@ -35,8 +35,8 @@ LETTER = 1.4
 
 
 def named(number: int, proposal: Proposal) -> str:
-    """Return what a proposal is called in tables and pictures."""
-    return f"{number} {proposal.family}, {proposal.variant}"
+    """Return what a proposal is called in pictures, and whether something of it was not judged."""
+    return f"{number} {proposal.family}, {proposal.variant}" + (" (not judged in full)" if proposal.open else "")
 
 
 @styled
