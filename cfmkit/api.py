@@ -229,13 +229,10 @@ def evaluate(
     0.0124
     """
     from cfmkit.metrics import evaluate as measured
+    from cfmkit.runs.values_with_units import read_window
 
     found = _result_of(result)
-    if isinstance(window, str | tuple):
-        from cfmkit.runs.measure_and_calibrate_api import read_window
-
-        window = read_window(window, found.curve.kind)
-    return measured(found, names, window)
+    return measured(found, names, read_window(window, found.curve.kind))
 
 
 def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
@@ -474,7 +471,8 @@ def drawing(spec: AnySpec, tolerance: str | float | None = None) -> Drawing:
     >>> drawing.name, len(drawing.contours) > 1
     ('cam', True)
     """
-    from cfmkit.runs.exported_files import drawing_of, read_length
+    from cfmkit.runs.exported_files import drawing_of
+    from cfmkit.runs.values_with_units import read_length
 
     spec = spec_of(spec)
     return drawing_of(spec, family(spec.family), read_length(tolerance, "tolerance"))

@@ -57,6 +57,7 @@ def exported(
         If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
     """
     from cfmkit.export import USUAL, files
+    from cfmkit.runs.values_with_units import read_length
 
     wanted = _formats(formats, USUAL)
     if kerf is not None and "dxf" not in wanted:
@@ -158,19 +159,3 @@ def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[s
         if name not in known:
             raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
     return names
-
-
-def read_length(length: str | float | None, option: str) -> float | None:
-    """Return a length above zero [m] of a number or a text with its unit; None for None."""
-    from cfmkit.errors import QuantityError
-    from cfmkit.specs.units import read_quantity
-
-    if length is None:
-        return None
-    try:
-        value = read_quantity(length, "length") if isinstance(length, str) else float(length)
-    except QuantityError as error:
-        raise UsageError(f"{option}: {error}") from None
-    if not value > 0:
-        raise UsageError(f"{option}: {length} is not allowed: must be > 0")
-    return value

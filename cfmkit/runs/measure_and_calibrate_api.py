@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.api import resolve
-from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics import Window
+from cfmkit.errors import UsageError
+from cfmkit.runs.values_with_units import read_target, read_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from cfmkit.api import AnySpec
-    from cfmkit.curves import Kind
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.low_pass import LowPass
@@ -224,48 +223,3 @@ def calibrate(
     paths = fit.split(",") if isinstance(fit, str) else fit
     chosen = parameters(start, paths, limits, source.recording)
     return fitted(start, source, chosen, loss, Window(*window) if window else None)
-
-
-def read_window(text: str | tuple[float, float] | None, kind: Kind) -> Window | None:
-    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; None for None.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
-    """
-    from cfmkit.specs.units import read_quantity
-
-    if text is None:
-        return None
-    if not isinstance(text, str):
-        low, high = text
-        return Window(low, high)
-    ends = text.split(":")
-    if len(ends) != 2:
-        raise UsageError(f"--window: {text!r} is not 'from:to'; write e.g. --window '40 mm:210 mm'")
-    try:
-        low, high = (read_quantity(end, "length" if kind == "force" else "angle") for end in ends)
-    except QuantityError as error:
-        raise UsageError(f"--window: {error}") from None
-    if not low < high:
-        raise UsageError(f"--window: {text!r} must be increasing")
-    return Window(low, high)
-
-
-def read_target(text: str | float | None, kind: Kind) -> float | None:
-    """Return the force [N] or torque [N m] that a text says, or a number as it is; None for None.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
-    """
-    from cfmkit.specs.units import read_quantity
-
-    if text is None or not isinstance(text, str):
-        return text
-    try:
-        return read_quantity(text, kind)
-    except QuantityError as error:
-        raise UsageError(f"--target: {error}") from None
