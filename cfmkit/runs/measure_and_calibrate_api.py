@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cfmkit.api import resolve
 from cfmkit.errors import UsageError
+from cfmkit.metrics import Window
 from cfmkit.runs.values_with_units import read_target, read_window
 
 if TYPE_CHECKING:

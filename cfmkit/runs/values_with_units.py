@@ -26,7 +26,7 @@ def read_length(length: str | float | None, option: str) -> float | None:
 
 
 def read_window(text: Window | str | tuple[float, float] | None, kind: Kind) -> Window | None:
-    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; None for None, a window as it is.
+    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; a window as it is.
 
     Raises
     ------
