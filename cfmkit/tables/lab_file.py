@@ -93,7 +93,7 @@ class Dialect:
 
 
 @dataclass(frozen=True)
-class Shape:
+class RowPattern:
     """What the lines of a table have in common."""
 
     dialect: Dialect
@@ -127,7 +127,7 @@ class LabTable:
     """A table of a lab file."""
 
     file: str  # for messages
-    shape: Shape
+    shape: RowPattern
     lines: list[str]  # all of the file
     rows: tuple[int, ...]  # indices of the lines of the table
     columns: tuple[ColumnInfo, ...]
@@ -290,7 +290,7 @@ def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = Non
     return [_table(lines, shape, run, start, units or {}, name) for run, start in zip(chosen, starts, strict=False)]
 
 
-def _shape(lines: list[str], filled: list[int], name: str) -> Shape:
+def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
     """Return how the numbers of a file are written."""
     # Most lines before the last few are data, whatever stands above and below them.
     middle = filled[len(filled) // 3 : max(len(filled) - 2, 1)] or filled
@@ -312,7 +312,7 @@ def _shape(lines: list[str], filled: list[int], name: str) -> Shape:
     rows = [cells for cells in rows if len(cells) == width]
     numeric = tuple(k for k in range(width) if 2 * sum(dialect.is_number(row[k]) for row in rows) > len(rows))
     blank = tuple(k for k in range(numeric[0] if numeric else 0) if not any(row[k] for row in rows))
-    return Shape(dialect, width, numeric, blank)
+    return RowPattern(dialect, width, numeric, blank)
 
 
 def _is_data(cells: Sequence[str], dialect: Dialect) -> bool:
@@ -329,7 +329,7 @@ def _score(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
     return count, sum(map(dialect.is_number, filled)) / len(filled), width
 
 
-def _runs(lines: list[str], filled: list[int], shape: Shape) -> list[list[int]]:
+def _runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[int]]:
     """Return the unbroken runs of lines with numbers; an empty line ends one unless numbers in all places follow."""
     runs: list[list[int]] = []
     before = -2
@@ -343,7 +343,9 @@ def _runs(lines: list[str], filled: list[int], shape: Shape) -> list[list[int]]:
     return runs
 
 
-def _table(lines: list[str], shape: Shape, run: list[int], start: int, units: Mapping[str, str], name: str) -> LabTable:
+def _table(
+    lines: list[str], shape: RowPattern, run: list[int], start: int, units: Mapping[str, str], name: str
+) -> LabTable:
     """Return one table with what the lines above it and its cells say of its columns."""
     names, unit_row, header = _header(lines, shape, range(start, run[0]), run[0] + 1, name)
     rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _SAMPLE, 1)]]
@@ -361,7 +363,7 @@ _COUNTER = re.compile(r"(?i)(no|nr|n|#|idx|index|reading|row|point|count|sample|
 """Names of columns that count the rows: a unit to their right is not theirs."""
 
 
-def _unit_columns(rows: list[list[str]], shape: Shape, names: Sequence[str]) -> dict[int, int]:
+def _unit_columns(rows: list[list[str]], shape: RowPattern, names: Sequence[str]) -> dict[int, int]:
     """Return the columns of numbers beside which the unit of each cell stands, and where: to their right, else left."""
     found: dict[int, int] = {}
     for k in sorted(set(range(shape.width)).difference(shape.numeric)):
@@ -374,7 +376,7 @@ def _unit_columns(rows: list[list[str]], shape: Shape, names: Sequence[str]) -> 
 
 
 def _header(
-    lines: list[str], shape: Shape, above: range, first_line: int, name: str
+    lines: list[str], shape: RowPattern, above: range, first_line: int, name: str
 ) -> tuple[list[str], list[str], int | None]:
     """Return the names, the units and the index of the line with the names."""
     filled = [index for index in above if lines[index].strip(EMPTY)]
@@ -408,7 +410,7 @@ def _halved(header: Sequence[str], width: int) -> bool:
     return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
 
 
-def _header_cells(line: str, shape: Shape) -> list[str]:
+def _header_cells(line: str, shape: RowPattern) -> list[str]:
     """Return the cells of a header, as many as the table is wide where that can be done.
 
     Quotes are understood even where the numbers have none, and a leading ``#`` or ``%`` is dropped.
