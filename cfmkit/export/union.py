@@ -20,7 +20,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.contours import Arc, Contour, Edge, Line, Smooth
-from cfmkit.export.tracks import Track, pair, xy
+from cfmkit.export.traced_edges import TracedEdge, pair, xy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -47,7 +47,7 @@ CHUNK = 0.5 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class OutlinePiece:
     """What is united: an area, and the edges that may bound it.
 
     Attributes
@@ -63,7 +63,7 @@ class Piece:
     areas: tuple[FloatArray, ...] = ()
 
     @classmethod
-    def polygon(cls, corners: FloatArray) -> Piece:
+    def polygon(cls, corners: FloatArray) -> OutlinePiece:
         """Return a polygon (n, 2) [m], in whichever sense it runs."""
         x, y = (np.asarray(corners) - corners[0]).T
         ring = corners if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else corners[::-1]
@@ -71,7 +71,7 @@ class Piece:
         return cls(tuple(Line(a, b) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True) if a != b))
 
     @classmethod
-    def around(cls, points: FloatArray) -> list[Piece]:
+    def around(cls, points: FloatArray) -> list[OutlinePiece]:
         """Return the convex hull of points (n, 2) [m]; none if they are on one line."""
         from shapely import MultiPoint
 
@@ -79,12 +79,12 @@ class Piece:
         return [cls.polygon(np.asarray(hull.exterior.coords)[:-1])] if hull.geom_type == "Polygon" else []
 
     @classmethod
-    def disc(cls, center: tuple[float, float], radius: float) -> Piece:
+    def disc(cls, center: tuple[float, float], radius: float) -> OutlinePiece:
         """Return a circle [m]."""
         return cls((Arc(center, radius, 0.0, 2.0 * math.pi),))
 
     @classmethod
-    def within(cls, contour: Contour) -> Piece:
+    def within(cls, contour: Contour) -> OutlinePiece:
         """Return what is within a closed contour."""
         if _encloses(contour.edges) > 0:
             return cls(contour.edges)
@@ -100,19 +100,23 @@ class Piece:
 
 
 def merged(
-    pieces: Sequence[Piece], size: float, fillet: float = 0.0, holes: Sequence[Piece] = (), layer: str = "cut"
+    pieces: Sequence[OutlinePiece],
+    size: float,
+    fillet: float = 0.0,
+    holes: Sequence[OutlinePiece] = (),
+    layer: str = "cut",
 ) -> tuple[Contour, ...]:
     """Return the contours of the union of some pieces, with rounded inside corners, less some holes.
 
     Parameters
     ----------
-    pieces : sequence of Piece
+    pieces : sequence of OutlinePiece
         They may overlap.
     size : float
         Of the thinnest of them: what is much smaller is rounding [m].
     fillet : float
         Radius of inside corners [m]: that of the cutter. Gaps narrower than twice of it are filled.
-    holes : sequence of Piece
+    holes : sequence of OutlinePiece
         Cut out in the end.
     layer : str
         Of the contours.
@@ -123,14 +127,14 @@ def merged(
         If nothing is left.
     """
     near = NEAR * GRID * size
-    tracks = [Track.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
+    tracks = [TracedEdge.of(edge, SAGITTA * size) for piece in pieces for edge in piece.edges]
     whole = _united([area for piece in pieces for area in piece.covered(size)], size)
     rings = [_recognised(_ring(runs, near), near) for runs in _traced(whole, tracks, size)]
     if fillet > 0:
         rings = _rounded(rings, fillet, size)
     if holes:
-        tracks = [Track.of(edge, SAGITTA * size) for ring in rings for edge in ring]
-        tracks += [Track.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
+        tracks = [TracedEdge.of(edge, SAGITTA * size) for ring in rings for edge in ring]
+        tracks += [TracedEdge.of(edge, SAGITTA * size) for hole in holes for edge in hole.removed()]
         left = _area(rings, size).difference(_united([area for hole in holes for area in hole.covered(size)], size))
         rings = [_ring(runs, near) for runs in _traced(left, tracks, size)]
     if not rings:
@@ -157,14 +161,14 @@ def _area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
 
 
 def _corners(ring: Sequence[Edge], size: float) -> FloatArray:
-    return np.concatenate([Track.of(edge, SAGITTA * size).corners[:-1] for edge in ring])
+    return np.concatenate([TracedEdge.of(edge, SAGITTA * size).corners[:-1] for edge in ring])
 
 
 def _encloses(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
     found = 0.0
     for edge in ring:
-        z = Track.of(edge, math.inf).z
+        z = TracedEdge.of(edge, math.inf).z
         found += 0.5 * float((np.conj(z[:-1]) * z[1:]).imag.sum())
     return found
 
@@ -173,7 +177,7 @@ def _encloses(ring: Sequence[Edge]) -> float:
 class _Run:
     """A piece of a track that bounds the part, from one parameter to another."""
 
-    track: Track
+    track: TracedEdge
     first: float
     last: float
 
@@ -183,7 +187,7 @@ class _Run:
         return self.track.part(self.first, self.last, self.track.foot(self.first), self.track.foot(self.last))
 
 
-def _traced(whole: Any, tracks: Sequence[Track], size: float) -> Iterator[list[_Run]]:
+def _traced(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Iterator[list[_Run]]:
     """Yield, ring by ring of a geometry of shapely, the runs of tracks that bound it, the material on their left."""
     from shapely import STRtree, linestrings, orient_polygons
 
@@ -215,7 +219,7 @@ def _apart(corners: NDArray[np.complex128], near: float) -> NDArray[np.complex12
 class _Sources:
     """All lines of some tracks: where each begins, its vector, its track and its number on it; a tree of them."""
 
-    tracks: Sequence[Track]
+    tracks: Sequence[TracedEdge]
     starts: NDArray[np.complex128]
     along: NDArray[np.complex128]
     owner: NDArray[np.int64]
@@ -248,7 +252,7 @@ class _Sources:
         runs: list[list[Any]] = []
         for k, candidates in enumerate(found):
             if candidates is None:  # a line that no edge explains stands for itself
-                runs.append([Track(Line(pair(a[k]), pair(b[k])), np.array([a[k], b[k]])), 0.0, 1.0])
+                runs.append([TracedEdge(Line(pair(a[k]), pair(b[k])), np.array([a[k], b[k]])), 0.0, 1.0])
                 continue
             same = [one for one in candidates if runs and self._follows(runs[-1], one)]
             owner, first, last = min(same or candidates, key=lambda one: (one[0], one[1]))
@@ -364,10 +368,10 @@ def _as_one(one: Edge, other: Edge, near: float) -> Edge | None:
 def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> list[list[Edge]]:
     """Return closed chains of edges with inside corners as a cutter of a radius [m] leaves them."""
     fine = SAGITTA * min(size, radius)
-    ways: list[Track] = []
+    ways: list[TracedEdge] = []
     areas: list[FloatArray] = []
     for ring in rings:
-        tracks = [Track.of(edge, fine) for edge in ring]
+        tracks = [TracedEdge.of(edge, fine) for edge in ring]
         for track, following in zip(tracks, [*tracks[1:], tracks[0]], strict=True):
             beside = track.beside(radius)
             ways.append(beside)
@@ -375,11 +379,11 @@ def _rounded(rings: Sequence[Sequence[Edge]], radius: float, size: float) -> lis
             out, turn = -1j * track.tangents[-1], float(np.angle(following.tangents[0] / track.tangents[-1]))
             if turn > SMOOTH:  # an outside corner: the cutter turns about it
                 start = float(np.angle(out))
-                around = Track.of(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
+                around = TracedEdge.of(Arc(pair(track.z[-1]), radius, start, start + turn), fine)
                 ways.append(around)
                 areas.append(np.concatenate([xy(track.z[-1:]), around.corners]))
             elif turn < -SMOOTH:  # an inside corner: beside edges shorter than the radius only it is near enough
-                areas.append(Track.of(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
+                areas.append(TracedEdge.of(Arc(pair(track.z[-1]), radius, 0.0, 2.0 * math.pi), fine).corners)
     reach = _united(areas, size, _area(rings, size))
     near = NEAR * GRID * size
     touched = (_touched(runs, radius, near) for runs in _traced(reach, ways, size))

@@ -16,14 +16,14 @@ from cfmkit.cli.main import main
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.contours import Drawing
-from cfmkit.export.union import Piece, merged
+from cfmkit.export.union import OutlinePiece, merged
 from cfmkit.families.beam import strips_and_gaps as strip_module
 from cfmkit.families.beam.network_from_spec import assemble, on_axis
 from cfmkit.families.beam.strips_and_gaps import mirrored, smallest_gap
 from cfmkit.numerics.arc_chain import points_on
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
-TWO = [Piece.polygon(SQUARE), Piece.polygon(SQUARE + 5 * MM)]
+TWO = [OutlinePiece.polygon(SQUARE), OutlinePiece.polygon(SQUARE + 5 * MM)]
 
 
 def area(contours):
@@ -44,7 +44,7 @@ def test_fillets_fill_inside_corners_and_leave_outside_ones():
 
 
 def test_holes_stay_holes():
-    contours = merged(TWO[:1], 10 * MM, holes=[Piece.polygon(0.2 * SQUARE + 4 * MM)])
+    contours = merged(TWO[:1], 10 * MM, holes=[OutlinePiece.polygon(0.2 * SQUARE + 4 * MM)])
     assert [contour.hole for contour in contours] == [False, True]
     assert area(contours) == pytest.approx(96e-6, rel=1e-3)
 

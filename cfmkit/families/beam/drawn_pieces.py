@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
-from cfmkit.export.union import Piece
+from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored
 
@@ -93,14 +93,14 @@ class DrawnParts:
 
     Attributes
     ----------
-    pieces, holes : list of Piece
+    pieces, holes : list of OutlinePiece
         All that is united, and what is then cut out of eyes.
     blocks : list of DrawnBlock
         Pads, eyes and bars among the pieces: of the described half, and between both.
     """
 
-    pieces: list[Piece]
-    holes: list[Piece]
+    pieces: list[OutlinePiece]
+    holes: list[OutlinePiece]
     blocks: list[DrawnBlock]
 
 
@@ -136,13 +136,13 @@ def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: fl
         bars = bars_between_halves(assembly, beams, *axis)
         solid += [mirrored(shape, *axis) for shape in solid] + list(bars.values())
         blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
-    pieces += [Piece.polygon(shape) for shape in solid] + [_round(end, EYE) for end in eyes]
+    pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE) for end in eyes]
     return DrawnParts(pieces, [_round(end, HOLE) for end in eyes], blocks)
 
 
-def _round(end: BeamEnd, size: float) -> Piece:
+def _round(end: BeamEnd, size: float) -> OutlinePiece:
     """Return a disc about the end of a beam, of a radius in its thicknesses."""
-    return Piece.disc((float(end.at[0]), float(end.at[1])), size * end.thickness)
+    return OutlinePiece.disc((float(end.at[0]), float(end.at[1])), size * end.thickness)
 
 
 def _pinned(assembly: Assembly, node: str) -> bool:
@@ -161,7 +161,7 @@ def meeting_ends(assembly: Assembly, halves: dict[str, list[BeamStrip]]) -> dict
     return found
 
 
-def _closed(ends: list[BeamEnd]) -> Iterator[Piece]:
+def _closed(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
     """Yield what closes the ends of beams at a node.
 
     Where all beams leave to one side, more than half a turn between two of them is open: there the corners of these two
@@ -171,13 +171,13 @@ def _closed(ends: list[BeamEnd]) -> Iterator[Piece]:
     away = [float(np.hypot(*(end.at - ends[0].at))) for end in ends]
     if max(away) > STANDS * ends[0].thickness:
         near = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
-        yield from Piece.around(np.concatenate(near)) if len(near) > 1 else ()
+        yield from OutlinePiece.around(np.concatenate(near)) if len(near) > 1 else ()
         return
     ordered = sorted(ends, key=lambda end: end.angle % math.tau)
     for one, other in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
         gap = (other.angle - one.angle) % math.tau
         if math.pi + ON < gap < math.tau - ON:
-            yield Piece.polygon(np.array([one.at, one.cap[0], other.cap[1]]))
+            yield OutlinePiece.polygon(np.array([one.at, one.cap[0], other.cap[1]]))
 
 
 def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[DrawnBlock]:

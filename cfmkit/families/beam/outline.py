@@ -26,7 +26,7 @@ from cfmkit.export.contours import (
     circle,
     mark,
 )
-from cfmkit.export.union import Piece
+from cfmkit.export.union import OutlinePiece
 from cfmkit.families.beam.drawn_pieces import (
     EYE,
     HOLE,
@@ -186,7 +186,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     frame = _frame(assembly, beams, tolerance)
     lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
     part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
-    pieces = [*solid.pieces, *map(Piece.polygon, frame)]
+    pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
     contours = merged(pieces, fine / FINE, fillet, solid.holes)
     sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet)
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
@@ -221,8 +221,8 @@ def drawn_fillet(spec: BeamSpec) -> float:
 
 def _checked(
     beams: dict[str, list[BeamStrip]],
-    pieces: Sequence[Piece],
-    holes: Sequence[Piece],
+    pieces: Sequence[OutlinePiece],
+    holes: Sequence[OutlinePiece],
     contours: Sequence[Contour],
     thinnest: float,
     fillet: float,

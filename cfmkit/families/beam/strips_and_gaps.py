@@ -12,7 +12,7 @@ from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
 from cfmkit.export.beam_sections import BeamSection
 from cfmkit.export.contours import Line, Smooth
-from cfmkit.export.union import Piece
+from cfmkit.export.union import OutlinePiece
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -90,12 +90,12 @@ class BeamStrip:
         return BeamSection(beam, self.points[k], across, float(self.thickness[k]), self.length)
 
     @property
-    def piece(self) -> Piece:
+    def piece(self) -> OutlinePiece:
         """What of the part it is."""
         if self.straight:
             left, right = self.sides
-            return Piece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
-        return Piece(self.edges, tuple(self.polygons))
+            return OutlinePiece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
+        return OutlinePiece(self.edges, tuple(self.polygons))
 
     def mirrored(self, at: complex, direction: float) -> BeamStrip:
         """Return its mirror image about the line through a point [m] along a direction [rad]."""

@@ -178,7 +178,7 @@ def _ends(spec: SliderCrankSpec) -> tuple[float, float, float]:
 
 def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     """Return a drawing with its inside corners rounded, its fixing holes, and the frame around it."""
-    from cfmkit.export.union import SAGITTA, Piece, merged
+    from cfmkit.export.union import SAGITTA, OutlinePiece, merged
 
     part = spec.mechanism.part or PaddedPart()
     outline, *others = drawn.contours
@@ -188,7 +188,9 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     if frame:
         thinnest = float(drawn.tables[0].columns["thickness"][0].min())
         check_simple(rounded.points(SAGITTA * thinnest), "the outline of the leg")  # the union would hide it
-        made = merged([Piece.within(rounded), *map(Piece.polygon, frame)], thinnest, spec.mechanism.fillet)
+        made = merged(
+            [OutlinePiece.within(rounded), *map(OutlinePiece.polygon, frame)], thinnest, spec.mechanism.fillet
+        )
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True)]
     marks += [mark(one, driven=False) for one in frame]

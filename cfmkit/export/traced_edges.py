@@ -22,7 +22,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class TracedEdge:
     """An edge over a parameter that counts the lines of its polygon; or the edge moved into the waste on its right."""
 
     edge: Edge
@@ -30,7 +30,7 @@ class Track:
     moved: float = 0.0
 
     @classmethod
-    def of(cls, edge: Edge, sagitta: float) -> Track:
+    def of(cls, edge: Edge, sagitta: float) -> TracedEdge:
         """Return an edge whose polygon is within `sagitta` [m] of it, a smooth one with its own points."""
         if isinstance(edge, Line):
             return cls(edge, np.array(edge.ends))
@@ -53,9 +53,9 @@ class Track:
             return np.asarray(self.edge.tangents @ np.array([1, 1j]))
         return np.array([self.ahead(float(k)) for k in range(len(self.z))])
 
-    def beside(self, distance: float) -> Track:
+    def beside(self, distance: float) -> TracedEdge:
         """Return the curve that runs at a distance [m] on the right."""
-        return Track(self.edge, self.z - 1j * distance * self.tangents, distance)
+        return TracedEdge(self.edge, self.z - 1j * distance * self.tangents, distance)
 
     def at(self, u: float) -> complex:
         """Return the point at a parameter, a little beyond the ends as well."""
