@@ -84,7 +84,7 @@ RUBBERS = ("tpu-95a",)
 
 
 def why_not_made(process: str, material: str | None, youngs_modulus: float) -> str:
-    """Return why a process makes no part of a material, and which processes do; empty if it makes such parts.
+    """Return why a process makes no part of a material, and which processes do; empty if it does.
 
     Wires erode what conducts, which is metals; nozzles and powder beds make plastics. A powder with values of its own
     is sintered only, and filaments are not.

@@ -22,6 +22,8 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     small_angle_number,
 )
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
+from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
+from cfmkit.families.slider_crank.springs.link_strength import link_of
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
@@ -151,6 +153,8 @@ class Base:
     def lacks(self, name: str) -> bool:
         """Return whether a mechanism with this drive has no such value: its cells are empty."""
         others = OTHER_DRIVE[self.assembly.drive]
+        if name in LINK_DEFINITIONS and link_of(self.spec) is None:
+            return True
         if name in WIRE_DEFINITIONS and not self.spec.mechanism.springs.bought:
             return True
         if name == "force_per_anchor":
