@@ -53,14 +53,14 @@ def exported(
     cfmkit.errors.GeometryError
         If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
     """
-    from cfmkit.export import TOLERANCE, USUAL, files
+    from cfmkit.export import USUAL, files
 
     wanted = _formats(formats, USUAL)
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
     drawn = drawing_of(spec, family(spec.family), near)
-    found = files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {})
+    found = files(drawn, width, near, wanted) | (_decks(spec) if DECK in wanted else {})
     return found | _on_paper(drawn, spec, [one for one in PAPER if one in wanted]), drawn
 
 
@@ -87,7 +87,11 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     from cfmkit.specs.units import format_short
 
     process = getattr(getattr(getattr(spec, "mechanism", None), "part", None), "process", None)
-    if process is None or not (least := process.thinnest) or not (walls := thin_walls(drawn.contours, least)):
+    if (
+        process is None
+        or not (least := process.thinnest)
+        or not (walls := thin_walls(drawn.contours, least, drawn.tolerance))
+    ):
         return
     first, *others = [
         f"{format_short(one.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in one.at)})"

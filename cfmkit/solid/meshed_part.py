@@ -28,12 +28,14 @@ from cfmkit.solid.mesh import mesh
 from cfmkit.solid.mesh_refinement import refine
 from cfmkit.solid.path_following import PathEnd, PosePath, advanced, follow
 from cfmkit.solid.rigid_groups import Group, Supports, within
+from cfmkit.solid.sections_of_mesh import check_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
     from cfmkit.solid.mesh import TriangleMesh
@@ -61,9 +63,11 @@ SINGULAR_SPLITS = 3
 halves the error from there."""
 ALLOWED = 5e-4
 """Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough."""
-ON, DRAWN, HELD_BESIDE = 5e-6, 0.5e-6, 0.002
-"""Nodes nearer to a pad or a hole than this belong to it [m], at most, at least, and as a share of the thinnest place:
-what is held beside the face of a clamp shortens a leaf. With 5e-6 m one of 0.1 mm was 6e-4 too stiff."""
+ON = 1e-3
+"""Nodes nearer to a pad or a hole than this belong to it, and smaller steps of an edge are none: in thicknesses of the
+thinnest place."""
+RING = 2e-5
+"""How far the lines of a boundary may be from its arcs, in the same: their bending stiffness is then within 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,8 @@ class Part:
         Side of an element where the part is thick, in those of its thinnest place.
     obstacles : tuple of (n, 2) arrays
         Polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one.
+    sections : tuple of BeamSection
+        Of its beams: meshes must have their thickness.
     """
 
     rings: tuple[Ring, ...]
@@ -125,11 +131,12 @@ class Part:
     regions: tuple[tuple[FloatArray, float], ...] = ()
     largest: float = 1.0
     obstacles: tuple[FloatArray, ...] = ()
+    sections: tuple[BeamSection, ...] = ()
 
     @property
     def near(self) -> float:
-        """Distance from a place up to which a node belongs to it [m]: as outlines are drawn, beside what bends."""
-        return min(ON, max(DRAWN, HELD_BESIDE * self.thinnest))
+        """How far nodes of a pad or a hole may be from it [m]."""
+        return ON * self.thinnest
 
     @cached_property
     def faces(self) -> tuple[FloatArray, ...]:
@@ -166,6 +173,7 @@ class Part:
         share = SHARE * size / (self.thinnest / ACROSS)
         across = self.thinnest / size if self.largest > 1.0 else across
         grid = mesh(self.rings, self.largest * size, share, across, self.faces, self.near)
+        check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
         meshed = self.on(grid, np.ones(len(grid.nodes), bool))
         for _ in range(SINGULAR_SPLITS):
             if meshed.singular.any():
@@ -362,17 +370,19 @@ def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
     return COARSE if area > BULKY * 0.5 * around * thinnest else 1.0
 
 
-def rings_of(contours: Sequence[Contour], sagitta: float = 1e-6) -> tuple[Ring, ...]:
+def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[Ring, ...]:
     """Return the boundary that closed contours draw, as rings.
 
     Parameters
     ----------
     contours : sequence of Contour
         Outlines and holes.
-    sagitta : float
-        Largest distance of the rings from arcs [m]; smooth edges are taken by their points.
+    thinnest : float
+        Thinnest place of the part [m]: rings are within `RING` of it from arcs; smooth edges are taken by their
+        points.
     """
-    return tuple(Ring.of(contour.points(sagitta, TURN), contour.hole) for contour in contours)
+    step = ON * thinnest if math.isfinite(thinnest) else 0.0
+    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
 
 
 HALVED = 16.0

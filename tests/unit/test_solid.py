@@ -114,12 +114,12 @@ def test_a_part_that_is_thinner_than_elements_can_resolve_is_named_with_the_plac
 
 
 @pytest.mark.parametrize("rise", [0.6e-6, -0.6e-6])
-def test_a_step_of_the_drawings_rounding_is_no_place_to_be_resolved(rise):
-    """Left over between the disc at a node and the end of a beam, it had been the thinnest place of the part."""
+def test_a_step_of_less_than_a_thousandth_of_the_thickness_is_no_place_to_be_resolved(rise):
+    """Between beams of almost one thickness: it had been the thinnest place of the part."""
     step = np.array([[0, 0], [9e-3, 0], [9e-3, 1e-3], [4e-3, 1e-3], [4e-3, 1e-3 + rise], [0, 1e-3 + rise]])
-    plain, stepped = (mesh((Ring.of(one, False),), 0.6e-3) for one in (box(0, 0, 9e-3, 1e-3), step))
+    plain, stepped = (mesh((Ring.of(one, False, 1e-6),), 0.6e-3) for one in (box(0, 0, 9e-3, 1e-3), step))
     assert len(stepped.triangles) < 2 * len(plain.triangles)
-    ring = Ring.of(step, False)
+    ring = Ring.of(step, False, 1e-6)
     assert len(ring.points) == 5
     assert ring.area == pytest.approx(9e-6 + 4e-3 * rise, rel=1e-4)
 

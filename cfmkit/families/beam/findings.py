@@ -386,7 +386,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
         yield finding("beams_touch", f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled")
     if part is None:
         return
-    least = max(part.min_gap, 2 * part.fillet)
+    least = max(part.min_gap, 2 * solution.spec.mechanism.fillet)
     if still is not None and still.size < least:
         yield finding(
             "gap_small",

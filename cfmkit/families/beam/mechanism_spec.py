@@ -26,7 +26,7 @@ from cfmkit.families.beam.network_elements_spec import (
     checked_thickness,
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
-from cfmkit.stock.material_and_part_spec import SafetyFactor
+from cfmkit.stock.material_and_part_spec import RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -209,7 +209,7 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
             yield ("nodes", name, "support"), "in stages in series, every support but the driven one is 'clamped'"
 
 
-class Mechanism(Model):
+class Mechanism(RoundedCorners, Model):
     """A planar network of slender beams, its loads and its drive."""
 
     material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
@@ -250,6 +250,12 @@ class Mechanism(Model):
         """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of all beams [m]."""
+        given = self.of_beams("thickness").values()
+        return min(one if isinstance(one, float) else min(value for _, value in one) for one in given)
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

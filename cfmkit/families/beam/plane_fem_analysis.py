@@ -18,7 +18,6 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import (
     assemble,
     constant_load,
@@ -28,7 +27,7 @@ from cfmkit.families.beam.network_from_spec import (
     thinnest_of,
 )
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.outline import drawing, drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -38,6 +37,7 @@ from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -266,22 +266,22 @@ def _under_load(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolution) ->
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.boundary_and_element_sizes import with_arcs
-    from cfmkit.solid.meshed_part import TURN, HeldOrDriven, Part, largest_in, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
-    cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
+    drawn = drawing(_without_frame(spec, frame))
+    cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
         for one in regions(spec)
     ]
-    fillet = (spec.mechanism.part or PartSpec()).fillet
-    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut))
     thinnest = _thinnest(assembly)
-    return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
+    rings = rings_of(cut, thinnest)
+    largest = largest_in(rings, thinnest)
+    return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
 
 
 def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
@@ -291,7 +291,7 @@ def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
     part = spec.mechanism.part
     if not frame or part is None or part.frame is None:
         return spec
-    pads = [one for place in regions(spec) for one in place.shapes if len(one) == 4]
+    pads = [one for place in regions(spec) for one in place.shapes if place.padded]
     kept = outside([one.at for one in part.holes], frame, pads)
     holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
     alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
@@ -458,12 +458,10 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
-def _sharp(fillet: float) -> str:
-    """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
-    from cfmkit.export.union import ROUGH
-    from cfmkit.solid.boundary_and_element_sizes import smallest_arc
-
-    if 0.0 < fillet < smallest_arc(ROUGH):
+def _sharp(spec: BeamSpec) -> str:
+    """Return what is wrong with fillets that the outline does not have; empty if it has them."""
+    fillet = spec.mechanism.fillet
+    if fillet > 0.0 == drawn_fillet(spec):
         radius = format_short(fillet, "length")
         return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
     return sharp_inside(fillet, ())
@@ -478,8 +476,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         load = format_short(solution.copies * point.effort, "torque" if _turns(spec) else "force")
         known = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
         yield finding("bifurcation", f"the part leaves its path at {at} and {load}{known} for a stable branch")
-    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    if reported := _sharp(spec):
+        yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
         yield finding(name, reported)

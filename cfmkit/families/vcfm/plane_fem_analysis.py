@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, tr
 from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
-from cfmkit.stock.material_and_part_spec import CutPart
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -169,7 +169,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
         )
         for number, one in enumerate(piece.held, start=1)
     ]
-    return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
+    return Part(rings_of((piece.contour,), about.thickness), about.thickness, about.width, law, (shuttle, *walls))
 
 
 def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
@@ -248,8 +248,8 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
-    if reported := sharp_inside((spec.mechanism.part or CutPart()).fillet, sharp_corners(spec)):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    if reported := sharp_inside(spec.mechanism.fillet, sharp_corners(spec)):
+        yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     for name, reported in sampler.mesh_error.too_large():
         yield finding(name, reported)
     about = spec.mechanism

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
+from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import (
     Analysis,
@@ -185,7 +185,7 @@ class Frame(Model):
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
 
-class Mechanism(Model):
+class Mechanism(CutLeaves, Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
     material: Annotated[LeafMaterial, material_input(LeafMaterial)] = Field(

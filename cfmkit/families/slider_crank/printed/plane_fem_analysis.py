@@ -33,7 +33,7 @@ from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
-from cfmkit.stock.material_and_part_spec import PaddedPart
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -178,7 +178,7 @@ def part_of(spec: SliderCrankSpec) -> Part:
     assert material is not None  # or `elasticity` had refused
     law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
     regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
-    rings = rings_of((piece.contour, *piece.holes))
+    rings = rings_of((piece.contour, *piece.holes), piece.thinnest)
     return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST, piece.frame)
 
 
@@ -265,8 +265,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
     piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
-    if reported := sharp_inside((solution.spec.mechanism.part or PaddedPart()).fillet, piece.sharp):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    if reported := sharp_inside(solution.spec.mechanism.fillet, piece.sharp):
+        yield finding("sharp_corners", reported, usual_fillet(solution.spec.mechanism.thinnest))
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
     wide = made_of.wide
