@@ -270,7 +270,7 @@ def _trial_travels(solution: MeshSolution, coarse: MeshSolution) -> tuple[float,
 
 
 @dataclass(frozen=True)
-class State:
+class MeshedPose:
     """An equilibrium on a mesh."""
 
     solution: MeshSolution
@@ -289,9 +289,9 @@ class State:
         return carried.moves(np.append(pose.slope, 1.0))
 
 
-def _states(solution: MeshSolution, travels: Sequence[float]) -> tuple[State, ...]:
+def _states(solution: MeshSolution, travels: Sequence[float]) -> tuple[MeshedPose, ...]:
     poses = {pose.travel: pose for pose in solution.course.poses}
-    return tuple(State(solution, poses[travel]) for travel in travels)
+    return tuple(MeshedPose(solution, poses[travel]) for travel in travels)
 
 
 @dataclass(frozen=True)
@@ -299,7 +299,7 @@ class Level:
     """A mesh and what is left of the error in each of its triangles, at a few poses."""
 
     meshed: Meshed
-    states: tuple[State, ...]
+    states: tuple[MeshedPose, ...]
     left: FloatArray  # of p poses and m triangles, in parts of the largest force, (p, m)
 
     @property
@@ -312,8 +312,8 @@ class Level:
         cls,
         meshed: Meshed,
         refinement: RefinedMesh,
-        states: tuple[State, ...],
-        coarse: tuple[State, ...],
+        states: tuple[MeshedPose, ...],
+        coarse: tuple[MeshedPose, ...],
         left: FloatArray | None = None,
     ) -> Level:
         """Return a level from poses on a mesh and on the coarser one, whose triangles had an error left (p, m)."""
@@ -359,5 +359,5 @@ class Level:
             pose = meshed.problem.solve(guess, state.pose.travel)
             if pose is None or pose.unstable > state.pose.unstable:
                 return None
-            states.append(State(meshed.at(pose), pose))
+            states.append(MeshedPose(meshed.at(pose), pose))
         return Level.of(meshed, refinement, tuple(states), self.states, self.left), refinement
