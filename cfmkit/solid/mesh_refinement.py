@@ -130,7 +130,7 @@ def _with_side_nodes(
 
     def side_of(first: IntArray, last: IntArray) -> IntArray:
         low, high = np.minimum(number[first], number[last]), np.maximum(number[first], number[last])
-        return np.searchsorted(keys, low * len(used) + high)
+        return np.asarray(np.searchsorted(keys, low * len(used) + high), np.int64)
 
     first, last, middle = mesh.edges.T
     split = halved[middle]

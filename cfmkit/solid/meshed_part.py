@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from cfmkit.solid.plane_stress_law import Law
 
 
-ACROSS, SHARE = 1.35, 0.4
+ACROSS, SHARE = 1.5, 0.4
 """Elements across the thinnest place, and side of an element on a fillet in radii, of the mesh that is refined: split
 once, the force of Lan's part is within 1e-4 of that of much finer meshes."""
 TURN = math.radians(1.0)
