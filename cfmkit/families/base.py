@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.results import Design, Result
-    from cfmkit.solid.two_meshes import DrivenPart
+    from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends
 

@@ -106,6 +106,14 @@ class Ring:
         with np.errstate(divide="ignore"):
             return np.asarray(np.where(turn > 1e-9, reach / np.maximum(turn, 1e-300), math.inf))
 
+    @cached_property
+    def curvature_jumps(self) -> FloatArray:
+        """By how much the curvature of the lines behind and before each vertex differs, (n,) [1/m]; 0 at corners."""
+        turn = np.where(np.abs(self.turns) > CORNER, 0.0, self.turns)
+        curvature = 0.5 * (turn + np.roll(turn, -1)) / self.lengths
+        jumps = np.abs(curvature - np.roll(curvature, 1))
+        return np.asarray(np.where(np.abs(self.turns) > CORNER, 0.0, jumps))
+
     def at(self, arc: FloatArray) -> FloatArray:
         """Return the points (k, 2) [m] at arc lengths (k,) [m], taken round the ring."""
         closed = np.concatenate([self.points, self.points[:1]])

@@ -32,14 +32,11 @@ def check_mesh(grid: TriangleMesh, area: float, sections: Sequence[BeamSection])
         With the place and the values.
     """
     if abs(grid.area - area) > ALLOWED * area:
-        raise GeometryError(
-            f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2: use a smaller "
-            "analysis.solid.mesh"
-        )
+        raise GeometryError(f"the mesh covers {1e6 * grid.area:.6g} mm2 of the part's {1e6 * area:.6g} mm2")
     starts, ends = _edges(grid)
     for section in sections:
         if section.length >= section.thickness:
-            section.check(sum(section.cut(starts, ends)), "mesh", "use a smaller analysis.solid.mesh")
+            section.check(sum(section.cut(starts, ends)), "mesh", "check mechanism.part")
 
 
 def _edges(grid: TriangleMesh) -> tuple[FloatArray, FloatArray]:

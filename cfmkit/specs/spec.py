@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
@@ -97,11 +97,16 @@ SweepValue = str | int | float | bool
 class SolidAnalysis(Model):
     """How the part is solved as a planar solid."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "mesh": "write 'error', the error allowed in the force: the mesh is refined to it (default: 5e-4)"
+    }
     poses: int = Field(
         21, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
     )
-    mesh: Annotated[Length, Field(gt=0)] | None = Field(
-        None, description="side of an element; default: 0.4 of the thickness of the thinnest beam, leaf or strip"
+    error: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        5e-4,
+        description="error of the force, in parts of the largest, to which the mesh is refined; a warning says if it "
+        "cannot be reached",
     )
 
 

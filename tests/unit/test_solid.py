@@ -20,7 +20,6 @@ from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
-from cfmkit.solid.two_meshes import FORCE_FACTOR, FORCE_LEAST, STRESS_FACTOR, STRESS_LEAST, MeshError
 
 E, NU = 2e9, 0.35
 HOOKE = SaintVenantKirchhoff(E, NU)
@@ -361,17 +360,7 @@ def test_an_end_that_is_free_to_turn_is_a_pin():
     assert max(pose.effort for pose in course.poses) == pytest.approx(load, rel=0.02)
 
 
-# --- how far a mesh can be trusted ---------------------------------------------------------------------------------
-
-
-def test_the_error_is_the_difference_of_two_meshes_times_its_factor_and_chance_agreement_counts_little():
-    apart, alike = MeshError(1e-3, 0.03), MeshError(0.0, 0.0)
-    assert apart.values()["mesh_force_error"] == pytest.approx(FORCE_FACTOR * 1e-3)
-    assert apart.values()["mesh_stress_error"] == pytest.approx(STRESS_FACTOR * 0.03)
-    assert alike.force == pytest.approx(FORCE_FACTOR * FORCE_LEAST)
-    assert alike.stress == pytest.approx(STRESS_FACTOR * STRESS_LEAST)
-    assert not list(alike.too_large())
-    assert [name for name, _ in MeshError(0.01, 0.0).too_large()] == ["mesh_coarse"]
+# --- seams ---------------------------------------------------------------------------------------------------------
 
 
 def test_a_seam_across_an_edge_begins_at_a_node_of_it():

@@ -63,7 +63,7 @@ FINDINGS = {
     "pins_not_drawn": "beams turn on pins in the mechanism, but are one piece in the drawing",
     "gap_small": "two beams are closer than can be cut",
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
-    "mesh_coarse": "results on two meshes of the part differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "feature_small": "a beam is thinner than can be made",
 }
 

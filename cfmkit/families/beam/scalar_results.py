@@ -52,6 +52,12 @@ DEFINITIONS = {
     "limit_force": ("force", "first limit point of a growing force: it snaps there"),
     "limit_displacement": ("length", "first limit point of a growing displacement: it snaps there"),
     "bifurcation_force": ("force", "first bifurcation under a growing force"),
+    "critical_force": ("force", "force of the part as a solid at the first bifurcation on its travel"),
+    "critical_error": (
+        "ratio",
+        "error of `critical_force` and, of the part as a solid, of `bifurcation_displacement`, relative to each: by "
+        "how much they differ on a coarser mesh, at least 1e-4",
+    ),
     "bifurcation_displacement": ("length", "first bifurcation under a growing displacement"),
     "error_estimate": ("ratio", "estimated error of forces and positions, relative to the largest of the path"),
     "gap_min": ("length", "smallest gap between two beams before any load, away from common nodes"),

@@ -55,7 +55,7 @@ FINDINGS = {
     "wide_beam": "strip or flexures are so wide that they cannot curl across their width: they are stiffer than "
     "in beam theory",
     "sharp_corners": "without fillets the stress in inside corners has no value",
-    "mesh_coarse": "results on two meshes of the part differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "too_thin": "a thickness is below the thinnest wall of the process",
     "lateral_buckling": "the part bends out of its plane nearly as easily as in its plane",
     "side_force": "the transverse force on the guide is large: friction in the guide adds to the force",

@@ -59,7 +59,7 @@ FINDINGS = {
     "too_thin": "the design needs a leaf that is thinner than can be made",
     "envelope": "the design does not fit into the given space",
     "wide_beam": "leaves are so wide that they cannot curl across their width: they are stiffer than in beam theory",
-    "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "spring_overstretched": "bought springs are deflected beyond their limit",
     "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",

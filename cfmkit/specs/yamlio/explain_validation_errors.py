@@ -137,6 +137,9 @@ def _unknown_key(found: Trace) -> str:
     fields = [one for slot in found.parents if slot.model is not None for one in slot.model.model_fields.items()]
     names = [field.alias or name for name, field in fields]
     key = str(found.path[-1]) if found.path else ""
+    removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in found.parents)
+    if instead := next(filter(None, removed), ""):
+        return f"the key {shown(key)} was removed; {instead}"
     hint = did_you_mean(key, names) or listed("allowed are", names)
     return f"unknown key {shown(key)}" + (f"; {hint}" if hint else "")
 
