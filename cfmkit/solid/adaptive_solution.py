@@ -160,7 +160,7 @@ class DrivenPart:
             report(FIRST_SHARE + (1.0 - FIRST_SHARE) * share, "fine mesh")
 
         finer, refinement = meshed.refined()
-        solution = _followed_alike(finer, Guide(coarse, finer, (refinement,)), self.stops, report_fine)
+        solution = _followed_alike(finer, PoseGuide(coarse, finer, (refinement,)), self.stops, report_fine)
         differences = solution.differences(coarse)
         trial = _trial_travels(solution, coarse)
         level = Level.of(finer, refinement, _states(solution, trial), _states(coarse, trial))
@@ -174,7 +174,7 @@ class DrivenPart:
             level, refinement = refined
             refinements.append(refinement)
         if refinements:
-            guide = Guide(solution, level.meshed, tuple(refinements))
+            guide = PoseGuide(solution, level.meshed, tuple(refinements))
             before, solution = solution, _followed_alike(level.meshed, guide, self.stops, report_fine)
         force = level.error + float(np.nan_to_num(coarse.between))
         error = MeshError(*differences, max(force, FORCE_ROUNDING), self.error, coarse.between)
@@ -187,7 +187,7 @@ FIRST_SHARE = 0.25
 
 
 @dataclass(frozen=True)
-class Guide:
+class PoseGuide:
     """Unknowns on a mesh predicted from those of a coarser one that it was refined from."""
 
     coarse: MeshSolution
@@ -231,7 +231,7 @@ def interpolate_unknowns(
 
 
 def _followed_alike(
-    meshed: Meshed, guide: Guide, stops: tuple[float, ...], report: Callable[[float], None]
+    meshed: Meshed, guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]
 ) -> MeshSolution:
     """Return the poses of a part at all travels at which a coarser mesh has one, and at the stops."""
     travels = sorted({*guide.travels, *stops}, reverse=bool(stops[-1] < stops[0]))

@@ -269,7 +269,7 @@ class Meshed:
 
     @cached_property
     def singular(self) -> NDArray[np.bool_]:
-        """Triangles at a point where the stress has no bound, (m,): a reentrant corner or the end of a clamp."""
+        """Triangles at a point where the stress is unbounded, (m,): a reentrant corner or the end of a clamp."""
         return np.asarray(self._singular_nodes[self.grid.triangles[:, :3]].any(axis=1))
 
     @cached_property

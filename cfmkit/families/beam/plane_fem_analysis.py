@@ -18,14 +18,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    constant_load,
-    mirror_axis,
-    on_axis,
-    resolve,
-    thinnest_of,
-)
+from cfmkit.families.beam.network_from_spec import assemble, constant_load, mirror_axis, on_axis, resolve, thinnest_of
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
 from cfmkit.families.beam.outline import drawing, drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns

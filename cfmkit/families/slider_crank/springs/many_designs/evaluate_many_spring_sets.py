@@ -25,12 +25,7 @@ from cfmkit.families.slider_crank.springs.largest_turns_and_forces import Motion
 from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
 from cfmkit.families.slider_crank.springs.link_strength import link_of
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
-from cfmkit.families.slider_crank.springs.model import (
-    efforts_inside,
-    reference_motion,
-    target_of,
-    window_of,
-)
+from cfmkit.families.slider_crank.springs.model import efforts_inside, reference_motion, target_of, window_of
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
