@@ -232,7 +232,7 @@ def evaluate(
     from cfmkit.runs.values_with_units import read_window
 
     found = _result_of(result)
-    return measured(found, names, read_window(window, found.curve.kind))
+    return measured(found, names, read_window(window, found.curve.kind) if window is not None else None)
 
 
 def check(result: Result | AnySpec) -> tuple[Outcome, ...]:

@@ -294,6 +294,14 @@ class Measured(Model):
     positive_stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="K_p of the spring")
 
 
+class VcfmSolid(SolidAnalysis):
+    """How the part is solved as planar solids."""
+
+    poses: int = Field(
+        41, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
+    )
+
+
 class VcfmAnalysis(Analysis):
     """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
 
@@ -309,7 +317,7 @@ class VcfmAnalysis(Analysis):
         description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
         "spring as drawn, as planar solids; for hybrid leaves the default is exact",
     )
-    solid: SolidAnalysis = Field(SolidAnalysis(poses=41), description="settings of fidelity 'solid'; default: 41 poses")
+    solid: VcfmSolid = Field(VcfmSolid(), description="settings of fidelity 'solid'")
     branch: Literal["stable", "primary"] = Field(
         "stable",
         description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",

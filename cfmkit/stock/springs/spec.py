@@ -109,7 +109,8 @@ class SpringSupport(Model):
 
     def check_guide(self, kind: Kind, wound: Wound | None, outer: float | None) -> None:
         """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
-        own = [key for key in ("seats", "guide_rod", "guide_tube") if key in self.model_fields_set]
+        own = ["seats"] if self.seats != "fixed-fixed" else []
+        own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
         if own and kind != "compression":
             raise ValueError(f"{own[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
         inside = wound.inner_diameter if wound is not None else outer
