@@ -63,7 +63,7 @@ class BeamEnd:
     @property
     def at(self) -> FloatArray:
         """Its middle (2,) [m]."""
-        return self.strip.points[-1 if self.last else 0]
+        return np.asarray(self.strip.points[-1 if self.last else 0])
 
     @property
     def thickness(self) -> float:

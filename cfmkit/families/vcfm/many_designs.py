@@ -222,7 +222,7 @@ class Slab:
     def _largest_part(self, travel: FloatArray) -> FloatArray:
         """Return the largest force of one leaf, or of the spring, at travels of each design, (k, n) [N]."""
         leaves, spring = self._parts(travel)
-        return np.maximum(leaves / self.half_beams, spring)
+        return np.asarray(np.maximum(leaves / self.half_beams, spring))
 
     def _extremes(self, travel: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the largest and smallest force: next to the samples, or where the leaves buckle and straighten."""

@@ -133,11 +133,7 @@ class SolidSampler(ExactSampler):
             pull = _pulled(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
             self.sides, self.mesh_error = [_path(springs.solution), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
-
-    @property
-    def accuracy(self) -> float:
-        """Error of the mesh, in parts of the largest force."""
-        return self.mesh_error.force
+        self.accuracy = self.mesh_error.force
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
