@@ -119,7 +119,7 @@ def free_sections(
             met = tree.query(LineString(section.line(cut)), "intersects")
             if not {*met.tolist()} <= {*mine}:
                 continue
-        smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length), "length", 2)
+        smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length, 0.5 * fillet), "length", 2)
         remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
         section.check(sum(cut), "outline", remedy)
         found.append(section)

@@ -39,7 +39,7 @@ def room(result: Result) -> Room | None:
     mechanism = solution.spec.mechanism
     angle = solution.assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi
     axes = np.array([[np.sin(angle), -np.cos(angle)], [np.cos(angle), np.sin(angle)]])
-    drawn = drawing(solution.spec, COARSE)
+    drawn = drawing(solution.spec, COARSE, check=False)
     boxes = np.array([contour.extents for contour in drawn.contours if contour.layer == "cut"])
     corners = [boxes[:, [0, 1]], boxes[:, [0, 3]], boxes[:, [2, 1]], boxes[:, [2, 3]]]
     inside = [(points, 0.0) for points in (*corners, *_moved_pads(solution))] + _bent(solution)

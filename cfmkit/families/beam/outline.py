@@ -165,7 +165,7 @@ def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) ->
     return HeldPlace(node, node, at, (end.cap,), (end.cap,))
 
 
-def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
+def drawing(spec: BeamSpec, tolerance: float | None = None, check: bool = True) -> Drawing:
     """Return the part, its centre lines, and the point table of every beam.
 
     Parameters
@@ -174,6 +174,13 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
         What to draw.
     tolerance : float, optional
         Largest distance of the contour from the exact edges [m]; default: `FINE`.
+    check : bool
+        Whether a part that is not as specified is refused; False if only its size is needed.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the outline of a beam, or its area, is not that of the specification.
     """
     from cfmkit.export.union import merged
 
@@ -188,7 +195,7 @@ def drawing(spec: BeamSpec, tolerance: float | None = None) -> Drawing:
     part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
     pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
     contours = merged(pieces, fine / FINE, fillet, solid.holes)
-    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet)
+    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet) if check else ()
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)

@@ -411,10 +411,9 @@ def made_as_wished(spec: Spec, wish: Wish) -> Spec:
     if wish.process is None:
         return spec
     radius = PROCESSES[wish.process].least_radius
-    part = getattr(spec.at("mechanism"), "part", None)
-    fillet = getattr(part, "fillet", None)
+    fillet = getattr(spec.at("mechanism"), "fillet", 0.0)
     changes: tuple[dict[str, Any], ...] = (
-        {"mechanism.part.process": wish.process, "mechanism.part.fillet": max(radius, fillet or ROUND)},
+        {"mechanism.part.process": wish.process, "mechanism.part.fillet": max(radius, fillet)},
         {"mechanism.part.process": wish.process},
         {"mechanism.plate.process": wish.process},
     )
@@ -424,10 +423,6 @@ def made_as_wished(spec: Spec, wish: Wish) -> Spec:
         except CfmError:  # another kind of part
             continue
     return spec
-
-
-ROUND = 0.5e-3
-"""Radius of inside corners where none is stated [m]: the default of parts that are cut."""
 
 
 def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, float | None]:
