@@ -10,7 +10,7 @@ import pytest
 from cam_motion import change_at_rest, moving, peak_over_one_second, response, with_springs
 from cam_support import analyze
 
-from cfmkit.families.cam.dynamics import machine_from_spec
+from cfmkit.families.cam.dynamics import machine_from_spec, scalar_results
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.machine_from_spec import build
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
@@ -23,7 +23,8 @@ NO_WEIGHT = {"analysis__gravity": False}
 @pytest.fixture(autouse=True)
 def _gravity_of_the_note(monkeypatch):
     """The note's numbers hold for 9.81 m/s^2; the product takes the standard value."""
-    monkeypatch.setattr(machine_from_spec, "GRAVITY", 9.81)
+    for module in (machine_from_spec, scalar_results):
+        monkeypatch.setattr(module, "GRAVITY", 9.81)
 
 
 def at_rest(position):
