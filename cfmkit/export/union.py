@@ -422,9 +422,23 @@ def _touched(runs: Sequence[_Run], radius: float, near: float) -> list[Edge]:
         if run.track.moved and (abs(end - start) > near or after.first - before.last > 1.0):
             edges.append(run.track.part(before.last, after.first, start, end))
         if abs(beyond - end) > near:
-            first, turn = float(np.angle(end - after.at)), float(np.angle((beyond - after.at) / (end - after.at)))
-            edges.append(Arc(pair(after.at), radius, first, first - (-turn % (2 * math.pi))))
+            center = _center_between(end, beyond, after.at, radius)
+            first, turn = float(np.angle(end - center)), float(np.angle((beyond - center) / (end - center)))
+            edges.append(Arc(pair(center), radius, first, first - (-turn % (2 * math.pi))))
     return _straightened(edges, near)
+
+
+def _center_between(start: complex, end: complex, near: complex, radius: float) -> complex:
+    """Return the centre of the arc of a radius [m] through two points: that on the side of a place near it.
+
+    Where two ways of the cutter meet at a small angle the place is known less exactly than the points are.
+    """
+    half = 0.5 * (end - start)
+    if not 0 < abs(half) < radius:
+        return near
+    aside = 1j * half / abs(half) * math.sqrt(radius**2 - abs(half) ** 2)
+    middle = 0.5 * (start + end)
+    return min(middle + aside, middle - aside, key=lambda center: abs(center - near))
 
 
 def _foot(run: _Run, u: float) -> complex:
