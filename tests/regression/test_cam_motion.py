@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cam_motion import change_at_rest, moving, peak_over_one_second, response, with_springs
-from cam_support import analyze
+from cam_support import analyze, take_gravity_of_the_note
 
-from cfmkit.families.cam.dynamics import machine_from_spec, scalar_results
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.machine_from_spec import build
 from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
@@ -23,8 +22,7 @@ NO_WEIGHT = {"analysis__gravity": False}
 @pytest.fixture(autouse=True)
 def _gravity_of_the_note(monkeypatch):
     """The note's numbers hold for 9.81 m/s^2; the product takes the standard value."""
-    for module in (machine_from_spec, scalar_results):
-        monkeypatch.setattr(module, "GRAVITY", 9.81)
+    take_gravity_of_the_note(monkeypatch)
 
 
 def at_rest(position):
