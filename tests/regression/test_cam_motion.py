@@ -150,7 +150,7 @@ def test_symmetric_closed_forms_of_weight_and_moving_mass_along_the_whole_stroke
     x = found.at.center[0].real
     slope, tangent = law.slope(x), x / np.sqrt(0.04 - x**2)
     rise, out = slope / (slope - tangent), 1.0 / (slope - tangent)
-    weight = 9.80665 * (2 * 0.38 * rise + 0.077 * (1 + rise) + 0.068)
+    weight = 9.81 * (2 * 0.38 * rise + 0.077 * (1 + rise) + 0.068)
     roller = (0.38 + 4.61e-6 / 0.016**2) * (rise**2 + out**2)
     brace = 0.077 * ((1 + rise) ** 2 + out**2) / 4 + 2.57e-4 * out**2 / (0.04 - x**2)
     np.testing.assert_allclose(found.mass, 0.068 + 2 * (roller + brace), rtol=1e-12)
