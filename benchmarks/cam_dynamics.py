@@ -43,7 +43,7 @@ def best(function, rounds, calls):
     return min(times), found
 
 
-A, X0, LENGTH, STIFFNESS, G = 9.058e-3, 0.068, 0.2, 1365.0, 9.81
+A, X0, LENGTH, STIFFNESS, G = 9.058e-3, 0.068, 0.2, 1365.0, 9.80665
 SLIDER, BRACE, BRACE_INERTIA, ROLLER, SPIN = 0.068, 0.077, 2.57e-4, 0.38, 4.61e-6 / 0.016**2
 START, STROKE, DURATION = 0.22, 0.1, 0.125
 FOOT = np.sqrt(LENGTH**2 - X0**2)

@@ -3,14 +3,19 @@
 For each family, rows a second of processor time with the family's block model (where it applies) and point by
 point. ``--against PYTHON`` runs the same sweeps with the interpreter of another checkout, in turn with this one, and
 prints how many times as long a sweep takes here; ``--configs DIR`` has specifications that both know.
+
+``--memory`` prints the peak memory of a sweep of cams by its number of rows, with one job and with two, side by side.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import re
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -64,13 +69,49 @@ def child(python: str, name: str, configs: Path, singly: bool) -> tuple[float, i
     return seconds, rows, blocks
 
 
+ROWS = (5_000, 20_000)
+
+
+def peak_memory(jobs: int, rows: int, configs: Path) -> tuple[float, float]:
+    """Return the peak memory of ``cfmkit sweep`` [MB]: of the process itself, and of the largest worker."""
+    vary = ("mechanism.roller_radius=6 mm:10 mm:50", f"mechanism.springs.stiffness=0.4 N/mm:1 N/mm:{rows // 50}")
+    code = (
+        "import resource, sys; from cfmkit.cli.main import entry; code = entry(); "
+        "print(code, *(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))"
+    )
+    with tempfile.TemporaryDirectory() as out:
+        options = ["-j", str(jobs), "-o", os.path.join(out, "sweep"), "--no-plots", "-q"]
+        command = [sys.executable, "-c", code, "sweep", str(configs / "cam.yaml"), *options]
+        command += [word for one in vary for word in ("--vary", one)]
+        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    code_, own, worker = map(int, re.findall(r"[0-9]+", said)[-3:])
+    assert code_ in (0, 6), said
+    return own / 1024, worker / 1024
+
+
+def print_memory(configs: Path) -> None:
+    """Print the peak memory of sweeps, and what each row adds."""
+    print(f"{'rows':>8}{'-j 1':>12}{'-j 2':>12}{'its workers':>14}   [MB]")
+    found = []
+    for rows in ROWS:
+        (alone, _), (parent, worker) = (peak_memory(jobs, rows, configs) for jobs in (1, 2))
+        found.append((alone, parent, worker))
+        print(f"{rows:>8}{alone:>12.0f}{parent:>12.0f}{worker:>14.0f}", flush=True)
+    added = [1024 * (b - a) / (ROWS[1] - ROWS[0]) for a, b in zip(*found, strict=True)]
+    print(f"{'kB a row':>8}{added[0]:>12.2f}{added[1]:>12.2f}{added[2]:>14.2f}")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition(":")[0])
     parser.add_argument("--against", metavar="PYTHON", help="interpreter of another checkout")
     parser.add_argument("--configs", type=Path, default=HERE.parents[1] / "configs")
+    parser.add_argument("--memory", action="store_true", help="peak memory with one job and with two")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     given = parser.parse_args()
+    if given.memory:
+        print_memory(given.configs)
+        return
     if given.one:
         name, configs, singly = json.loads(given.one)
         print(json.dumps(min(measured(name, Path(configs), singly) for _ in range(2))))

@@ -6,12 +6,13 @@ Everything is a value: nothing here prints or plots, and a disk is written to on
 from __future__ import annotations
 
 import os
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.arrays import Named
 from cfmkit.errors import UsageError
 from cfmkit.families import family, origin
-from cfmkit.families.run_control import Run
+from cfmkit.families.run_control import Run, read_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -200,7 +201,9 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
 
 
 def evaluate(
-    result: Result | AnySpec, names: Iterable[str] | None = None, window: Window | None = None
+    result: Result | AnySpec,
+    names: Iterable[str] | None = None,
+    window: Window | str | tuple[float, float] | None = None,
 ) -> dict[str, Quantity]:
     """Return constant-force metrics and the family's own scalar results, by name, in SI.
 
@@ -210,13 +213,13 @@ def evaluate(
         Of any status; a specification is analysed.
     names : iterable of str, optional
         Only these; ``[branch]`` picks a branch. Default: all.
-    window : Window, optional
-        Where to measure; default: ``analysis.window``, else the full travel.
+    window : Window or str or tuple of float, optional
+        Where to measure: ``"40 mm:210 mm"``, or numbers [m or rad]; default: ``analysis.window``, else the full travel.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If one of the names does not exist.
+        If one of the names does not exist, or the window is malformed.
 
     Examples
     --------
@@ -226,8 +229,10 @@ def evaluate(
     0.0124
     """
     from cfmkit.metrics import evaluate as measured
+    from cfmkit.runs.values_with_units import read_window
 
-    return measured(_result_of(result), names, window)
+    found = _result_of(result)
+    return measured(found, names, read_window(window, found.curve.kind) if window is not None else None)
 
 
 def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
@@ -322,10 +327,10 @@ def suggest(
     *,
     seed: int = 0,
     jobs: int = 1,
-    time_budget: float | None = 60.0,
+    time_budget: str | float | None = 180.0,
     **keys: Any,
 ) -> Suggestions:
-    """Return mechanisms of every family that do what is wished, the best first.
+    """Return mechanisms of every family that do what is wished, the best first, and those not judged in full.
 
     Parameters
     ----------
@@ -335,8 +340,8 @@ def suggest(
         Of everything random.
     jobs : int
         Processes; 1: only this one, in which a long job cannot be stopped when the time budget ends.
-    time_budget : float, optional
-        In seconds; None: no limit.
+    time_budget : str or float, optional
+        A text with its unit (``"20 s"``, ``"2 min"``), or a number [s]; None: no limit.
     **keys
         Keys of the wish, which replace those of the file: texts with units (``force="20 N"``), numbers for shares,
         lists (``room=["80 mm", "60 mm", "6 mm"]``).
@@ -363,7 +368,7 @@ def suggest(
 
     block = wish_of(None if wish is None else os.fspath(wish), {key: written(value) for key, value in keys.items()})
     executor = serial if jobs == 1 else Pool(jobs)
-    return searched(block.wish(), Run(seed, time_budget=time_budget, executor=executor), block.prefer)
+    return searched(block.wish(), Run(seed, time_budget=read_time(time_budget), executor=executor), block.prefer)
 
 
 def export(
@@ -385,10 +390,16 @@ def export(
     kerf : str or float, optional
         Width of the cut: a text with its unit, or a number [m]; adds a DXF moved by half of it.
     tolerance : str or float, optional
-        Largest distance from the exact curves, likewise; default: 0.005 mm.
+        Largest distance from the exact curves, likewise; default: 0.005 mm, of beams a 5000th of
+        the smallest thickness.
     format : str or sequence of str, optional
         What to write, of dxf, svg, csv, stl, 3mf, step, inp, png and pdf: ``"stl,step"``; default: dxf, svg, csv. The
         last two are the dimensioned drawing that `design` makes, ``figures/drawing.png``.
+
+    Warns
+    -----
+    UserWarning
+        For each format beside dxf, svg and csv that cannot be made while others are.
 
     Raises
     ------
@@ -410,7 +421,10 @@ def export(
     from cfmkit.runs.exported_files import exported
 
     spec = spec_of(spec)
-    drawn = Named(exported(spec, kerf, tolerance, format)[0])
+    made, _, failed = exported(spec, kerf, tolerance, format)
+    for name, error in failed.items():
+        warnings.warn(f"{name} is not made: {error}", stacklevel=2)
+    drawn = Named(made)
     if out is not None:
         from cfmkit.store import RunFolder, stable_hash
 
@@ -420,7 +434,8 @@ def export(
             source = {"source": spec.name, "sha256": stable_hash(spec.model_dump(mode="json"))}
             package = {"family": computed} if (computed := origin(spec.family)) else {}
             about = {"command": "export", "arguments": [], "spec": source | package}
-            folder.commit({**about, "status": "complete", "exit_code": 0})
+            ending = {"status": "partial", "exit_code": 6} if failed else {"status": "complete", "exit_code": 0}
+            folder.commit({**about, **ending})
     return drawn
 
 
@@ -432,20 +447,20 @@ def resolve(spec: AnySpec) -> Spec:
     return resolved
 
 
-def drawing(spec: AnySpec, tolerance: float | None = None) -> Drawing:
+def drawing(spec: AnySpec, tolerance: str | float | None = None) -> Drawing:
     """Return the outlines of the parts that can be cut or printed.
 
     Parameters
     ----------
     spec : Spec or path-like
         What to draw.
-    tolerance : float, optional
-        Largest distance of the outlines from the exact edges [m]; default: 5 um.
+    tolerance : str or float, optional
+        Largest distance of the outlines from the exact edges: a text with its unit, or a number [m]; default: 5 um.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If the family has nothing to cut.
+        If the family has nothing to cut, or the distance is not above zero.
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
 
@@ -457,9 +472,10 @@ def drawing(spec: AnySpec, tolerance: float | None = None) -> Drawing:
     ('cam', True)
     """
     from cfmkit.runs.exported_files import drawing_of
+    from cfmkit.runs.values_with_units import read_length
 
     spec = spec_of(spec)
-    return drawing_of(spec, family(spec.family), tolerance)
+    return drawing_of(spec, family(spec.family), read_length(tolerance, "tolerance"))
 
 
 def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:

@@ -64,6 +64,10 @@ class ExitCode(IntEnum):
     TERMINATED = 143
 
 
+class StoppedBySignal(BaseException):
+    """A signal asked the process to end; not an Exception, so that nothing swallows it."""
+
+
 class CfmError(Exception):
     """Base of every error that cfmkit raises on purpose."""
 
@@ -156,13 +160,19 @@ def code_of(error: BaseException) -> ExitCode:
     return ExitCode.IO if isinstance(error, OSError) else ExitCode.BUG
 
 
+def reason_of(error: Exception) -> str:
+    """Return why the system could not do something; names of files keep their capitals."""
+    reason = getattr(error, "strerror", None)
+    return reason.lower() if reason else str(error)
+
+
 def sentence_of(error: BaseException) -> str:
     """Return what an exception says to a user, in one line."""
     if isinstance(error, CfmError):
         return " ".join(str(error).split())
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
-        return f"{place}{(error.strerror or str(error)).lower()}"
+        return f"{place}{reason_of(error)}"
     reported = " ".join(f"{type(error).__name__}: {error}".split())
     return f"this is a bug in cfmkit: {reported}; -vv shows where"
 

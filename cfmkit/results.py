@@ -40,6 +40,26 @@ OVERWRITTEN = "overwritten"
 """Finding that a design replaces a value that was stated."""
 
 
+ROUND_OFF = 1e-12
+"""Error of a sum of efforts by formulas, in parts of the sum of their sizes: some thousand roundings, as places and
+lengths that they are computed from are differences themselves."""
+
+
+def round_off(parts: FloatArray) -> float:
+    """Return the error of the sum of efforts (parts, n), the largest of all n places: `ROUND_OFF` of their sizes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round_off(np.array([[4.0, 2.0], [-4.0, np.inf]]))
+    8e-12
+    """
+    import numpy as np
+
+    sizes = np.abs(parts).sum(axis=0)
+    return ROUND_OFF * float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+
+
 class Status(Enum):
     """How a solve ended."""
 
@@ -81,12 +101,13 @@ class Finding(ShortRepr):
 
     `name` is stable (scripts match it); `message` holds the numbers that decide
     and, where there is one, the cure. `cures` are changes of the specification that
-    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``.
+    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``; several that only
+    work together are a tuple.
     """
 
     name: str
     message: str
-    cures: tuple[str, ...] = ()
+    cures: tuple[str | tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -253,6 +274,13 @@ class Result:
         The nominal curve at every place of its way, where its motion turns back; it has one branch.
     ends : Curve, optional
         Points of the nominal curve beside its own: where windows end between two of these.
+    effort_error : float, optional
+        Numerical error of the nominal curve's effort [N or N m]: rounding of the sum of what springs and members do
+        where that is a formula (`ROUND_OFF`), the accuracy of the solver where it is solved for. Nothing is measured
+        relative to an effort that is not above it. Default: 1e-12 of the largest effort.
+    part_efforts : callable, optional
+        ``part_efforts(branch, places)``, the largest effort of one spring or member of the nominal curve at places of
+        its motion, (n,) each [m or rad; N or N m]: that of a part is the derivative of its energy by the motion.
     tables : mapping
         More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
     state : Any
@@ -276,6 +304,8 @@ class Result:
     closed: ClosedForm | None = None
     winding: WindingPath | None = None
     ends: Curve | None = None
+    effort_error: float | None = None
+    part_efforts: Callable[[str, FloatArray], FloatArray] | None = None
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None
 

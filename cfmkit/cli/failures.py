@@ -12,7 +12,7 @@ import typer
 
 from cfmkit import errors
 from cfmkit.cli.verb_result import Answer, document
-from cfmkit.errors import ExitCode, OutputError, SpecError, shortened
+from cfmkit.errors import ExitCode, OutputError, SpecError, StoppedBySignal, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,16 +23,19 @@ ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the option parser raises; typer does not name it itself."""
 
 
-class Stopped(BaseException):
-    """A signal asked the process to end; not an Exception, so that nothing swallows it.
+class Stopped(StoppedBySignal):
+    """A signal asked the command to end: its exit code, and what is said of what it has finished.
 
     Attributes
     ----------
     began : bool
         Whether the command has opened a journal, in which it keeps what it has finished; the same for all signals.
+    last : Stopped or None
+        The signal that came; libraries that are not written in Python make other exceptions of the one it raises.
     """
 
     began: ClassVar[bool] = False
+    last: ClassVar[Stopped | None] = None
 
     def __init__(self, number: int) -> None:
         """Keep the signal's number."""

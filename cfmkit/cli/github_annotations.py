@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import CfmError
+from cfmkit.errors import CfmError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -77,7 +77,7 @@ def command(kind: str, properties: Mapping[str, Any], message: str) -> str:
 
 
 def _escaped(text: str, more: str = "") -> str:
-    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    text = visible(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
     for char in more:
         text = text.replace(char, f"%{ord(char):02X}")
     return text

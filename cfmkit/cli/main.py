@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +25,7 @@ from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from contextlib import AbstractContextManager
     from types import FrameType
 
 TEXT = (
@@ -76,9 +78,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     streams.prepare()
     try:
-        return int(_run(given))
-    finally:
-        streams.settle()
+        try:
+            return int(_run(given))
+        finally:
+            streams.settle()
+    except Stopped as stop:  # while it was told how the command has ended
+        return int(stop.exit_code)
 
 
 def _run(given: list[str]) -> ExitCode:
@@ -92,7 +97,7 @@ def _run(given: list[str]) -> ExitCode:
     except Stopped as stop:
         return fail(stop, terminal)
     except Exception as error:
-        return _failed(error, terminal)
+        return _failed(Stopped.last or error, terminal)
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
@@ -113,7 +118,8 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
         _tell_more()
     Stopped.began = False
     try:
-        answer = call.run(call.options, wishes)
+        with _locks_of(call.options):
+            answer = call.run(call.options, wishes)
     except Stopped as stop:
         if hasattr(call.options, "fresh") and not Stopped.began:
             stop.nothing_begun()
@@ -127,6 +133,15 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     return answer.exit_code
 
 
+def _locks_of(options: Any) -> AbstractContextManager[None]:
+    """Return the context of a verb: in it folders are locked, unless an option says otherwise."""
+    if not getattr(options, "no_lock", False):
+        return nullcontext()
+    from cfmkit.store.lock import without_locks
+
+    return without_locks()
+
+
 def _tell_more() -> None:
     """Let the parts of the program say on standard error what they do beside their work: where they keep files."""
     import logging
@@ -137,7 +152,7 @@ def _tell_more() -> None:
     log.setLevel(logging.INFO)
 
 
-def _failed(error: Exception, terminal: Terminal) -> ExitCode:
+def _failed(error: BaseException, terminal: Terminal) -> ExitCode:
     """Tell of an error; a signal may arrive while that is done."""
     try:
         return fail(error, terminal)
@@ -152,8 +167,10 @@ def _listen() -> None:
 
     def stop(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
-        raise Stopped(number)
+        Stopped.last = Stopped(number)
+        raise Stopped.last
 
+    Stopped.last = None
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, stop)

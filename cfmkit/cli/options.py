@@ -6,14 +6,13 @@ An option or argument is a field of the dataclass that a verb's `run` takes: its
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from cfmkit.cli import shell_completion
-from cfmkit.errors import QuantityError, UsageError
+from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,6 +79,10 @@ NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
 Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Processes; default: all cores.")]
 Timeout = Annotated[
     float | None, option("--timeout-per-point", metavar="S", text="Stop the computation of a point after S seconds.")
+]
+NoLock = Annotated[
+    bool,
+    flag("--no-lock", text="Do not lock the output folder: no other run may use it (for file systems without locks)."),
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse no results of an earlier run.")]
 Tables = Annotated[
@@ -178,6 +181,7 @@ class OneSpec(Changing):
         str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", shell_completion.specs)
     ]
     out: Out = None
+    no_lock: NoLock = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,6 +252,24 @@ class Measuring(Common):
         ),
     ] = None
 
+    cycles: Annotated[
+        str | None,
+        option(
+            "--cycles",
+            metavar="FIRST:LAST",
+            text="Cycles to use, e.g. 2:5, or 3 for one; default: the complete ones of full travel.",
+        ),
+    ] = None
+    group: Annotated[
+        str | None,
+        option(
+            "--group",
+            metavar="COLUMN",
+            text="Column that tells specimens apart; 'Specimen=2' chooses one, 'table=2' one of several tables, 'none' "
+            "takes all rows as one specimen.",
+        ),
+    ] = None
+
     @property
     def flips(self) -> tuple[str, ...]:
         """What ``--flip`` names."""
@@ -267,7 +289,7 @@ def read_measured(name: str, options: Measuring) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
     from cfmkit.experiment.curves_and_metrics_of_recording import read_measured as read
 
-    return read(name, options.units, options.tare, options.zero, options.flips)
+    return read(name, options.units, options.tare, options.zero, options.flips, options.cycles, options.group)
 
 
 def refuse_without_data(options: Measuring) -> None:
@@ -278,7 +300,7 @@ def refuse_without_data(options: Measuring) -> None:
     cfmkit.errors.UsageError
         Naming the first of them.
     """
-    for name in ("units", "tare", "zero", "flip"):
+    for name in ("units", "tare", "zero", "flip", "cycles", "group"):
         if getattr(options, name) is not None:
             raise UsageError(f"--{name} applies to a measurement: name its file with --data")
 
@@ -291,13 +313,9 @@ def seconds(text: str) -> float:
     cfmkit.errors.UsageError
         If it is no time above zero.
     """
-    from cfmkit.specs.units import read_quantity
+    from cfmkit.families.run_control import read_time
 
-    spaced = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", text.strip())
-    try:
-        value = float(spaced) if re.fullmatch(r"[\d.]+", spaced) else read_quantity(spaced, "time")
-    except (QuantityError, ValueError) as error:
-        raise UsageError(f"--time-budget: {error}") from None
+    value = read_time(text, "--time-budget") or 0.0
     if not 0.0 < value < 1e6:
         raise UsageError(f"--time-budget: {text} is not allowed: must be > 0")
     return value

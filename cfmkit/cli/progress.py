@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections import deque
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,10 @@ RECENT = 30.0
 """Seconds over which the rate is taken: three lines of a log, so that it follows points that get slower and does not
 jump with each."""
 
+FIRST_RESULTS = 0.2
+"""Share of the time up to the first result within which others are first results of other processes, too: they say how
+long processes take to start and to compile, and not how long a point takes."""
+
 
 class StudyProgress:
     """A monitor of a study that tells the user, and listens to Ctrl-C.
@@ -50,7 +55,8 @@ class StudyProgress:
         self.stopped = False
         self._all = self._done = self._failed = self._reused = 0
         self._start = self._reported = time.monotonic()
-        self._marks: list[tuple[float, int]] = [(self._start, 0)]
+        self._first: float | None = None
+        self._marks: deque[tuple[float, int]] = deque()
 
     def total(self, points: int) -> None:
         """Take how many points there are; a study that draws points again adds them to those that are done."""
@@ -62,6 +68,8 @@ class StudyProgress:
         self._failed += failed
         self._reused += points if reused else 0
         now = time.monotonic()
+        if not reused:
+            self._note(now)
         if self._tells and now - self._reported >= (LINE_EVERY if self._bar is None else DRAW_EVERY):
             self._reported = now
             self._tell(now)
@@ -79,17 +87,35 @@ class StudyProgress:
 
     def _sentence(self, now: float) -> str:
         rate = self._rate(now)
-        left = f", {duration((self._all - self._done) / rate)} left" if rate else ""
-        return f"{rate:.3g}/s{left}, {self._failed} failed"
+        left = f"{rate:.3g}/s, {duration((self._all - self._done) / rate)} left, " if rate else ""
+        return f"{left}{self._failed} failed"
+
+    def _note(self, now: float) -> None:
+        """Remember how many points were computed by now; what came from the journal does not count."""
+        if self._first is None:
+            self._first = now
+        if now - self._first <= FIRST_RESULTS * (self._first - self._start):
+            self._marks.clear()
+        elif now - self._marks[-1][0] < DRAW_EVERY:
+            return
+        self._marks.append((now, self._done - self._reused))
+        while len(self._marks) > 2 and now - self._marks[1][0] > RECENT:
+            self._marks.popleft()
 
     def _rate(self, now: float) -> float:
-        """Return points a second over the last while; what came from the journal does not count."""
+        """Return points a second over the last while; 0 as long as nothing is known but first results.
+
+        Processes that work in step finish in bursts: until there are several of them, the mean since the start, which
+        can only be too small, says more than the beginning of a burst.
+        """
+        if not self._marks:
+            return 0.0
         fresh = self._done - self._reused
-        self._marks.append((now, fresh))
-        while len(self._marks) > 2 and now - self._marks[0][0] > RECENT:
-            self._marks.pop(0)
         since, before = self._marks[0]
-        return (fresh - before) / (now - since) if now > since else 0.0
+        if fresh == before:
+            return 0.0
+        recent, mean = (fresh - before) / (now - since), fresh / (now - self._start)
+        return recent if now - since >= RECENT else max(recent, mean)
 
     def interrupt(self, number: int, _frame: FrameType | None) -> None:
         """Take Ctrl-C: the first time as a wish to stop soon, the second time at once."""

@@ -156,12 +156,13 @@ def _warnings(outcome: FinishedRun) -> Iterator[Block]:
             yield whole_line(Span(" " * MARGIN + _cure(outcome, cure)))
 
 
-def _cure(outcome: FinishedRun, cure: str) -> str:
+def _cure(outcome: FinishedRun, cure: str | tuple[str, ...]) -> str:
     """Return the command line that applies a cure to the spec of a run, changed as it was."""
-    verb = "design" if cure.startswith("design.") else outcome.verb.name
-    path = cure.partition("=")[0]
-    kept = [change for change in outcome.changes if change.partition("=")[0].strip() != path]
-    settings = [word for change in (*kept, cure) for word in ("--set", change)]
+    changes = (cure,) if isinstance(cure, str) else cure
+    verb = "design" if changes[0].startswith("design.") else outcome.verb.name
+    paths = [change.partition("=")[0] for change in changes]
+    kept = [change for change in outcome.changes if change.partition("=")[0].strip() not in paths]
+    settings = [word for change in (*kept, *changes) for word in ("--set", change)]
     folder = ["-o", outcome.folder] if outcome.source == STDIN else []
     return command_line("cfmkit", verb, outcome.source, *settings, *folder)
 

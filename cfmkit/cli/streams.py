@@ -6,7 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import OutputError, visible
+from cfmkit.errors import OutputError, reason_of, visible
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -35,7 +35,7 @@ def put(text: str) -> None:
         silence(sys.stdout)
     except OSError as error:
         silence(sys.stdout)
-        raise OutputError(f"cannot write standard output: {(error.strerror or str(error)).lower()}") from None
+        raise OutputError(f"cannot write standard output: {reason_of(error)}") from None
 
 
 def complain(text: str) -> None:

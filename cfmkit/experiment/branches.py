@@ -8,13 +8,15 @@ counted and left out, all but the first and the last of each pause.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.zeros_and_signs import words_of
 
 if TYPE_CHECKING:
@@ -70,17 +72,32 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Strokes:
-    """All strokes of a recording, and how many of its points belong to pauses."""
+    """All strokes of a recording, how many of its points belong to pauses, and which cycles the user chose."""
 
     strokes: tuple[Stroke, ...]
     pauses: int
+    chosen: Cycles | None = None
 
-    @property
-    def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
+    @cached_property
+    def complete(self) -> tuple[tuple[Stroke, Stroke], ...]:
         """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
         found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
         pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2 and covered((pair[0], pair[1])) >= SHORT]
         return tuple([pair for pair in pairs if covered(pair) >= WHOLE] or pairs)
+
+    @cached_property
+    def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
+        """The complete cycles that are measured: those that the user chose, else those of full travel."""
+        if self.chosen is not None:
+            return tuple(pair for pair in self.complete if self.chosen.first <= pair[0].cycle <= self.chosen.last)
+        full = WHOLE * max((travel_of(pair) for pair in self.complete), default=0.0)
+        return tuple(pair for pair in self.complete if travel_of(pair) >= full)
+
+    @property
+    def shorter(self) -> tuple[tuple[Stroke, Stroke], ...]:
+        """The complete cycles that are left out because others go farther, as cycles that seat the parts do."""
+        measured_ones = {pair[0].cycle for pair in self.cycles}
+        return tuple(pair for pair in self.complete if not (self.chosen or pair[0].cycle in measured_ones))
 
     @property
     def measured(self) -> tuple[tuple[Stroke, ...], ...]:
@@ -90,6 +107,58 @@ class Strokes:
     @property
     def _numbers(self) -> list[int]:
         return sorted({item.cycle for item in self.strokes})
+
+
+def travel_of(cycle: tuple[Stroke, Stroke]) -> float:
+    """Return what the longer stroke of a cycle covers [m or rad]."""
+    return max(stroke.way for stroke in cycle)
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Cycles that the user chose, by their first and last number."""
+
+    first: int
+    last: int
+
+    @property
+    def text(self) -> str:
+        """As it was stated: ``2:5``."""
+        return f"{self.first}:{self.last}"
+
+
+def read_cycles(text: str | None) -> Cycles | None:
+    """Return what ``--cycles`` says: ``2:5`` or ``3``; None for None.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is malformed.
+    """
+    if text is None:
+        return None
+    match = re.fullmatch(r"\s*([0-9]{1,9})\s*(?::\s*([0-9]{1,9})\s*)?", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2] or match[1]):
+        raise UsageError(f"--cycles: {text!r} is not 'first:last'; write e.g. --cycles 2:5, or --cycles 3 for one")
+    return Cycles(int(match[1]), int(match[2] or match[1]))
+
+
+def choose(strokes: Strokes, cycles: Cycles | None, name: str) -> Strokes:
+    """Return strokes of which some cycles are measured.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If one of them is not there, or not complete.
+    """
+    if cycles is None:
+        return strokes
+    there = [pair[0].cycle for pair in strokes.complete]
+    missing = [number for number in (cycles.first, cycles.last) if number not in there]
+    if missing:
+        said = f"cycles {there[0]} to {there[-1]}" if len(there) > 1 else f"cycle {there[0]}" if there else "no cycle"
+        raise DataError(f"{name}: --cycles {cycles.text}: cycle {missing[0]} is not there; {said} can be measured")
+    return replace(strokes, chosen=cycles)
 
 
 def covered(cycle: tuple[Stroke, Stroke]) -> float:
@@ -194,7 +263,7 @@ def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[S
 
 def _whole_cycles(strokes: tuple[Stroke, ...]) -> int:
     """Return how many complete cycles some strokes hold."""
-    return sum(covered(cycle) >= WHOLE for cycle in Strokes(strokes, 0).cycles)
+    return sum(covered(cycle) >= WHOLE for cycle in Strokes(strokes, 0).complete)
 
 
 def jitter_of(motion: FloatArray) -> float:

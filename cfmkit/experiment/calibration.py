@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import CfmError, SolutionError, UsageError
-from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
+from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare, model_at
 from cfmkit.experiment.parameters_to_fit import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.run_control import Run
@@ -49,8 +49,16 @@ BY_CHANCE = 1e-3
 SWING = 0.2
 """Swings of the residuals that are smaller than this part of their noise are left alone, however certain."""
 
+UNKNOWN = 1.0
+"""Parameters whose half interval exceeds this part of their size cannot be determined."""
+
+ALIKE = 1e-7
+"""Branches of a model that differ by less than this part of the force are one: it has no losses."""
+
 TIED = 0.999
 """Parameters more correlated than this are reported as poorly distinguished."""
+
+CANNOT = "cannot be determined from this recording"
 
 FINDINGS = {
     "weakly_identified": "the data determine a fitted value poorly",
@@ -127,6 +135,8 @@ def calibrate(
         If the start has no solution, or the data do not determine the parameters, which are named.
     """
     before = _compared(spec, source, parameters, window)
+    if _has_no_loss(spec, before, parameters):
+        before = before.of_the_mean()
     problem = _problem(spec, before, parameters)
     _check(problem, problem.start, parameters)
     fit = solve(problem, loss)
@@ -134,7 +144,8 @@ def calibrate(
     fitted = _with_values(spec, parameters, fit.values)
     result = _analysed(fitted)
     zeros = _zeros(parameters, fit.values)
-    after = Comparison(tuple(item.less(zeros) for item in before.samples), before.window, result.curve)
+    samples, branches = (tuple(item.less(zeros) for item in measured) for measured in (before.samples, before.branches))
+    after = Comparison(samples, before.window, result.curve, before.holes, branches)
     warnings = (*_warnings(parameters, fit), *_misfit(parameters, fit, after))
     return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
 
@@ -156,6 +167,32 @@ def _compared(
             f"--bounds: within the bounds of {shift.path} there is no travel that the model covers for every value"
         )
     return compare(result, source, Window(low, high))
+
+
+def _has_no_loss(spec: Spec, before: Comparison, parameters: Sequence[FitParameter]) -> bool:
+    """Return whether the model has one force at each place where the measurement has two, whatever is fitted.
+
+    Then the branches say together where the model must be, which is between them, and their gap what it leaves out.
+    """
+    if before.loop is None:
+        return False
+    branches = {item.model_branch for item in before.samples}
+    if len(branches) == 1:
+        return True
+    trials = [spec, *(_with_values(spec, [item], np.array([item.start + _step(item)])) for item in parameters)]
+    places = np.linspace(before.window.lo, before.window.hi, 65)[1:-1]
+    for trial in trials:
+        curve = before.curve if trial is spec else _analysed(trial).curve
+        up, down = (model_at(curve, branch, places) for branch in sorted(branches))
+        if not np.nanmax(np.abs(up - down)) <= ALIKE * np.nanmax(np.abs(up)):
+            return False
+    return True
+
+
+def _step(item: FitParameter) -> float:
+    """Return a small change of a parameter inside its bounds."""
+    step = 1e-3 * item.size
+    return step if item.start + step <= item.high else -min(step, item.start - item.low)
 
 
 def _is_shift(item: FitParameter) -> bool:
@@ -188,7 +225,8 @@ def _with_values(spec: Spec, parameters: Sequence[FitParameter], values: FloatAr
 def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
     columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).T
     level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
-    nothing = np.full(sum(len(item.motion) for item in before.samples), np.nan)
+    weight = np.concatenate([item.weight for item in before.samples])
+    nothing, root = np.full(len(weight), np.nan), np.sqrt(weight)
 
     def residuals(values: FloatArray) -> FloatArray:
         try:
@@ -196,9 +234,11 @@ def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter])
         except CfmError:
             return nothing  # the solver then takes a shorter step
         zeros = _zeros(parameters, values)
-        return np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
+        errors: FloatArray = root * np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
+        return errors
 
-    return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level)
+    effect = float(np.mean(weight**2) / np.mean(weight) ** 2)
+    return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level, effect)
 
 
 def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitParameter]) -> None:
@@ -227,6 +267,8 @@ def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Fin
     for k, item in enumerate(parameters):
         if fit.at_bound[k]:
             found.append(Finding("at_bound", f"{item.path} is at its bound: the data require a value beyond"))
+        elif half[k] > UNKNOWN * item.size:
+            found.append(Finding("weakly_identified", f"{item.path} {CANNOT}: fit fewer values, or give it with --set"))
         elif half[k] > POOR * item.size:
             found.append(
                 Finding(
@@ -275,7 +317,8 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
     for k, item in enumerate(calibration.parameters):
         value = float(calibration.fit.values[k])
         numbers = {
-            "value": value, "low_95": value - float(half[k]), "high_95": value + float(half[k]),
+            "value": value, "low_95": max(value - float(half[k]), item.low),
+            "high_95": min(value + float(half[k]), item.high),
             "standard_deviation": float(spread[k]), "start": item.start,
         }  # fmt: skip
         shown = {name: float(to_border(number, item.dimension)) for name, number in numbers.items()}
@@ -283,4 +326,4 @@ def table(calibration: Calibration) -> list[dict[str, Any]]:
     return records
 
 
-__all__ = ["FINDINGS", "Calibration", "Samples", "calibrate", "resolved", "table"]
+__all__ = ["CANNOT", "FINDINGS", "UNKNOWN", "Calibration", "Samples", "calibrate", "resolved", "table"]

@@ -11,21 +11,28 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
+from cfmkit.experiment.coverage import emptied, holes_of, large_holes
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
+from cfmkit.experiment.loop_area_and_repeatability import loop_area
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.curve_differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.numerics.holes_in_samples import holes_between, weights
+from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
+    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.metrics.curve_differences import Measure
-    from cfmkit.results import Quantity, Result
+    from cfmkit.results import Result
 
 PLACES = 257
 """Places of a window at which the branches of a loop are laid beside each other."""
@@ -48,6 +55,10 @@ class Samples:
         As measured [m, N] or [rad, N m].
     elapsed : (n,) array
         Which part of the recording had passed, 0 to 1.
+    weight : (n,) array
+        The way that each stands for, over that of all on average.
+    cycle : (n,) array of int
+        Which cycle each is of, counted from 0.
     """
 
     branch: str
@@ -55,6 +66,8 @@ class Samples:
     motion: FloatArray
     effort: FloatArray
     elapsed: FloatArray
+    weight: FloatArray
+    cycle: NDArray[np.intp]
 
     def less(self, zeros: Zeros) -> Samples:
         """Return the samples with the errors of the zeros taken out."""
@@ -95,16 +108,22 @@ class Comparison(ShortRepr):
         Where they are compared.
     curve : Curve
         Of the model.
+    holes : tuple of UnrecordedInterval
+        Those of the recording in the window that are too large for numbers over it.
+    branches : tuple of Samples
+        The branches as measured, where the samples are their mean; else empty.
     """
 
     samples: tuple[Samples, ...]
     window: Window
     curve: Curve
+    holes: tuple[UnrecordedInterval, ...] = ()
+    branches: tuple[Samples, ...] = ()
 
     @property
     def loop(self) -> MeasuredLoop | None:
         """Both measured branches at even places of the window; None where one way only was measured."""
-        found = {item.branch: item for item in self.samples}
+        found = {item.branch: item for item in self.branches or self.samples}
         if set(found) != {LOAD, UNLOAD}:
             return None
         places = np.linspace(self.window.lo, self.window.hi, PLACES)
@@ -118,19 +137,69 @@ class Comparison(ShortRepr):
         if module is None or loop is None:
             return {}
         causes: Mapping[str, Quantity] = import_module(module).attribute(result, loop)
-        return causes
+        return emptied(causes, self.holes, self.curve.kind)
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean error per branch, and over all, by name, SI."""
         gap = "the model has no equilibrium at some of the points"
-        each = {item.branch: Difference(item.errors(self.curve), gap) for item in self.samples}
-        return summarize(each, _ERRORS, self.curve.kind)
+        each = {item.branch: Difference(item.errors(self.curve), gap, item.weight) for item in self.samples}
+        return emptied(summarize(each, _ERRORS, self.curve.kind), self.holes, self.curve.kind)
+
+    def loss(self) -> dict[str, Quantity]:
+        """Return what a measured cycle loses, and half the mean gap between its branches; nothing without a loop."""
+        loop = self.loop
+        if loop is None:
+            return {}
+        area = loop_area(loop.places, loop.up, loop.down)
+        kind, width = self.curve.kind, self.window.hi - self.window.lo
+        found = {
+            "data_loss": Quantity(area, "energy", "area between the measured branches over the window"),
+            "data_half_gap": Quantity(
+                0.5 * area / width, kind, f"half the mean difference of the measured {kind} on the way up and back"
+            ),
+        }
+        return emptied(found, self.holes, kind)
+
+    def of_the_mean(self) -> Comparison:
+        """Return the comparison of a model without losses: with the mean of the branches, cycle by cycle."""
+        up, down = (next(item for item in self.samples if item.branch == name) for name in (LOAD, UNLOAD))
+        parts = [_mean_of(up, down, cycle) for cycle in sorted(set(up.cycle) & set(down.cycle))]
+        motion, effort, passed = (
+            np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True)
+        )
+        cycles = np.repeat([cycle for *_, cycle in parts], [len(part[0]) for part in parts])
+        mean = Samples(MEAN, up.model_branch, motion, effort, passed, np.ones(len(motion)), cycles)
+        return replace(self, samples=(mean,), branches=self.samples)
 
 
+MEAN = "mean"
+"""Name of the samples that are the mean of both branches."""
+
+
+def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Return places, mean effort and time of the branches of one cycle, where both were recorded."""
+    one, other = ({name: getattr(item, name)[item.cycle == cycle] for name in ("motion", "effort", "elapsed")}
+                  for item in (up, down))  # fmt: skip
+    one, other = ({name: values[np.argsort(part["motion"])] for name, values in part.items()} for part in (one, other))
+    low, high = (way(part["motion"][end] for part in (one, other)) for way, end in ((max, 0), (min, -1)))
+    places = np.linspace(low, high, min(len(one["motion"]), len(other["motion"])))
+    known = np.ones(len(places), dtype=bool)
+    for part in (one, other):
+        for start, stop in holes_between(part["motion"], low, high):
+            known &= (places <= start) | (places >= stop)
+    places = places[known]
+    effort, passed = (
+        0.5 * sum(np.interp(places, part["motion"], part[name]) for part in (one, other))
+        for name in ("effort", "elapsed")
+    )
+    return places, effort, passed, cycle
+
+
+_OVER = "over the measured travel in the window"
 _ERRORS: dict[str, Measure] = {
-    "data_rmse": (rms, "root mean square of (model - measured) {}, at the measured points in the window"),
+    "data_rmse": (rms, f"root mean square of (model - measured) {{}}, {_OVER}"),
     "data_error_max": (largest, "(model - measured) {} where it is largest in magnitude, in the window"),
-    "data_offset": (mean, "mean of (model - measured) {}, at the measured points in the window"),
+    "data_offset": (mean, f"mean of (model - measured) {{}}, {_OVER}"),
 }
 """What is reported of the errors: name -> (function, definition)."""
 
@@ -160,7 +229,9 @@ def compare(result: Result, source: MeasuredCurves, window: Window | None = None
     samples = tuple(_samples(source, branch, mine, window) for branch, mine in pairs.items())
     if not all(len(item.motion) >= 2 for item in samples):
         raise DataError(f"{name}: has fewer than 2 points in {span_text(window.lo, window.hi, curve.kind)} on a branch")
-    return Comparison(samples, window, curve)
+    size = float(np.concatenate([item.weight for item in samples]).mean())
+    samples = tuple(replace(item, weight=item.weight / size) for item in samples)
+    return Comparison(samples, window, curve, large_holes(holes_of(source.raw, window), window))
 
 
 def model_branch(curve: Curve, measured: str) -> str:
@@ -222,12 +293,15 @@ def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> 
     times = np.split(elapsed(source, branch), np.cumsum([len(inside) for inside in keep])[:-1])
     size = max(-(-sum(int(inside.sum()) for inside in keep) // MOST), 1)
     # Cycle by cycle: the end of one and the start of the next have nothing to do with each other.
-    grouped = [
-        _grouped((np.clip(part.motion[inside], window.lo, window.hi), part.effort[inside], passed[inside]), size)
-        for part, inside, passed in zip(parts, keep, times, strict=True)
-    ]
-    motion, effort, passed = (np.concatenate(columns) for columns in zip(*grouped, strict=True))
-    return Samples(branch, mine, motion, effort, passed)
+    grouped = []
+    for number, (part, inside, passed) in enumerate(zip(parts, keep, times, strict=True)):
+        way = 1 if part.motion[-1] >= part.motion[0] else -1
+        stands_for = weights(part.motion[inside][::way])[::way]
+        motion = np.clip(part.motion[inside], window.lo, window.hi)
+        columns = _grouped((motion, part.effort[inside], passed[inside], stands_for), size)
+        grouped.append((*columns, np.full(len(columns[0]), number)))
+    motion, effort, passed, stands_for, cycle = (np.concatenate(columns) for columns in zip(*grouped, strict=True))
+    return Samples(branch, mine, motion, effort, passed, stands_for, cycle)
 
 
 def _grouped(columns: Sequence[FloatArray], size: int) -> Sequence[FloatArray]:

@@ -19,19 +19,31 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.curves import Column, Curve
+from cfmkit.curves import Column, Curve, Kind
 from cfmkit.errors import DataError, UsageError
-from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
+from cfmkit.experiment.branches import LOAD, UNLOAD, Cycles, Stroke, Strokes, choose, read_cycles, split
+from cfmkit.experiment.coverage import (
+    UnrecordedInterval,
+    coverage,
+    emptied,
+    hole_finding,
+    holes_of,
+    large_holes,
+    least,
+    number_of,
+    of_cycle,
+)  # fmt: skip
+from cfmkit.experiment.findings import FINDINGS, passages_left_out, spikes_left_out, warnings_of
 from cfmkit.experiment.loop_area_and_repeatability import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversal_transitions import settled
 from cfmkit.experiment.zeros_and_signs import corrected
-from cfmkit.metrics import MeasuringFrame, Window, measure
+from cfmkit.metrics import Definition, MeasuringFrame, Window, measure, metrics_by_name
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
-from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     import os
@@ -41,25 +53,12 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
-    from cfmkit.experiment.reversal_transitions import Settled
 
 LEFT_OUT = ("reversals", "spikes")
 """What verbs leave out of a recording unless it is to count as recorded."""
 
 CYCLES_PER_STROKE = 60.0
 """Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
-
-FINDINGS = {
-    "one_branch": "the recording has no return branch: there is no loop",
-    "unfinished_cycle": "strokes that belong to no complete cycle are left out",
-    "pauses": "points at which the machine stood are left out",
-    "spikes": "points far off their neighbours are left out",
-    "reversals": "points next to reversals, where the force passes from one branch to the other, are left out",
-    "window_at_reversal": "the window reaches into points that are left out next to reversals: it was shortened",
-    "not_filtered": "there are too few points for the filter",
-    "negative_force": "the mean force is negative: the sign of the sensor may be reversed",
-    "negative_loop": "the mechanism would deliver energy in every cycle: a sign may be reversed",
-}
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,6 +77,8 @@ class MeasuredCurves(ShortRepr):
         The same points with filtered forces; empty without a filter.
     reached : Window
         What every branch reached before points next to reversals were left out.
+    passage : float
+        Longest way next to a reversal that was left out [m or rad].
     low_pass : LowPass or None
         The filter.
     warnings : tuple of Finding
@@ -88,6 +89,7 @@ class MeasuredCurves(ShortRepr):
     strokes: Strokes
     raw: tuple[Curve, ...]
     reached: Window
+    passage: float = 0.0
     filtered: tuple[Curve, ...] = ()
     low_pass: LowPass | None = None
     warnings: tuple[Finding, ...] = ()
@@ -102,6 +104,7 @@ def measured(
     recording: Recording,
     low_pass: LowPass | Literal["default"] | None = "default",
     leave_out: Collection[str] = ("reversals",),
+    cycles: Cycles | None = None,
 ) -> MeasuredCurves:
     """Return a recording as raw and filtered curves.
 
@@ -115,35 +118,37 @@ def measured(
     leave_out : collection of str
         ``"reversals"`` for the points next to them at which the force passes between the branches,
         ``"spikes"`` for points far off their neighbours.
+    cycles : Cycles, optional
+        Which are measured; default: the complete ones of full travel.
 
     Raises
     ------
     cfmkit.errors.DataError
-        If there is no stroke in the recording, or a filter that was named cannot be used.
+        If there is no stroke in the recording, a cycle that was chosen, or a filter that was named cannot be used.
     cfmkit.errors.UsageError
         If another word stands for the filter, or for what is left out.
     """
     _check_words(low_pass, leave_out)
-    strokes, reached, left_out = _strokes(recording, leave_out)
-    cycles = strokes.measured
-    warnings = (*_warnings(recording, strokes), *left_out)
+    strokes, reached, passage, left_out = _strokes(recording, leave_out, cycles)
+    each = strokes.measured
+    warnings = (*warnings_of(recording, strokes), *left_out)
     chosen = _default(recording) if low_pass == "default" else low_pass
-    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
+    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in each)
     if turned_loop(raw):
         reported = (
             f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would deliver energy"
         )
         warnings = (*warnings, Finding("negative_loop", f"{reported}: is the sign of a column reversed?"))
-    plain = MeasuredCurves(recording, strokes, raw, reached=reached, warnings=warnings)
+    plain = MeasuredCurves(recording, strokes, raw, reached, passage, warnings=warnings)
     if chosen is None:
         return plain
     try:
-        smooth = _smooth(recording, [stroke for cycle in cycles for stroke in cycle], chosen)
+        smooth = _smooth(recording, [stroke for cycle in each for stroke in cycle], chosen)
     except DataError as problem:
         if low_pass != "default":
             raise DataError(f"{recording.name}: {problem}") from None
         return replace(plain, warnings=(*warnings, Finding("not_filtered", str(problem))))
-    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in cycles)
+    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in each)
     return replace(plain, filtered=filtered, low_pass=chosen)
 
 
@@ -163,6 +168,8 @@ def read_measured(
     tare: str | float | None = None,
     zero: str | float | None = None,
     flip: Collection[str] = (),
+    cycles: str | None = None,
+    group: str | None = None,
 ) -> MeasuredCurves:
     """Return the raw curves in a lab file, spikes and passages at reversals left out.
 
@@ -174,20 +181,27 @@ def read_measured(
         Likewise.
     tare, zero, flip
         As for `cfmkit.experiment.zeros_and_signs.corrected`.
+    cycles : str, optional
+        Which are measured: ``"2:5"``.
+    group : str, optional
+        Which specimen of several, as ``"Specimen=2"``.
     """
-    recording = corrected(read_recording(path, units), tare, zero, flip)
-    return measured(recording, None, LEFT_OUT)
+    chosen = read_cycles(cycles)
+    recording = corrected(read_recording(path, units, group), tare, zero, flip)
+    return measured(recording, None, LEFT_OUT, chosen)
 
 
-def _strokes(recording: Recording, leave_out: Collection[str]) -> tuple[Strokes, Window, tuple[Finding, ...]]:
-    """Return what counts of each stroke, what all branches reached, and what is said of the points left out."""
+def _strokes(
+    recording: Recording, leave_out: Collection[str], cycles: Cycles | None
+) -> tuple[Strokes, Window, float, tuple[Finding, ...]]:
+    """Return what counts of each stroke, what all branches reached, the longest passage, and what is said of both."""
     spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
-    strokes = _without(recording, spiky)
-    reached, reported = _reached(recording, strokes), _spikes_left_out(recording, spiky)
+    strokes = choose(_without(recording, spiky), cycles, recording.name)
+    reached, reported = _reached(recording, strokes), spikes_left_out(recording, spiky)
     if "reversals" not in leave_out:
-        return strokes, reached, reported
+        return strokes, reached, 0.0, reported
     found = settled(recording, strokes)
-    return found.strokes, reached, (*reported, *_passages_left_out(recording, found))
+    return found.strokes, reached, found.length, (*reported, *passages_left_out(recording, found))
 
 
 def _spiky(recording: Recording) -> NDArray[np.bool_]:
@@ -237,24 +251,6 @@ def _reached(recording: Recording, strokes: Strokes) -> Window:
         if id(stroke) in measured_ones:
             ends.append((float(points.min()), float(points.max())))
     return Window(max(low for low, _ in ends), min(high for _, high in ends))
-
-
-def _spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Finding, ...]:
-    """Return what is said of spikes."""
-    count = int(spiky.sum())
-    if not count:
-        return ()
-    return (Finding("spikes", f"{count} of {len(recording)} points are far from their neighbours and are omitted"),)
-
-
-def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:
-    """Return what is said of the points next to reversals."""
-    if not found.length:
-        return ()
-    length = format_short(found.length, recording.motion_dimension, 3)
-    points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
-    reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
-    return (Finding("reversals", reported),)
 
 
 def _default(recording: Recording) -> LowPass:
@@ -308,29 +304,6 @@ def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
     return passed
 
 
-def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
-    found = []
-    cycles = strokes.cycles
-    if not cycles:
-        only = strokes.measured[0][0].branch
-        found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
-    left = len(strokes.strokes) - sum(map(len, strokes.measured))
-    if cycles and covered(cycles[0]) < WHOLE:
-        reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
-        found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
-    if left:
-        found.append(
-            Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
-        )
-    if strokes.pauses:
-        reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
-        found.append(Finding("pauses", reported))
-    if float(recording.effort.mean()) < 0:
-        reported = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
-        found.append(Finding("negative_force", reported))
-    return tuple(found)
-
-
 @dataclass(frozen=True)
 class Measurement:
     """Numbers of a measured mechanism.
@@ -345,6 +318,8 @@ class Measurement:
         Where they hold.
     warnings : tuple of Finding
         What the user must know of the window.
+    holes : tuple of UnrecordedInterval
+        Those so large that what they are in has no value.
     """
 
     raw: Mapping[str, Quantity]
@@ -352,12 +327,21 @@ class Measurement:
     each: tuple[Mapping[str, Quantity], ...]
     window: Window
     warnings: tuple[Finding, ...] = ()
+    holes: tuple[UnrecordedInterval, ...] = ()
+
+    @property
+    def shortfall(self) -> str:
+        """Why some numbers have no value; "" where all have one."""
+        return next((item.message for item in self.warnings if item.name == "holes"), "") if self.holes else ""
 
 
 def numbers_of(
-    source: MeasuredCurves, frame: MeasuringFrame | None = None, window: Window | None = None
+    source: MeasuredCurves,
+    frame: MeasuringFrame | None = None,
+    window: Window | None = None,
+    largest_hole: float = LARGEST_HOLE,
 ) -> Measurement:
-    """Return the metrics of a measured mechanism, raw and filtered, and its repeatability.
+    """Return the metrics of a measured mechanism, raw and filtered, its coverage and its repeatability.
 
     Parameters
     ----------
@@ -367,6 +351,8 @@ def numbers_of(
         Target and so on.
     window : Window, optional
         Default: what every branch of every cycle covers.
+    largest_hole : float
+        Part of the window: a branch with a larger hole in it has no values.
 
     Raises
     ------
@@ -374,10 +360,33 @@ def numbers_of(
         If a branch does not cover the window.
     """
     window, warnings = _window(source, window)
-    each = tuple(measure(curve, frame or MeasuringFrame(), window) for curve in source.raw)
-    smooth = tuple(measure(curve, frame or MeasuringFrame(), window) for curve in source.filtered)
-    raw = _mean(each) | repeatability(source.raw, window)
-    return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings)
+    frame, kind = replace(frame or MeasuringFrame(), over_motion=True), source.recording.kind
+    holes = holes_of(source.raw, window)
+    large = large_holes(holes, window, largest_hole)
+    if large:
+        warnings = (
+            *warnings,
+            hole_finding(large, window, kind, f"; --window avoids {'it' if len(large) == 1 else 'them'}"),
+        )
+
+    def all_metrics(curves: Sequence[Curve]) -> tuple[Mapping[str, Quantity], ...]:
+        each = ((curve, measure(curve, frame, window, _over_motion(kind))) for curve in curves)
+        return tuple(emptied(metrics, of_cycle(large, curve), kind) for curve, metrics in each)
+
+    covered_by = tuple(coverage(curve, of_cycle(holes, curve), window) for curve in source.raw)
+    each = tuple({**metrics, **shares} for metrics, shares in zip(all_metrics(source.raw), covered_by, strict=True))
+    smooth = all_metrics(source.filtered)
+    repeated = emptied(repeatability(source.raw, window), large, kind)
+    raw = _mean(each) | least(covered_by) | repeated
+    return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings, large)
+
+
+def _over_motion(kind: Kind) -> tuple[Definition, ...]:
+    """Return mean and standard deviation as they are of a recording."""
+    own = {f"{kind}_mean": "mean {effort}", f"{kind}_sd": "standard deviation of the {effort}"}
+    known = metrics_by_name(kind)
+    how = "over the {motion} in the window, each sample weighted by the way that it stands for (trapezoids)"
+    return tuple(replace(known[name], definition=f"{words} {how}") for name, words in own.items())
 
 
 def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
@@ -387,7 +396,8 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
         common = common_window(source.raw)
     except DataError as problem:
         raise DataError(f"{name}: {problem}") from None
-    wanted = wanted or common
+    if wanted is None:
+        return common, _cut(source, common)
     slack = 1e-9 * (wanted.hi - wanted.lo)
     low, high = max(wanted.lo, common.lo), min(wanted.hi, common.hi)
     if wanted.lo >= common.lo - slack and wanted.hi <= common.hi + slack:
@@ -401,6 +411,29 @@ def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tupl
     reported = f"the window {span_text(wanted.lo, wanted.hi, kind)} touches a reversal"
     taken = f"the numbers hold over {span_text(low, high, kind)}, which every branch covers"
     return Window(low, high), (Finding("window_at_reversal", f"{reported}: {taken}"),)
+
+
+def _cut(source: MeasuredCurves, common: Window) -> tuple[Finding, ...]:
+    """Return what is said where one branch makes the window much shorter than the others would."""
+    kind = source.recording.kind
+    extents = {
+        (branch, number_of(curve)): (float(part.min()), float(part.max()))
+        for curve in source.raw
+        for branch in curve.branches
+        for part in [curve.on(branch).motion]
+    }
+    widest = min(low for low, _ in extents.values()), max(high for _, high in extents.values())
+    # Passages at reversals are left out of one branch or the other of every recording.
+    allowed = LARGEST_HOLE * (widest[1] - widest[0]) + source.passage
+    late, early = max(extents, key=lambda key: extents[key][0]), min(extents, key=lambda key: extents[key][1])
+    missing = {late: common.lo - widest[0], early: widest[1] - common.hi}
+    cut = [key for key, length in missing.items() if length > allowed]
+    if not cut:
+        return ()
+    (branch, number), (low, high) = cut[0], extents[cut[0]]
+    where = UnrecordedInterval(low, high, branch, number).text(kind)
+    reported = f"the window ends where the shortest branch does, {where}; others cover {span_text(*widest, kind)}"
+    return (Finding("window_cut", f"{reported}: choose with --window or --cycles"),)
 
 
 def common_window(curves: Sequence[Curve]) -> Window:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.experiment.comparison import model_at
+from cfmkit.numerics.holes_in_samples import is_hole_after
 from cfmkit.plots.axis_labels_and_headings import Heading, axis_label, write_heading
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.stacked_line_diagrams import MarkedRange
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
+    from cfmkit.experiment.coverage import UnrecordedInterval
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
@@ -48,7 +52,7 @@ def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     subject = "raw and filtered" if source.filtered else "raw"
     write_heading(figure, Heading(source.recording.name, f"measured {source.recording.kind}, {subject}"))
     upper, lower = axes_mm(figure, (17, 63, 138, 27.5)), axes_mm(figure, (17, 12, 138, 46))
-    thin = [thinned(curve) for curve in source.raw]
+    thin = [broken_at_holes(thinned(curve)) for curve in source.raw]
     plain = CurveLook(names=False, arrows=False)
     plot_curve([replace(curve, label={}) for curve in thin] if len(thin) > 1 else thin[0], upper, plain)
     upper.set_xlabel("")
@@ -56,11 +60,15 @@ def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     across = upper.get_xlim()
     for curve in thin:
         _draw_faint(curve, lower)
-    smooth = thinned(source.curve)
+    smooth = broken_at_holes(thinned(source.curve))
     limits = _range_in(source.raw, (window.lo, window.hi))
     motion = smooth.motion_dimension
     ends = tuple(_from_border(value, motion) for value in across)
-    plot_curve(replace(smooth, label={}), lower, CurveLook(window=((ends[0], ends[1]), limits)))
+    marked = tuple(
+        MarkedRange(low, high, "not recorded")
+        for low, high in sorted({(hole.low, hole.high) for hole in numbers.holes})
+    )
+    plot_curve(replace(smooth, label={}), lower, CurveLook(window=((ends[0], ends[1]), limits), regions=marked))
     _note_window(source, window, lower)
     return figure
 
@@ -69,6 +77,40 @@ def _from_border(value: float, dimension: str) -> float:
     from cfmkit.specs.units import from_border
 
     return float(from_border(value, dimension))
+
+
+def _named_holes(holes: Sequence[UnrecordedInterval]) -> dict[tuple[float, float], str]:
+    """Return the text at each hole: on which branch and in which cycle, where it is not on all of them."""
+    found: dict[tuple[float, float], list[UnrecordedInterval]] = {}
+    for hole in holes:
+        found.setdefault((hole.low, hole.high), []).append(hole)
+    alone = {ends: f"{here[0].branch}{f' of cycle {here[0].cycle}' if here[0].cycle else ''}"
+             for ends, here in found.items() if len(here) == 1}  # fmt: skip
+    return {ends: f"not recorded{f': {alone[ends]}' if ends in alone else ''}" for ends in found}
+
+
+def broken_at_holes(curve: Curve) -> Curve:
+    """Return a curve with a point without effort in each hole: its line ends there and begins again."""
+    places = [np.sort(curve.on(name).motion) for name in curve.branches]
+    after = [set(part[:-1][is_hole_after(part)].tolist()) for part in places]
+    breaks = []
+    for name, holes in zip(curve.branches, after, strict=True):
+        index = np.flatnonzero(curve.branch == name)
+        rising = curve.motion[index[-1]] >= curve.motion[index[0]]
+        inside = [k for k in index.tolist() if float(curve.motion[k]) in holes]
+        breaks += [k + 1 if rising else k for k in inside]
+    if not breaks:
+        return curve
+    at = np.array(sorted(breaks))
+    before = np.maximum(at - 1, 0)
+    return replace(
+        curve,
+        motion=np.insert(curve.motion, at, curve.motion[before]),
+        effort=np.insert(curve.effort, at, np.nan),
+        branch=np.insert(curve.branch, at, curve.branch[before]),
+        stable=np.insert(curve.stable, at, True),
+        extra={},
+    )
 
 
 def _draw_faint(curve: Curve, ax: Axes) -> None:
@@ -138,10 +180,15 @@ def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[st
     figure = new_figure()
     write_heading(figure, Heading(*heading))
     upper, lower = axes_mm(figure, (17, 41, 138, 49.5)), axes_mm(figure, (17, 12, 138, 24))
-    efforts = np.concatenate([item.effort for item in comparison.samples])
+    shown = comparison.branches or comparison.samples
+    efforts = np.concatenate([item.effort for item in shown])
     models = [comparison, *([before] if before else [])]
     values = [efforts, *(item.errors(one.curve) + item.effort for one in models for item in one.samples)]
-    labels = [label for item in comparison.samples for label in _draw_measured(item, comparison, upper)]
+    labels = [_draw_measured(item, comparison, upper, 0.25 - 0.12 * k) for k, item in enumerate(shown)]
+    if comparison.branches:
+        mean = _unbroken_runs(comparison.samples[0], comparison)
+        upper.plot(*mean.T, color=GREY, linewidth=0.8, dashes=(4, 2), zorder=2.5)
+        labels.append(Label("mean of the branches", GREY, mean, prefer=0.9))
     for one in models:
         labels += _draw_model(one, upper, dashed=one is before)
     _fit_limits(upper, np.concatenate(values), comparison)
@@ -158,10 +205,22 @@ def _in_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -
     return np.column_stack([to_border(motion, curve.motion_dimension), to_border(effort, curve.kind)])
 
 
-def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes) -> list[Label]:
-    points = _in_border(comparison, samples.motion, samples.effort)
+def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes, prefer: float) -> Label:
+    """Draw a measured branch, cycle by cycle; return its name."""
+    points = _unbroken_runs(samples, comparison)
     ax.plot(*points.T, color=GREY, linewidth=0.5, alpha=0.6, zorder=2, gid="no-obstacle")
-    return [Label("measured", GREY, points, prefer=0.25)] if samples is comparison.samples[0] else []
+    several = len(comparison.branches or comparison.samples) > 1
+    return Label(f"measured, {samples.branch}" if several else "measured", GREY, points, prefer=prefer)
+
+
+def _unbroken_runs(samples: Samples, comparison: Comparison, values: FloatArray | None = None) -> FloatArray:
+    """Return points of samples in border units, with a gap between cycles and in holes."""
+    points = _in_border(comparison, samples.motion, samples.effort if values is None else values)
+    breaks = np.flatnonzero(np.diff(samples.cycle) != 0) + 1
+    for start, stop in pairwise([0, *breaks.tolist(), len(points)]):
+        way = 1 if samples.motion[stop - 1] >= samples.motion[start] else -1
+        breaks = np.append(breaks, start + 1 + np.flatnonzero(is_hole_after(samples.motion[start:stop][::way])[::way]))
+    return np.insert(points, breaks.astype(int), np.nan, axis=0)
 
 
 def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
@@ -173,7 +232,8 @@ def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
         color = LINES[number % len(LINES)]
         ax.plot(*points.T, color=color, linewidth=0.9 if dashed else 1.4, linestyle="--" if dashed else "-", zorder=3)
         if not dashed:
-            labels.append(Label(f"model, {samples.model_branch}", color, points, prefer=0.7))
+            name = f"model, {samples.model_branch}" if len(comparison.samples) > 1 else "model"
+            labels.append(Label(name, color, points, prefer=0.7))
         elif number == 0:
             labels.append(Label("at the start of the fit", color, points, prefer=0.45))
     return labels
@@ -192,7 +252,7 @@ def _fit_limits(ax: Axes, values: FloatArray, comparison: Comparison) -> None:
 def _draw_errors(comparison: Comparison, ax: Axes) -> None:
     """Draw model less measurement, smoothed only by what the eye does."""
     for number, samples in enumerate(comparison.samples):
-        points = _in_border(comparison, samples.motion, samples.errors(comparison.curve))
+        points = _unbroken_runs(samples, comparison, samples.errors(comparison.curve))
         ax.plot(*points.T, color=LINES[number % len(LINES)], linewidth=0.6, alpha=0.8, zorder=3)
     ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
     curve = comparison.curve

@@ -13,11 +13,14 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column
-from cfmkit.experiment.calibration import table
+from cfmkit.experiment.calibration import CANNOT, UNKNOWN, table
+from cfmkit.experiment.coverage import hole_finding
 from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves, Measurement, numbers_of
 from cfmkit.experiment.zeros_and_signs import raw_zeros, words_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.metrics.branch_views import span_text
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
+from cfmkit.results import Status
 from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
@@ -55,13 +58,18 @@ class MeasureReport(ShortRepr):
         """What the user must know of recording and window."""
         return (*self.source.warnings, *self.numbers.warnings)
 
+    @property
+    def status(self) -> Status:
+        """Partial where some numbers cannot be known."""
+        return Status.PARTIAL if self.numbers.holes else Status.COMPLETE
+
     @cached_property
     def data(self) -> dict[str, Any]:
         """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
         source, low_pass = self.source, self.source.low_pass
         return {
-            "status": "complete",
-            "message": "",
+            "status": self.status.key,
+            "message": self.numbers.shortfall,
             "metrics": metrics_json(self.numbers.raw),
             "requirements": [],
             "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
@@ -82,11 +90,68 @@ def _ends(report: MeasureReport) -> dict[str, Any]:
     return {"from": low, "to": high, "unit": border_unit(dimension)}
 
 
+def data_of(reports: Mapping[str, MeasureReport]) -> dict[str, Any]:
+    """Return what metrics.json says of one specimen, or of several: their metrics by name as ``force_mean[A,load]``."""
+    if len(reports) == 1:
+        return next(iter(reports.values())).data
+    each = {name: report.data for name, report in reports.items()}
+    short = {name: data["message"] for name, data in each.items() if data["message"]}
+    return {
+        "status": (Status.PARTIAL if short else Status.COMPLETE).key,
+        "message": "; ".join(f"{name}: {message}" for name, message in short.items()),
+        "metrics": _tagged(each, "metrics"),
+        "requirements": [],
+        "warnings": [
+            {"name": item["name"], "message": f"{name}: {item['message']}"}
+            for name, data in each.items()
+            for item in data["warnings"]
+        ],
+        "metrics_filtered": _tagged(each, "metrics_filtered"),
+        "groups": {name: _about(data) for name, data in each.items()},
+    }
+
+
+def _tagged(each: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, Any]:
+    """Return the metrics of all specimens, each with its specimen in brackets."""
+    found = {}
+    for group, data in each.items():
+        for name, value in data[key].items():
+            metric, branch = split_name(name)
+            found[f"{metric}[{','.join(part for part in (group, branch) if part)}]"] = value
+    return found
+
+
+def _about(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: data[key] for key in ("filter", "window", "cycles", "data", "reading")}
+
+
 def report_on(
-    source: MeasuredCurves, frame: MeasuringFrame | None = None, window: Window | None = None
+    source: MeasuredCurves,
+    frame: MeasuringFrame | None = None,
+    window: Window | None = None,
+    largest_hole: float = LARGEST_HOLE,
 ) -> MeasureReport:
     """Return the report on a measured mechanism."""
-    return MeasureReport(source, numbers_of(source, frame, window))
+    return MeasureReport(source, numbers_of(source, frame, window, largest_hole))
+
+
+def _stacked(tables: Mapping[str, Table]) -> Table:
+    """Return the tables of several specimens as one, the specimen first; that of one as it is."""
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    names = list(dict.fromkeys(column.name for table in tables.values() for column in table.columns))
+    columns = [TableColumn("group", tuple(name for name, table in tables.items() for _ in range(_rows(table))))]
+    for name in names:
+        values: list[Any] = []
+        for one in tables.values():
+            found = next((column.values for column in one.columns if column.name == name), None)
+            values += [""] * _rows(one) if found is None else list(found)
+        columns.append(TableColumn(name, tuple(values)))
+    return Table(tuple(columns))
+
+
+def _rows(table: Table) -> int:
+    return len(table.columns[0].values)
 
 
 def curves_table(source: MeasuredCurves) -> Table:
@@ -127,13 +192,15 @@ def _column_name(name: str) -> str:
     return f"{metric} {branch}" if branch else metric
 
 
-def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = None) -> Iterator[tuple[str, bytes]]:
+def files(
+    reports: Mapping[str, MeasureReport], plots: bool = True, form: FigureForm | None = None
+) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a measurement as (name below the folder, content).
 
     Parameters
     ----------
-    report : MeasureReport
-        Of one recording.
+    reports : mapping of str to MeasureReport
+        By specimen.
     plots : bool
         Whether to draw.
     form : FigureForm, optional
@@ -141,14 +208,18 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
     """
     from cfmkit.tables.json_writing import json_bytes
 
-    yield "curve.csv", to_csv(curves_table(report.source))
-    yield "cycles.csv", to_csv(cycles_table(report))
-    yield "metrics.json", json_bytes(report.data)
+    yield "curve.csv", to_csv(_stacked({name: curves_table(report.source) for name, report in reports.items()}))
+    yield "cycles.csv", to_csv(_stacked({name: cycles_table(report) for name, report in reports.items()}))
+    yield "metrics.json", json_bytes(data_of(reports))
     if plots:
         from cfmkit.experiment.figures import figures
         from cfmkit.plots.figure_options import PLAIN
 
-        yield from (form or PLAIN).files(figures(report.source, report.numbers))
+        for number, report in enumerate(reports.values(), 1):
+            drawn = figures(report.source, report.numbers)
+            yield from (form or PLAIN).files(
+                drawn if len(reports) == 1 else {f"{k}-{number}": v for k, v in drawn.items()}
+            )
 
 
 def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str, Any]:
@@ -197,6 +268,20 @@ def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
     return (("causes", ", ".join(reported)),) if reported else ()
 
 
+def shortfall(comparison: Comparison) -> str:
+    """Return why the errors have no value; "" where they have one."""
+    if not comparison.holes:
+        return ""
+    return hole_finding(comparison.holes, comparison.window, comparison.curve.kind).message
+
+
+def comparison_warnings(comparison: Comparison, source: MeasuredCurves) -> tuple[Finding, ...]:
+    """Return what the user must know of a recording beside a model."""
+    if not comparison.holes:
+        return source.warnings
+    return (*source.warnings, hole_finding(comparison.holes, comparison.window, comparison.curve.kind))
+
+
 def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
     """Return what makes the file of a comparison: the measured curve."""
     return {"data.csv": lambda: to_csv(curves_table(source))}
@@ -234,7 +319,8 @@ def calibration_data(calibration: Calibration) -> dict[str, Any]:
 
 def _rms(comparison: Comparison) -> float:
     errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
-    return float(np.sqrt(np.mean(errors**2)))
+    weight = np.concatenate([item.weight for item in comparison.samples])
+    return float(np.sqrt(np.average(errors**2, weights=weight)))
 
 
 def _border(value: float, calibration: Calibration) -> float:
@@ -255,8 +341,20 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     lines = []
     for k, item in enumerate(calibration.parameters):
         value, width = float(calibration.fit.values[k]), float(half[k])
-        reported = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
-        lines.append(("fitted", f"{item.path} = {reported} (95 %), from {_exact(item.start, item.dimension)}"))
+        if width > UNKNOWN * item.size and not calibration.fit.at_bound[k]:
+            lines.append(("fitted", f"{item.path} {CANNOT}"))
+            continue
+        low, high = max(value - width, item.low), min(value + width, item.high)
+        reported = f"± {_exact(width, item.dimension, 2)} (95 %)"
+        if (low, high) != (value - width, value + width):
+            reported = f"({_exact(low, item.dimension)} to {_exact(high, item.dimension)}, 95 %, within its bounds)"
+        lines.append(
+            (
+                "fitted",
+                f"{item.path} = {_exact(value, item.dimension)} {reported}, from {_exact(item.start, item.dimension)}",
+            )
+        )
+    lines += _loss_lines(calibration.after)
     zeros = calibration.zeros
     if zeros.effort or zeros.motion:
         options = _options(recording, zeros)
@@ -264,6 +362,18 @@ def calibration_lines(calibration: Calibration, recording: Recording) -> tuple[t
     if zeros.drift:
         lines.append(("data", "no option subtracts the fitted drift from a recording (analyze --data, measure)"))
     return tuple(lines)
+
+
+def _loss_lines(after: Comparison) -> list[tuple[str, str]]:
+    """Return what is said where the model has no losses and the measurement has."""
+    if not after.branches:
+        return []
+    area, half = (item.value for item in after.loss().values())
+    if area is None or half is None:
+        return [("loss", "the model has no losses: it is fitted to the mean of the branches")]
+    gap = f"{format_short(half, after.curve.kind)} to either side"
+    reported = f"a measured cycle loses {format_short(area, 'energy')}, on average {gap}"
+    return [("loss", f"the model has no losses: it is fitted to the mean of the branches; {reported}")]
 
 
 def _options(recording: Recording, zeros: Zeros) -> str:
@@ -298,6 +408,6 @@ def residuals_table(calibration: Calibration) -> Table:
         (
             TableColumn("branch", tuple(branch.tolist())),
             border_column(curve.motion_name, motion, curve.motion_dimension),
-            border_column("residual", calibration.fit.residuals, curve.kind),
+            border_column("residual", np.concatenate([item.errors(curve) for item in after.samples]), curve.kind),
         )
     )

@@ -7,110 +7,28 @@ free of gaps.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
-from cfmkit.errors import DataError, UsageError
+from cfmkit.errors import DataError, UsageError, reason_of, visible
 from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.specs.units.strict_decimal_number import shown
-from cfmkit.tables.lab_file import (
-    ROLES,
-    SEPARATORS,
-    ColumnInfo,
-    TextBlock,
-    block_of,
-    column_of,
-    decoded,
-    describe,
-    header_cells,
-    is_unit_row,
-    read_units,
-    refuse_group,
-    split_header,
-)
+from cfmkit.tables.lab_columns import column_named, read_units, roles_of
+from cfmkit.tables.lab_file import EMPTY, SEPARATORS, decoded, lines_of, tables_in
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from cfmkit.curves import Kind
-
-
-HEADER_LINES = 5
-"""So many lines above the numbers are searched for their names."""
-
-
-def columns_of(
-    lines: list[str], block: TextBlock, reported: dict[str, str], name: str
-) -> tuple[list[ColumnInfo], int | None]:
-    """Return the columns with what the lines above the numbers say of them, and the line with the names."""
-    above = [index for index in range(block.first) if lines[index].strip()][-HEADER_LINES:]
-    rows = [(index, header_cells(lines[index], block)) for index in reversed(above)]
-    fitting = [(index, cells) for index, cells in rows if len(cells) == block.width]
-    # A column of remarks that stayed empty: its title stands beyond the numbers and has no unit.
-    fitting = fitting or [
-        (index, cells[: block.width])
-        for index, cells in rows
-        if len(cells) > block.width and not any(split_header(cell)[1] for cell in cells[block.width :])
-    ]
-    names, unit_row, at = [""] * block.width, [""] * block.width, None
-    if fitting:
-        at, names = fitting[0]
-        if len(fitting) > 1 and is_unit_row(names):
-            unit_row, (at, names) = names, fitting[1]
-    elif rows and block.dialect.separator == "," and _halved(rows[0][1], block.width):
-        raise DataError(
-            f"{name}: line {block.first + 1} has {block.width} cells but the header {len(rows[0][1])}: comma seems to "
-            "be both separator and decimal sign; export with another separator"
-        )
-    return describe(names, unit_row, reported, name), None if at is None else at + 1
-
-
-def _halved(header: Sequence[str], width: int) -> bool:
-    """Return whether a header has half the cells of the numbers below it, and is not just a title."""
-    return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
-
-
-def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> dict[str, ColumnInfo]:
-    """Return the columns that are used, by role."""
-    pairs = (("length", "force"), ("angle", "torque"))
-    there = {item.dimension for item in numeric}
-    complete = [pair for pair in pairs if set(pair) <= there]
-    if len(complete) > 1:
-        reported = {item.dimension for item in numeric if item.reported}
-        complete = [pair for pair in pairs if set(pair) <= reported] or complete
-    if len(complete) > 1:
-        raise DataError(
-            f"{name}: there are displacement and force, and angle and torque; name the columns that are meant "
-            'with --units, e.g. --units "phi=deg,M=N*mm"'
-        )
-    if not complete:
-        raise DataError(_missing(numeric, columns, name))
-    wanted = ("time", *complete[0])
-    found = {ROLES[dimension]: column_of(numeric, dimension, name) for dimension in wanted}
-    return {role: column for role, column in found.items() if column is not None}
-
-
-def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> str:
-    """Say which of displacement and force there is not, and what to do."""
-    if not any(column.unit for column in columns):
-        example = ",".join(f"{column.name if not column.name.startswith('column ') else column.index + 1}=..."
-                           for column in numeric[:3])  # fmt: skip
-        return f'{name}: the header names no units, and they are never guessed; state them with --units "{example}"'
-    there = {item.dimension for item in numeric}
-    lacking = "force" if "length" in there else "displacement" if "force" in there else "displacement and force"
-    lacking = "torque" if "angle" in there and "force" not in there else lacking
-    labels = ", ".join(column.label for column in columns)
-    return (
-        f"{name}: no column for the {lacking} was found among {labels}; state which column it is, and its unit, with "
-        "--units"
-    )
+    from cfmkit.tables.lab_columns import ColumnInfo
+    from cfmkit.tables.lab_file import LabTable
 
 
 LARGEST = 500_000_000
@@ -227,7 +145,7 @@ class Recording(ShortRepr):
         return [*(self.decisions.lines() if self.decisions else []), *self.notes]
 
 
-def read_recording(path: str | os.PathLike[str], units: str | None = None) -> Recording:
+def read_recording(path: str | os.PathLike[str], units: str | None = None, group: str | None = None) -> Recording:
     """Return the measured curve in a lab file.
 
     Parameters
@@ -237,36 +155,203 @@ def read_recording(path: str | os.PathLike[str], units: str | None = None) -> Re
     units : str, optional
         Units that the header does not state, by name or number of the column: ``"s=mm,F=N"``.
         Where several columns qualify, those named here are used.
+    group : str, optional
+        Which specimen of several, as ``"Specimen=2"``; ``"none"``: all rows are of one.
 
     Raises
     ------
     cfmkit.errors.UsageError
         If the file cannot be read, or `units` is malformed.
     cfmkit.errors.DataError
-        If it holds no curve.
+        If it holds no curve, or those of several specimens.
+    """
+    found = read_recordings(path, units, group)
+    if len(found) > 1:
+        column = (group or "").strip()
+        raise DataError(f"{Path(path).name}: {column!r} has {len(found)} values; choose {_options(column, found)}")
+    return next(iter(found.values()))
+
+
+def read_recordings(
+    path: str | os.PathLike[str], units: str | None = None, group: str | None = None
+) -> dict[str, Recording]:
+    """Return the measured curve of each specimen in a lab file, by what `group` tells them apart.
+
+    Parameters
+    ----------
+    path, units
+        As for `read_recording`.
+    group : str, optional
+        ``"COLUMN"``: one curve for each of its values; ``"COLUMN=VALUE"``: that one; ``"table"`` and ``"table=2"``
+        likewise of tables one below the other; ``"none"``: all rows of a table are of one specimen, whatever its
+        columns say. Default: all rows, where nothing speaks for several specimens.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or `units` is malformed.
+    cfmkit.errors.DataError
+        If it holds no curve, or those of several specimens and `group` does not say of which.
     """
     name = Path(path).name
-    reported = read_units(units)
+    stated = read_units(units)
     text, encoding = decoded(_content(Path(path)), name)
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    block = block_of(lines, name)
-    columns, header = columns_of(lines, block, reported, name)
-    roles = roles_of([column for column in columns if column.index in block.numeric], columns, name)
-    values = _values(lines, block, list(roles.values()), name)
-    rows = [index + 1 for index in range(block.first, block.last) if lines[index].strip()]
-    others = len([line for line in lines if line.strip()]) - len(rows) - (header is not None)
-    dialect = block.dialect
+    lines = lines_of(text)
+    tables = tables_in(lines, name, stated)
+    key, _, value = (part.strip() for part in (group or "").partition("="))
+    if group is not None and not key:
+        raise UsageError("--group is empty; give the column that tells the specimens apart, as --group Specimen")
+    if len(tables) > 1 or key == TABLE:
+        return _each_table(tables, group, encoding, name)
+    table = tables[0]
+    roles = roles_of(table.numeric, table.columns, name)
+    if key in ("", ONE):
+        found = None if key else _specimens(table, roles)
+        if found is not None:
+            values = list(dict.fromkeys(_labels(table, found)))
+            raise DataError(
+                f"{name}: {shown(found.name)} tells {len(values)} specimens apart, which no single curve describes; "
+                f"choose {_options(found.name, values)}, or --group {ONE} if all rows are of one"
+            )
+        return {"": _recording(table, roles, encoding, name)}
+    column = column_named(key, table.columns, name)
+    parts = _parts(table.with_values(list(roles.values())), column)
+    if value and value not in parts:
+        raise DataError(
+            f"{name}: --group: {shown(column.name)} is nowhere {shown(value)}; there are {_options(key, parts)}"
+        )
+    chosen = {value: parts[value]} if value else parts
+    total = sum(len(part.rows) for part in parts.values())
+    return {
+        item: _recording(part, roles, encoding, f"{name}, {column.name} {item}", total) for item, part in chosen.items()
+    }
+
+
+TABLE, ONE = "table", "none"
+"""Words in place of a column: tables one below the other, and no column at all."""
+
+_NO_SPECIMEN = re.compile(
+    r"(?i).*(cycle|zyklus|loop|branch|segment|step|schritt|direction|richtung|phase|stage|stroke|block|ramp|pass\b"
+    r"|judg|state|status|mode|unit|remark|comment|note|event|flag|error|date|datum|time|zeit).*"
+)
+"""Columns of such names tell parts of one recording apart, or say something of its points."""
+
+
+_SPECIMEN = re.compile(r"(?i).*(specimen|sample|probe|pr\u00fcfling|muster|teil|part|piece|serial|\bid\b).*")
+
+
+def _each_table(tables: Sequence[LabTable], group: str | None, encoding: str, name: str) -> dict[str, Recording]:
+    """Return the curve of each table of a file, or of the one that is chosen."""
+    key, _, value = (part.strip() for part in (group or "").partition("="))
+    names = [str(number + 1) for number in range(len(tables))]
+    if key != TABLE or (value and value not in names):
+        places = ", ".join(str(table.rows[0] + 1) for table in tables)
+        choices = _options(TABLE, names)
+        raise DataError(
+            f"{name}: there are {len(tables)} tables, with numbers from lines {places} on; choose {choices}"
+        )
+    chosen = [value] if value else names
+    found = {}
+    for item in chosen:
+        table = tables[int(item) - 1]
+        roles = roles_of(table.numeric, table.columns, name)
+        found[item] = _recording(table, roles, encoding, f"{name}, table {item}", sum(len(one.rows) for one in tables))
+    return found
+
+
+def _options(column: str, values: Iterable[str]) -> str:
+    """Return what to write for each of some values."""
+    listed = list(values)
+    shown_ones = [f'--group "{column}={value}"' for value in listed[:MOST_LISTED]]
+    return " or ".join(shown_ones) + (f" (and {len(listed) - MOST_LISTED} more)" if len(listed) > MOST_LISTED else "")
+
+
+MOST_LISTED = 6
+"""So many values are listed to choose from."""
+
+
+def _labels(table: LabTable, column: ColumnInfo) -> list[str]:
+    """Return the cells of a column; an empty one is as the one above it, as spreadsheets merge them."""
+    found: list[str] = []
+    for text in table.texts(column):
+        found.append(text or (found[-1] if found else ""))
+    return found
+
+
+def _parts(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:
+    """Return the rows of each value of a column."""
+    labels = _labels(table, column)
+    return {item: table.only(label == item for label in labels) for item in dict.fromkeys(labels)}
+
+
+def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo | None:
+    """Return the column that tells specimens apart; None where none does.
+
+    It has words or whole numbers without a unit, each over much of the travel, and in rows that follow each other
+    unless its name says what it is.
+    """
+    filled = table.with_values(list(roles.values()))
+    motion = filled.numbers(roles.get("displacement") or roles["angle"])
+    units = {column.unit_column for column in table.columns}
+    for column in table.columns:
+        if column in roles.values() or column.unit or column.index in units or _NO_SPECIMEN.fullmatch(column.name):
+            continue
+        labels = np.array(_labels(filled, column))
+        values, runs = set(labels.tolist()), 1 + int((labels[1:] != labels[:-1]).sum())
+        named = _SPECIMEN.fullmatch(column.name) is not None
+        if len(values) < 2 or "" in values or (runs > len(values) and not named):
+            continue
+        if any(_is_fraction(value, table) for value in values) or len(values) > len(labels) // FEWEST:
+            continue
+        parts = [motion[labels == value] for value in values]
+        if all(len(part) >= FEWEST and np.ptp(part) > 0.5 * np.ptp(motion) for part in parts):
+            return column
+    return None
+
+
+def _is_fraction(text: str, table: LabTable) -> bool:
+    """Return whether a text is a number that is not whole: something was measured there."""
+    number = table.shape.dialect.number(text)
+    return number is not None and not number[0].is_integer()
+
+
+def _recording(
+    table: LabTable, roles: Mapping[str, ColumnInfo], encoding: str, name: str, n_rows: int | None = None
+) -> Recording:
+    """Return the curve of a table; of a part of one `n_rows` is how many rows the file has of it."""
+    filled = table.with_values(list(roles.values()))
+    n_rows = len(filled.rows) if n_rows is None else n_rows
+    values = {role: filled.numbers(column) for role, column in roles.items()}
+    others = sum(bool(line.strip(EMPTY)) for line in table.lines) - n_rows - (table.header is not None)
+    dialect = table.shape.dialect
     decisions = Decisions(
         encoding,
         SEPARATORS[dialect.separator],
         {".": "point", ",": "comma"}[dialect.decimal],
-        block.first + 1,
-        header,
+        filled.rows[0] + 1,
+        None if table.header is None else table.header + 1,
         others,
         {role: f"{column.name} [{column.unit}]" for role, column in roles.items()},
-        tuple(column.name for column in columns if column.name and column not in roles.values()),
+        tuple(column.name for column in table.columns if _is_unused(column, table, roles)),
     )
-    return _recording(name, dict(zip(roles, values, strict=True)), decisions, rows)
+    kind: Kind = "force" if "force" in values else "torque"
+    motion, effort = (
+        (values["displacement"], values["force"]) if kind == "force" else (values["angle"], values["torque"])
+    )
+    time = values.get("time")
+    if time is not None and len(time) > 1 and (back := np.flatnonzero(np.diff(time) < 0)).size:
+        raise DataError(
+            f"{name}: line {filled.rows[int(back[0]) + 1] + 1}: the time goes back from {time[back[0]]:g} s to "
+            f"{time[back[0] + 1]:g} s; a recording must be in the order in which it was made"
+        )
+    return Recording(name, motion, effort, time, kind, decisions)
+
+
+def _is_unused(column: ColumnInfo, table: LabTable, roles: Mapping[str, ColumnInfo]) -> bool:
+    """Return whether a column with a name is neither used nor the unit of one that is."""
+    units = {used.unit_column for used in roles.values()}
+    named = column.name != f"column {column.index + 1}" or any(table.texts(column))
+    return named and column not in roles.values() and column.index not in units
 
 
 def _content(path: Path) -> bytes:
@@ -278,92 +363,10 @@ def _content(path: Path) -> bytes:
     except FileNotFoundError:
         raise UsageError(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}".lower()) from None
+        raise UsageError(f"{visible(str(path))} cannot be read: {reason_of(error)}") from None
     if len(data) > LARGEST:
         raise DataError(f"{path.name}: is larger than {LARGEST // 1_000_000} MB; thin it out or split it")
     return data
-
-
-def _values(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo], name: str) -> list[FloatArray]:
-    """Return the numbers of some columns in SI."""
-    rows = lines[block.first : block.last]
-    if block.dialect.decimal == ",":
-        raw = "\n".join(rows)
-        if "." in raw:
-            _refuse_in(rows, block, name, columns)
-        if block.dialect.separator != ",":
-            rows = raw.replace(",", ".").split("\n")
-    try:
-        table = np.loadtxt(
-            StringIO("\n".join(rows)),
-            delimiter=None if block.dialect.separator == " " else block.dialect.separator,
-            comments=None,
-            usecols=[column.index for column in columns],
-            quotechar='"' if block.dialect.quoted else None,
-            converters=_comma_reader if block.dialect.decimal == "," and block.dialect.separator == "," else None,
-            ndmin=2,
-        )
-    except ValueError:
-        raise DataError(_bad_cell(lines, block, columns, name)) from None
-    if not np.isfinite(table).all():
-        raise DataError(_bad_cell(lines, block, columns, name))
-    return [_in_si(table[:, number], column) for number, column in enumerate(columns)]
-
-
-def _comma_reader(cell: str) -> float:
-    return float(cell.replace(",", "."))
-
-
-def _in_si(values: FloatArray, column: ColumnInfo) -> FloatArray:
-    from cfmkit.specs.units import from_border
-    from cfmkit.specs.units.table import COMMON, border_unit
-
-    dimension, unit = column.dimension or "", column.unit or ""
-    if unit == border_unit(dimension):
-        converted: FloatArray = from_border(values, dimension)
-        return converted
-    if (dimension, unit) in COMMON:
-        return values * float(COMMON[dimension, unit])
-    from cfmkit.specs.units.unit_size import unit_size
-
-    return values * float(unit_size(unit).factor)
-
-
-def _refuse_in(rows: list[str], block: TextBlock, name: str, columns: Sequence[ColumnInfo]) -> None:
-    for row in rows:
-        cells = block.dialect.cells(row)
-        for column in columns:
-            if column.index < len(cells):
-                refuse_group(cells[column.index], name)
-
-
-def _bad_cell(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo], name: str) -> str:
-    """Return what is wrong with the first line of the block that cannot be used."""
-    for number in range(block.first, block.last):
-        cells = block.dialect.cells(lines[number])
-        if lines[number].strip() and len(cells) != block.width:
-            return f"{name}: line {number + 1} has {len(cells)} cells, the others have {block.width}"
-        for column in columns if cells else ():
-            cell = cells[column.index]
-            if not block.dialect.is_number(cell):
-                refuse_group(cell, name)
-                what = "is empty" if not cell else f"holds {shown(cell)}, which is not a number"
-                return f"{name}: line {number + 1}: column {column.label} {what}; remove the line or correct it"
-    return f"{name}: the numbers from line {block.first + 1} on cannot be read"
-
-
-def _recording(name: str, values: dict[str, FloatArray], decisions: Decisions, lines: list[int]) -> Recording:
-    kind: Kind = "force" if "force" in values else "torque"
-    motion, effort = (
-        (values["displacement"], values["force"]) if kind == "force" else (values["angle"], values["torque"])
-    )
-    time = values.get("time")
-    if time is not None and len(time) > 1 and (back := np.flatnonzero(np.diff(time) < 0)).size:
-        raise DataError(
-            f"{name}: line {lines[int(back[0]) + 1]}: the time goes back from {time[back[0]]:g} s to "
-            f"{time[back[0] + 1]:g} s; a recording must be in the order in which it was made"
-        )
-    return Recording(name, motion, effort, time, kind, decisions)
 
 
 def _check_values(recording: Recording) -> None:
@@ -384,4 +387,4 @@ def _check_values(recording: Recording) -> None:
             )
 
 
-__all__ = ["FEWEST", "Decisions", "Recording", "columns_of", "read_recording", "roles_of"]
+__all__ = ["FEWEST", "Decisions", "Recording", "read_recording", "read_recordings"]

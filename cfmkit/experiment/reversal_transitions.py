@@ -189,7 +189,10 @@ def passage(ends: Sequence[End]) -> float:
     distance, gap, weight = _thinned(distance[order], gap[order])
     if len(distance) < _FEWEST:
         return 0.0
-    if np.median(gap[distance > 0.5 * reach]) < 0:  # a sign is turned: another finding says so
+    beyond = gap[distance > 0.5 * reach]
+    if not len(beyond):  # a hole in the recording
+        return 0.0
+    if np.median(beyond) < 0:  # a sign is turned: another finding says so
         gap = -gap
     length, level = 0.0, 0.0
     for _ in range(4):  # what no single shape describes, such as play before elasticity, goes in parts

@@ -30,7 +30,7 @@ USUAL = FORMATS[:3]
 
 
 def files(
-    drawing: Drawing, kerf: float | None = None, tolerance: float = TOLERANCE, formats: Sequence[str] = USUAL
+    drawing: Drawing, kerf: float | None = None, tolerance: float | None = None, formats: Sequence[str] = USUAL
 ) -> dict[str, bytes]:
     """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are requested.
 
@@ -43,8 +43,9 @@ def files(
     kerf : float, optional
         Width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved
         into the waste by half of it; the other files always have the true size.
-    tolerance : float
-        Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs.
+    tolerance : float, optional
+        Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs;
+        default: that of the drawing.
     formats : sequence of str
         Of `FORMATS`.
 
@@ -55,6 +56,7 @@ def files(
     cfmkit.errors.UsageError
         If the library for a format is not installed.
     """
+    tolerance = drawing.tolerance if tolerance is None else tolerance
     stem = check_name(drawing.name, "drawing")
     drawn = outlines(drawing.with_reference_square(), tolerance)
     found: dict[str, bytes] = {}

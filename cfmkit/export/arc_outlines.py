@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.contours import TOLERANCE, Arc, Contour, Drawing, Edge, Line
+from cfmkit.export.contours import Arc, Contour, Drawing, Edge, Line
 from cfmkit.numerics.arc_chain import ArcChain
 from cfmkit.numerics.biarcs import CoarseDataError, fit_arcs
 from cfmkit.specs.units import format_short, to_border
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 _LEAN = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
-_GAP = 1e-9  # two ends closer than this are one point [m]
+_GAP = 5e-9  # two ends closer than this are one point, in sizes of the contour
 _STRAIGHT = 1e-12  # an arc no higher than this over its chord is a line [m]
 
 
@@ -46,7 +46,7 @@ class Outline:
     circle: tuple[complex, float] | None = None
 
 
-def outlines(drawing: Drawing, tolerance: float = TOLERANCE) -> tuple[Outline, ...]:
+def outlines(drawing: Drawing, tolerance: float | None = None) -> tuple[Outline, ...]:
     """Return the contours of a drawing as chains of arcs, checked.
 
     The arcs' direction is kept within a milliradian too, as far as the points allow: on a
@@ -56,8 +56,8 @@ def outlines(drawing: Drawing, tolerance: float = TOLERANCE) -> tuple[Outline, .
     ----------
     drawing : Drawing
         What to draw.
-    tolerance : float
-        Largest distance of the arcs from the exact smooth curves [m].
+    tolerance : float, optional
+        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
 
     Raises
     ------
@@ -67,6 +67,7 @@ def outlines(drawing: Drawing, tolerance: float = TOLERANCE) -> tuple[Outline, .
     """
     if not drawing.contours:
         raise GeometryError(f"the drawing {drawing.name!r} has no contours")
+    tolerance = drawing.tolerance if tolerance is None else tolerance
     found = tuple(_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1))
     check_outlines(found)
     return found
@@ -74,10 +75,16 @@ def outlines(drawing: Drawing, tolerance: float = TOLERANCE) -> tuple[Outline, .
 
 def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     name = f"contour {number} on layer {contour.layer!r}"
-    edges = [edge for edge in contour.edges if isinstance(edge, Arc) or not _is_point(edge)]
+    if not contour.edges:
+        raise GeometryError(f"{name} has no edges")
+    x0, y0, x1, y1 = contour.extents
+    if not np.isfinite(x0 + y0 + x1 + y1):
+        raise GeometryError(f"{name} has a point that is not finite")
+    gap = _GAP * (x1 - x0 + y1 - y0)
+    edges = [edge for edge in contour.edges if isinstance(edge, Arc) or not _is_point(edge, gap)]
     if not edges:
         raise GeometryError(f"{name} has no edges")
-    _check_joints(edges, contour.closed, name)
+    _check_joints(edges, contour.closed, name, gap)
     chains = [_chain(edge, tolerance, f"{name}, edge {index}") for index, edge in enumerate(edges, start=1)]
     nodes = np.concatenate([chains[0].nodes, *(chain.nodes[1:] for chain in chains[1:])])
     bulges = np.concatenate([chain.bulges for chain in chains])
@@ -88,21 +95,19 @@ def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
     return Outline(chain.closed() if contour.closed else chain, contour.layer, contour.closed, contour.hole, circle)
 
 
-def _is_point(edge: Edge) -> bool:
+def _is_point(edge: Edge, gap: float) -> bool:
     """Whether a line has no length: a dimension that is zero may leave one."""
-    return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) < _GAP
+    return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) <= gap
 
 
-def _check_joints(edges: list[Edge], closed: bool, name: str) -> None:
+def _check_joints(edges: list[Edge], closed: bool, name: str, gap: float) -> None:
     ends = [edge.ends for edge in edges]
-    if not np.isfinite(ends).all():
-        raise GeometryError(f"{name} has a point that is not finite")
     for index, (edge, following) in enumerate(itertools.pairwise(ends), start=1):
-        if abs(edge[1] - following[0]) > _GAP:
+        if abs(edge[1] - following[0]) > gap:
             raise GeometryError(
                 f"{name}: edge {index + 1} begins at {place(following[0])}, but edge {index} ends at {place(edge[1])}"
             )
-    if closed and abs(ends[-1][1] - ends[0][0]) > _GAP:
+    if closed and abs(ends[-1][1] - ends[0][0]) > gap:
         raise GeometryError(f"{name} is not closed: it begins at {place(ends[0][0])} and ends at {place(ends[-1][1])}")
 
 
@@ -130,7 +135,7 @@ def _arc_chain(edge: Arc, name: str) -> ArcChain:
     return ArcChain(nodes, np.full(count, np.tan(turn / count / 4)))
 
 
-SAGITTA = 2e-7  # distance of the flattening from the arcs [m]
+SAGITTA = 1e-6  # distance of the flattening from the arcs, in sizes of the chain
 
 
 def place(point: complex) -> str:
@@ -139,10 +144,14 @@ def place(point: complex) -> str:
     return f"({x:g}, {y:g}) mm"
 
 
+def flat_sagitta(chain: ArcChain) -> float:
+    """Return how far the lines between `flat_points` are from a chain at most [m]."""
+    return SAGITTA * float(np.ptp(chain.nodes.real) + np.ptp(chain.nodes.imag))
+
+
 def flat_points(chain: ArcChain) -> Any:
-    """Return points (n, 2) on the chain [m], no farther than `SAGITTA` from it in between, or 1e-8 of a large one."""
-    extent = float(np.ptp(chain.nodes.real) + np.ptp(chain.nodes.imag))
-    points = chain.flattened(max(SAGITTA, 1e-8 * extent))
+    """Return points (n, 2) on the chain [m], no farther than `flat_sagitta` from it in between."""
+    points = chain.flattened(flat_sagitta(chain))
     return np.column_stack([points.real, points.imag])
 
 

@@ -16,10 +16,12 @@ import numpy as np
 
 from cfmkit.arrays import FloatArray, ShortRepr, read_only
 from cfmkit.export.layers import DRIVEN, HELD
+from cfmkit.numerics.biarcs import cubic
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.results import Finding
 
 TOLERANCE = 5e-6
@@ -132,7 +134,7 @@ class Contour:
         return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
 
     def points(self, sagitta: float, turn: float = math.inf) -> FloatArray:
-        """Return points (n, 2) [m] along closed edges: within `sagitta` [m] of arcs, smooth ones' own.
+        """Return points (n, 2) [m] along closed edges, smooth ones' own among them, within `sagitta` [m] of all edges.
 
         On arcs neighbouring lines differ by `turn` [rad] at most.
         """
@@ -150,7 +152,7 @@ def _corners(edge: Edge) -> FloatArray:
 
 def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
     if isinstance(edge, Smooth):
-        return edge.points
+        return _between(edge, sagitta)
     if isinstance(edge, Line):
         return np.array([edge.start, edge.end])
     # quarter turns at most: a circle within `sagitta` of its centre is still a ring
@@ -158,6 +160,21 @@ def _along(edge: Edge, sagitta: float, turn: float) -> FloatArray:
     count = max(math.ceil(abs(edge.end - edge.start) / step), 2)
     angle = np.linspace(edge.start, edge.end, count + 1)
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _between(edge: Smooth, sagitta: float) -> FloatArray:
+    """Return the points of a smooth edge, and between them those of its cubics that keep lines within `sagitta` [m]."""
+    z, t = (values @ np.array([1, 1j]) for values in (edge.points, edge.tangents))
+    bulge = np.abs(np.diff(z) * np.angle(t[1:] / t[:-1])) / 8.0
+    count = np.maximum(np.ceil(np.sqrt(bulge / sagitta)), 1).astype(int)
+    if count.max() == 1:
+        return edge.points
+    k = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(k)) - np.repeat(np.cumsum(count) - count, count)) / count[k]
+    inner = cubic(z[k], t[k], z[k + 1], t[k + 1], share)
+    found = np.column_stack([inner.real, inner.imag])
+    found[share == 0.0] = edge.points[:-1]
+    return np.vstack([found, edge.points[-1]])
 
 
 UNCUT = ("path", "reference", HELD, DRIVEN)
@@ -273,7 +290,8 @@ class Drawing(ShortRepr):
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands
     and what is moved. `notes` say what the contours do not show: how often a part is to be made. `dimensions` and
     `facts` are what a sheet of paper says beside the outline: main lengths, and what it is made of in (word, text).
-    `labels` are engraved. `warnings` say what is wrong with the part as drawn.
+    `labels` are engraved. `warnings` say what is wrong with the part as drawn. `tolerance` is how far files may be from
+    the exact outlines unless somebody states another value [m]. `sections` are those of beams that the outline has.
     """
 
     name: str
@@ -285,6 +303,8 @@ class Drawing(ShortRepr):
     facts: tuple[tuple[str, str], ...] = ()
     labels: tuple[EngravedText, ...] = ()
     warnings: tuple[Finding, ...] = ()
+    tolerance: float = TOLERANCE
+    sections: tuple[BeamSection, ...] = ()
 
     @property
     def extents(self) -> tuple[float, float, float, float]:

@@ -21,7 +21,6 @@ import numpy as np
 
 from cfmkit.errors import OutputError
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.layers import ENGRAVED, LayerLook, looks
 from cfmkit.specs.units import to_border
 
@@ -37,15 +36,15 @@ _CENTER, _MIDDLE = 1, 2  # of texts, about their point
 _LOCK = threading.Lock()
 
 
-def write_dxf(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
+def write_dxf(drawing: Drawing, tolerance: float | None = None) -> bytes:
     """Return the drawing as DXF.
 
     Parameters
     ----------
     drawing : Drawing
         What to draw.
-    tolerance : float
-        Largest distance of the arcs from the exact smooth curves [m].
+    tolerance : float, optional
+        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
 
     Raises
     ------

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.contours import Sheet
 
-SPECK = 1e-13
-"""Faces smaller than this are rounding, where the edge of a region runs along the edge of the part [m2]."""
+SPECK = 1e-12
+"""Faces smaller than this are rounding, where the edge of a region runs along the edge of the part, in squares of its
+size."""
 GRID = 1e-9
-"""Points of outlines and regions that are nearer to each other are one [m]."""
+"""Points of outlines and regions that are nearer to each other are one, in sizes of the part."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
     cfmkit.errors.GeometryError
         If nothing says how thick the parts are, or nothing is to be cut.
     """
-    from shapely import Polygon, set_precision
+    from shapely import Polygon
 
     if sheet.thickness is None:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
@@ -88,7 +89,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[La
     found = []
     for solid in solids:
         holes = [ring.exterior for one, ring in rings if one.hole and solid.contains(ring)]
-        found.append(_faces(set_precision(Polygon(solid.exterior, holes), GRID), sheet))
+        found.append(_faces(Polygon(solid.exterior, holes), sheet))
     return tuple(found)
 
 
@@ -98,12 +99,15 @@ def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     from shapely.ops import polygonize
 
     usual = float(sheet.thickness or 0.0)
+    x0, y0, x1, y1 = part.bounds
+    size = x1 - x0 + y1 - y0
+    part = set_precision(part, GRID * size)
     other = [one for one in sheet.regions if one.thickness != usual]
-    areas = [(set_precision(Polygon(one.polygon), GRID), one.thickness) for one in other]
-    areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > SPECK]
+    areas = [(set_precision(Polygon(one.polygon), GRID * size), one.thickness) for one in other]
+    areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > SPECK * size**2]
     if not areas:
         return LayeredPolygon(((part, usual),))
-    lines = union_all([part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=GRID)
+    lines = union_all([part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=GRID * size)
     prepare(part)
     faces = []
     for face in polygonize(lines):

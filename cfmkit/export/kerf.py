@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.arc_outlines import check_outlines, flat_points, place
+from cfmkit.export.arc_outlines import check_outlines, flat_points, flat_sagitta, place
 from cfmkit.numerics.arc_chain import ArcChain, points_on
 from cfmkit.specs.units import format_short
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from cfmkit.export.arc_outlines import Outline
 
 
-_ARC_ERROR = 1e-6  # of the distance between contour and cut where arcs stay arcs [m]: that of the flattening
-_POLYLINE_ERROR = 4e-6  # of the same where the cut becomes a polyline [m]
+_ARC_ERROR = 5.0  # of the distance between contour and cut where arcs stay arcs, in errors of the flattening
+_POLYLINE_ERROR = 20.0  # of the same where the cut becomes a polyline
 _GEOS_ERROR = 0.011  # shapely's buffer smooths inside corners by 1 % of its distance
 
 
@@ -99,6 +99,7 @@ def _follows(chain: ArcChain, outline: Outline, half: float, region: Any, error:
 
     edge = flat_points(outline.chain)
     track = flat_points(chain)
+    error *= flat_sagitta(outline.chain)
     source = shapely.LinearRing(edge)
     shapely.prepare(source)
     points = shapely.points(track)

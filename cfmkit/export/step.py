@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import re
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import GeometryError, OutputError, UsageError
-from cfmkit.numerics.arc_chain import arcs_through, points_on
+from cfmkit.errors import CfmError, GeometryError, OutputError, UsageError
+from cfmkit.numerics.arc_chain import points_on
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 
 STRAIGHT = 1e-6
 """Arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]."""
-MANY, ROUGH = 60, 2e-6
-"""Outlines of more lines than this come from merged pieces: arcs take their place, this near to them [m]."""
 
 
 def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
@@ -44,7 +41,16 @@ def step_bytes(name: str, drawn: Sequence[Outline], sheet: Sheet) -> bytes:
     if sheet.thickness is None:
         where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
         raise GeometryError(f"nothing says how thick the part is: {where}")
-    cut = [_with_arcs(one) for one in drawn if one.layer == "cut" and one.closed]
+    try:
+        return _step(kernel, name, [one for one in drawn if one.layer == "cut" and one.closed], sheet)
+    except CfmError:
+        raise
+    except Exception as error:  # the kernel has dozens of its own
+        reported = " ".join(f"{type(error).__name__}: {error}".split())
+        raise GeometryError(f"the CAD kernel cannot make a body from the outline ({reported})") from error
+
+
+def _step(kernel: Any, name: str, cut: Sequence[Outline], sheet: Sheet) -> bytes:
     wires = [(one, kernel.Wire(_edges(kernel, one))) for one in cut]
     faces = [kernel.Face(wire) for one, wire in wires if not one.hole]
     holes = [kernel.Face(wire) for one, wire in wires if one.hole]
@@ -63,17 +69,6 @@ def _kernel() -> ModuleType:
         raise UsageError("--format step needs build123d: pip install 'cfmkit[step]'") from None
     module: ModuleType = build123d
     return module
-
-
-def _with_arcs(outline: Outline) -> Outline:
-    """Return an outline of many short lines as arcs within `ROUGH` of them: a kernel's time grows with their square."""
-    chain = outline.chain
-    if np.any(chain.bulges) or len(chain.bulges) < MANY:
-        return outline
-    turns = np.abs(np.angle(chain.chords / np.roll(chain.chords, 1)))
-    start = int(turns.argmax())
-    points = np.append(np.roll(chain.nodes[:-1], -start), chain.nodes[start])
-    return replace(outline, chain=arcs_through(points, ROUGH))
 
 
 def _edges(kernel: Any, outline: Outline) -> list[Any]:

@@ -28,13 +28,13 @@ FINE = 4.0
 MOST = 2000
 """Points of a strip at most; those of more windings are farther apart."""
 TOUCHING = 1e-6
-"""Gaps that are rounding, and are closed when the outline is made [m]."""
+"""Gaps that are rounding, in thicknesses of the thinnest strip."""
 TRIED = 200
 """Lines between two strips that are looked at, the shortest ones."""
-SAGITTA = 1e-6
-"""How far arcs of the outline may be from their lines [m]."""
-ROUNDING = 1e-8
-"""Lines run through the material if less than this lies outside [m]: outlines are simplified."""
+SAGITTA = 1e-3
+"""How far arcs of the outline may be from their lines, in the same."""
+ROUNDING = 1e-5
+"""Lines run through the material if less than this lies outside, in the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def joined_away_from_nodes(
     found = [*look.between_strips(), *look.beside_blocks(blocks), *look.between_blocks(blocks)]
     if not found:
         return ()
-    whole = _material(contours)
+    whole = _material(contours, look.thinnest)
     shapely.prepare(whole)
     joins: dict[tuple[str, str], Join] = {}
     for one, other, starts, ends, gaps in found:
@@ -177,14 +177,14 @@ def joined_away_from_nodes(
     return tuple(joins.values())
 
 
-def _material(contours: Sequence[Contour]) -> Any:
+def _material(contours: Sequence[Contour], thinnest: float) -> Any:
     """Return the area within outlines and outside of holes, a little larger for rounding."""
     from shapely import Polygon, union_all
 
     closed = [one for one in contours if one.closed]
-    areas = [union_all([Polygon(one.points(SAGITTA)).buffer(0.0) for one in closed if one.hole is hole])
+    areas = [union_all([Polygon(one.points(SAGITTA * thinnest)).buffer(0.0) for one in closed if one.hole is hole])
              for hole in (False, True)]  # fmt: skip
-    return areas[0].difference(areas[1]).buffer(ROUNDING)
+    return areas[0].difference(areas[1]).buffer(ROUNDING * thinnest)
 
 
 Candidates = tuple[str, str, "FloatArray", "FloatArray", "FloatArray"]
@@ -196,7 +196,8 @@ class _Look:
 
     def __init__(self, strips: Sequence[DrawnStrip], nodes: NodesAndBodies, fillet: float) -> None:
         self.nodes, self.fillet = nodes, fillet
-        self.filled = 2.0 * fillet + TOUCHING
+        self.thinnest = min((float(strip.thickness.min()) for strip in strips), default=1.0)
+        self.filled = 2.0 * fillet + TOUCHING * self.thinnest
         self.names = [strip.name for strip in strips]
         sampled = [strip.sampled(fillet) for strip in strips]
         self.points, self.way, self.half = (

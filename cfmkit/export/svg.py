@@ -6,13 +6,13 @@ Arcs are arcs (`A` commands), so that nothing is lost against the DXF.
 from __future__ import annotations
 
 import math
+from functools import partial
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.layers import ENGRAVED, LayerLook, check_name, looks
 from cfmkit.specs.units import to_border
 
@@ -25,15 +25,15 @@ _MARGIN = 5.0  # around the drawing [mm]
 _STROKE = 0.25  # width of every line [mm]
 
 
-def write_svg(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
+def write_svg(drawing: Drawing, tolerance: float | None = None) -> bytes:
     """Return the drawing as SVG 1.1 at real size.
 
     Parameters
     ----------
     drawing : Drawing
         What to draw.
-    tolerance : float
-        Largest distance of the arcs from the exact smooth curves [m].
+    tolerance : float, optional
+        Largest distance of the arcs from the exact smooth curves [m]; default: that of the drawing.
 
     Raises
     ------
@@ -46,6 +46,8 @@ def write_svg(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
 def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText] = ()) -> bytes:
     """Return outlines and engraved texts as SVG; see `write_svg`."""
     points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
+    digits = _digits(float(np.ptp(points, axis=0).max()))
+    shape = partial(_shape, digits=digits)
     (left, low), (right, high) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
     width, height = _text(right - left), _text(high - low)
     head = (
@@ -56,17 +58,17 @@ def svg_bytes(name: str, drawn: Sequence[Outline], labels: Sequence[EngravedText
     layers = [
         line
         for layer, look in looks(outline.layer for outline in drawn).items()
-        for line in _group(layer, look, [outline for outline in drawn if outline.layer == layer])
+        for line in _group(layer, look, [shape(outline) for outline in drawn if outline.layer == layer])
     ]
     layers += _texts(labels)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, f"<title>{title}</title>", *layers, "</svg>", ""]
     return "\n".join(lines).encode()
 
 
-def _group(layer: str, look: LayerLook, members: Sequence[Outline]) -> list[str]:
+def _group(layer: str, look: LayerLook, members: Sequence[str]) -> list[str]:
     dashes = f' stroke-dasharray="{" ".join(map(_text, look.dashes))}"' if look.dashes else ""
     style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE)}" stroke-linejoin="round"{dashes}'
-    return [f'<g id="{layer}" {style}>', *map(_shape, members), "</g>"] if members else []
+    return [f'<g id="{layer}" {style}>', *members, "</g>"] if members else []
 
 
 def _texts(labels: Sequence[EngravedText]) -> list[str]:
@@ -85,26 +87,32 @@ def _texts(labels: Sequence[EngravedText]) -> list[str]:
     return [*found, "</g>"]
 
 
-def _shape(outline: Outline) -> str:
+def _shape(outline: Outline, digits: int) -> str:
     """Return one outline as a `circle` or a `path`; y is turned over, and with it the sense of every arc."""
+    number = partial(_text, digits=digits)
     if outline.circle:
         center, radius = (to_border(value, "length") for value in outline.circle)
-        return f'<circle cx="{_text(center.real)}" cy="{_text(-center.imag)}" r="{_text(radius)}"/>'
+        return f'<circle cx="{number(center.real)}" cy="{number(-center.imag)}" r="{number(radius)}"/>'
     nodes = to_border(outline.chain.nodes, "length")
-    steps = [f"M {_text(nodes[0].real)} {_text(-nodes[0].imag)}"]
+    steps = [f"M {number(nodes[0].real)} {number(-nodes[0].imag)}"]
     for start, end, bulge in zip(nodes[:-1], nodes[1:], outline.chain.bulges.tolist(), strict=True):
-        point = f"{_text(end.real)} {_text(-end.imag)}"
-        if abs(bulge) * abs(end - start) < 1e-6:
+        point = f"{number(end.real)} {number(-end.imag)}"
+        if abs(bulge) * abs(end - start) < 10.0**-digits:
             steps.append(f"L {point}")
         else:
-            radius = _text(abs(end - start) * (1 + bulge**2) / (4 * abs(bulge)))
+            radius = number(abs(end - start) * (1 + bulge**2) / (4 * abs(bulge)))
             steps.append(f"A {radius} {radius} 0 {int(abs(bulge) > 1)} {int(bulge < 0)} {point}")
     if outline.closed:
         steps[-1:] = ["Z"] if steps[-1].startswith("L") else [steps[-1], "Z"]
     return f'<path d="{" ".join(steps)}"/>'
 
 
-def _text(value: float) -> str:
-    """Return millimetres with nanometres, without idle zeros."""
-    text = f"{value:.6f}".rstrip("0").rstrip(".")
+def _digits(size: float) -> int:
+    """Return with how many digits a drawing of a size [mm] is written: nanometres, finer below 10 mm."""
+    return 6 + max(0, 1 - math.floor(math.log10(size))) if size > 0.0 else 6
+
+
+def _text(value: float, digits: int = 6) -> str:
+    """Return millimetres without idle zeros."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

@@ -27,9 +27,6 @@ FACING = 0.7
 PER_WALL, MOST_PLACES = 2.0, 20_000
 """Places along an edge in the thinnest wall that a process makes, and all round a part at most."""
 
-SLACK = 2.0 * TOLERANCE
-"""Two edges are drawn so far from the true ones together [m]: a wall just as thick as can be made is not thin."""
-
 AROUND = 4.0
 """Way along the edge from one side of a wall to the other, in its thickness, at least: round a tip of 27 degrees it is
 4.2 times as long as the ray, round blunter ones less. The end of a wall belongs to it up to 1.5 thicknesses from there.
@@ -102,12 +99,12 @@ class EdgeLines:
     around: FloatArray
 
     @classmethod
-    def of(cls, contours: Sequence[Contour]) -> EdgeLines:
-        """Return those of closed contours that are cut."""
+    def of(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:
+        """Return those of closed contours that are cut, within `sagitta` [m] of their arcs."""
         starts, along, ring, at = [], [], [], []
         around: list[float] = []
         for contour in contours:
-            points = contour.points(0.2 * TOLERANCE)
+            points = contour.points(sagitta)
             x, y = (points - points[0]).T
             if (float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0) != contour.hole:
                 points = points[::-1]
@@ -131,7 +128,7 @@ class EdgeLines:
         return line, (number + 0.5) / count[line]
 
 
-def thin_walls(contours: Sequence[Contour], least: float) -> tuple[ThinWall, ...]:
+def thin_walls(contours: Sequence[Contour], least: float, tolerance: float = TOLERANCE) -> tuple[ThinWall, ...]:
     """Return the walls of a part that are thinner than can be made, the thinnest first.
 
     Parameters
@@ -140,17 +137,19 @@ def thin_walls(contours: Sequence[Contour], least: float) -> tuple[ThinWall, ...
         Of its drawing; those that are closed and cut count.
     least : float
         Thinnest wall that can be made [m].
+    tolerance : float
+        How far each edge may be from the exact one [m]: a wall just as thick as can be made is not thin.
     """
     cut = [one for one in contours if one.layer == "cut" and one.closed]
-    if not cut or least <= SLACK:
+    if not cut or least <= 2.0 * tolerance:
         return ()
-    edges = EdgeLines.of(cut)
+    edges = EdgeLines.of(cut, 0.2 * tolerance)
     line, share = edges.places(least / PER_WALL)
     lengths = np.hypot(*edges.along.T)
     places = edges.starts[line] + share[:, None] * edges.along[line]
     unit = edges.along[line] / lengths[line, None]
     normals = np.column_stack([-unit[:, 1], unit[:, 0]])
-    ray, met, depth = facing_lines(edges.starts, edges.along, places, normals, least - SLACK)
+    ray, met, depth = facing_lines(edges.starts, edges.along, places, normals, least - 2.0 * tolerance)
     # the nearest line that a ray meets is the other side of its wall
     order = np.lexsort([depth, ray])
     ray, met, depth = ray[order], met[order], depth[order]

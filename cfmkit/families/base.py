@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
-from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE
+from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
     from cfmkit.results import Design, Result
-    from cfmkit.solid.two_meshes import DrivenPart
+    from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.units import Ends
 
@@ -228,6 +228,8 @@ class Room:
         Its lower left corner in the drawings of the mechanism [m].
     sideways : bool
         Whether the travel is along x in the drawings, not along y.
+    drawn : (float, float), optional
+        Width and height of the box along x and y of the drawings [m], where the travel is along neither.
     """
 
     across: float
@@ -237,6 +239,22 @@ class Room:
     assumed: str = ""
     corner: tuple[float, float] = (0.0, 0.0)
     sideways: bool = False
+    drawn: tuple[float, float] | None = None
+
+    @property
+    def sides(self) -> tuple[float, float, float | None]:
+        """Sizes along x and y of the drawings, and out of their plane [m]."""
+        width, height = (self.along, self.across) if self.sideways else (self.across, self.along)
+        width, height = self.drawn or (width, height)
+        return width, height, self.depth
+
+
+ENVELOPE = {
+    "envelope_x": ("length", "width of the box that everything stays in over the travel, along x of the drawings"),
+    "envelope_y": ("length", "height of the same box, along y of the drawings"),
+    "envelope_z": ("length", "depth of the same box, out of the plane, springs included"),
+}
+"""Scalar results of every family that knows its box; computed where a requirement, or a study, names one of them."""
 
 
 @dataclass(frozen=True)
@@ -298,8 +316,8 @@ class Family:
         ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
         specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
     errors : str, optional
-        ``"module:function"`` with ``errors(spec) -> {path: "thickness" or "position"}``: which values of a part the
-        process that makes it errs in, and in what.
+        ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position" or "rate"}``: which values of a part
+        err, and in what: by the process that makes it, or as the rate of a spring.
     attribution : str, optional
         ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
@@ -372,8 +390,10 @@ class Family:
     interface: int | None = None
 
     def __post_init__(self) -> None:
-        """Add the findings that every family has."""
+        """Add the findings that every family has, and the values of those that know their box."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
+        if self.room:
+            object.__setattr__(self, "values", {**self.values, **ENVELOPE})
 
     @property
     def bibtex(self) -> str:
@@ -398,8 +418,20 @@ class Family:
         return function
 
     def analyze(self, spec: Spec, run: Run) -> Result:
-        """Return what the model that a specification picks makes of it."""
-        return self.model_of(spec)(spec, run)
+        """Return what the model that a specification picks makes of it, with its box where a requirement is on that."""
+        names = {*(one.metric for one in spec.requirements), *(run.wanted or ())}
+        return self.with_envelope(self.model_of(spec)(spec, run), names)
+
+    def with_envelope(self, result: Result, names: Collection[str]) -> Result:
+        """Return a result with the sizes of its box among its values, if one of some names asks for them."""
+        if ENVELOPE.keys().isdisjoint(names) or not self.room:
+            return result
+        return sized(result, self.envelope(result))
+
+    def envelope(self, result: Result) -> Room | None:
+        """Return the box that a solved mechanism stays in; None where it is not known."""
+        found: Room | None = function_named(self.room)(result) if self.room else None
+        return found
 
     def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
         """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
@@ -411,6 +443,17 @@ class Family:
         name = self.elastic_networks
         found: tuple[DrivenNetwork, ...] = function_named(name)(spec) if name else ()
         return found
+
+
+def sized(result: Result, space: Room | None) -> Result:
+    """Return a result with the sizes of its box among its values; without a value where the box is not known."""
+    sides = (None, None, None) if space is None else space.sides
+    reason = (space.assumed if space else "") or "the box is not known"
+    found = {
+        name: Quantity(value, *about, "" if value is not None else reason)
+        for (name, about), value in zip(ENVELOPE.items(), sides, strict=True)
+    }
+    return replace(result, values={**result.values, **found})
 
 
 def packaged(name: str) -> str:

@@ -12,14 +12,17 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import sys
-from contextlib import redirect_stdout
-from dataclasses import dataclass
+import threading
+from collections.abc import Mapping
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from cfmkit.errors import UsageError, visible
+from cfmkit.errors import StoppedBySignal, UsageError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -137,15 +140,56 @@ def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
 
 @lru_cache(maxsize=64)
 def _imported(offer: InstalledFamily) -> Family | str:
-    """Return the record, or why there is none."""
-    from cfmkit.families.base import INTERFACE, Family, function_named
+    """Return the record, or why there is none: whatever the package raises when it is imported or looked at."""
+    from cfmkit.families.base import function_named
 
     try:
-        with redirect_stdout(sys.stderr):  # standard output is for results
+        with redirect_stdout(sys.stderr), _interrupts_apart():  # standard output is for results
             record = function_named(offer.target)
-    except (Exception, SystemExit) as error:  # whatever the package does when it is imported
-        reported = " ".join(str(error).split())
-        return f"it cannot be imported: {type(error).__name__}{': ' if reported else ''}{visible(reported)}"
+            return _fault_of(record, offer) or record
+    except _Interrupted:
+        raise KeyboardInterrupt from None
+    except StoppedBySignal:
+        raise
+    except BaseException as error:
+        return f"it cannot be imported: {_sentence_of(error)}"
+
+
+class _Interrupted(StoppedBySignal):
+    """Ctrl-C in a program that leaves it to Python; a KeyboardInterrupt may also be raised by a package."""
+
+
+@contextmanager
+def _interrupts_apart() -> Iterator[None]:
+    """Let Ctrl-C raise an exception that no package raises by itself."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: object) -> NoReturn:
+        raise _Interrupted
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+def _sentence_of(error: BaseException) -> str:
+    """Return what an exception of a package says, in one line; to say it may fail, too."""
+    try:
+        reported = visible(" ".join(str(error).split()))
+    except Exception:
+        reported = ""
+    return f"{type(error).__name__}{': ' if reported else ''}{reported}"
+
+
+def _fault_of(record: Any, offer: InstalledFamily) -> str:
+    """Return why a record cannot be used; empty if it can."""
+    from cfmkit.families.base import INTERFACE, Family, packaged
+
     if not isinstance(record, Family):
         return f"{offer.target} is a {type(record).__name__}, not a Family"
     if record.name != offer.name:
@@ -153,7 +197,43 @@ def _imported(offer: InstalledFamily) -> Family | str:
     if record.interface != INTERFACE:
         made = "does not state its interface" if record.interface is None else f"is for interface {record.interface}"
         return f"its record {made}, this cfmkit has interface {INTERFACE}; another version of one of them is needed"
-    return record
+    for one in fields(Family):
+        if not _is_of_kind(getattr(record, one.name), str(one.type)):
+            return f"the field {one.name!r} of its record must be of the type {one.type}"
+    for name in filter(None, (record.template, record.bibliography)):
+        packaged(name)
+    return ""
+
+
+def _is_of_kind(value: Any, kind: str) -> bool:
+    """Return whether a field of a record is what its annotation says, as far as every verb relies on it."""
+    from cfmkit.families.base import Search
+    from cfmkit.specs.spec import Spec
+
+    def are(parts: Any, *types: type) -> bool:
+        return all(isinstance(part, types) for part in parts)
+
+    if value is None:
+        return kind.endswith("| None")
+    kind = kind.removesuffix(" | None")
+    if kind == "type[Spec]":
+        return isinstance(value, type) and issubclass(value, Spec)
+    if kind == "tuple[str, ...]":
+        return isinstance(value, tuple) and are(value, str)
+    if kind.startswith(("Mapping", "dict")):
+        if not isinstance(value, Mapping) or not are(value, str):
+            return False
+        if "Analyzer" in kind:
+            return bool(value) and all(isinstance(one, str) or callable(one) for one in value.values())
+        if "tuple" in kind:
+            pairs = "..." not in kind
+            return are(value.values(), tuple) and all(
+                are(one, str) and (not pairs or len(one) == 2) for one in value.values()
+            )
+        return are(value.values(), str)
+    if kind.startswith("Callable"):
+        return callable(value)
+    return isinstance(value, {"str": str, "bool": bool, "int": int, "Search": Search}[kind])
 
 
 def code_of(offer: InstalledFamily) -> dict[str, str]:

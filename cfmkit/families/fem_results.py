@@ -24,26 +24,27 @@ if TYPE_CHECKING:
 DEFINITIONS = {
     "mesh_force_difference": (
         "ratio",
-        "largest difference of the force on a coarser mesh, relative to the largest force",
+        "largest difference of the force on the first two meshes, relative to the largest force",
     ),
     "mesh_stress_difference": (
         "ratio",
-        "largest difference of a pose's largest stress on a coarser mesh, relative to the largest of all poses",
+        "largest difference of a pose's largest stress on the first two meshes, relative to the largest of all poses",
     ),
     "mesh_force_error": (
         "ratio",
-        "discretisation error of the force, relative to the largest force: `mesh_force_difference`, at least 1e-4, "
-        "times a factor that covers 95 % of the parts in docs/solid.md",
+        "error of the force, relative to the largest force: what is left of the difference of two meshes on the last "
+        "one, by the order of convergence, and `curve_error`; more than `analysis.solid.error` only where "
+        "`mesh_coarse` warns",
     ),
     "mesh_stress_error": (
         "ratio",
-        "discretisation error of the largest stress, relative to it: `mesh_stress_difference`, at least 2 %, times "
-        "such a factor",
+        "discretisation error of the largest stress, relative to it: `mesh_stress_difference`, at least 3 %",
     ),
     "curve_error": (
         "ratio",
         "difference between the interpolated curve and poses solved between its poses, where it is expected to be "
-        "largest, relative to the largest force; poses are added, up to twice as many, until it is at most 5e-4",
+        "largest, relative to the largest force; poses are added, up to twice as many, until it is at most a fifth "
+        "of `analysis.solid.error`",
     ),
     "stress_concentration_max": (
         "factor",
@@ -52,7 +53,7 @@ DEFINITIONS = {
         "the beams' largest",
     ),
 }
-"""Name -> dimension and definition; `cfmkit.solid.two_meshes` and `nominal_stress_beside_fillets` compute them."""
+"""Name -> dimension and definition; computed by `solid.adaptive_solution` and `nominal_stress_beside_fillets`."""
 
 
 def unknown_to_beams() -> dict[str, Quantity]:

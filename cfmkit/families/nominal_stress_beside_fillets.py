@@ -38,9 +38,9 @@ TOGETHER = 1e-6
 TOLERANCE = 1e-6
 """Of the beams' path: far below what a mesh is off, and slender leaves reach it where they are pulled straight."""
 
-BESIDE, CHORDS = 1e-5, 0.02
-"""How far a fillet may end from the edge of its beam: what outlines may be off [m], and, in thicknesses, what lines
-between the places of a curved beam are."""
+CHORDS = 0.02
+"""How far a fillet may end from the edge of its beam, in thicknesses: what lines between the places of a curved beam
+are off."""
 
 
 def nominal_stresses(
@@ -166,7 +166,7 @@ class SolvedBeams:
         middle = 0.5 * float(found.place[point, k] + found.place[point, k + 1])
         at = found.place[point, k] + share * (found.place[point, k + 1] - found.place[point, k])
         thickness = float(np.real(beam.section.thickness_at(at, middle)))
-        allowed = BESIDE + CHORDS * thickness
+        allowed = CHORDS * thickness
         if abs(along) > allowed or abs(abs(aside) - 0.5 * thickness) > allowed:
             return None
         bending, axial = (

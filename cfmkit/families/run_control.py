@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -79,6 +80,31 @@ def rising(told: Callable[[float, str], None]) -> Callable[[float, str], None]:
     return told if told is silent or isinstance(told, Rising | Scaled) else Rising(told)
 
 
+def read_time(time: str | float | None, name: str = "time_budget") -> float | None:
+    """Return a time [s] of a number or a text with its unit; None for None.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is no time, with the name of what it was given for.
+
+    Examples
+    --------
+    >>> read_time("2 min"), read_time(20.0)
+    (120.0, 20.0)
+    """
+    from cfmkit.errors import QuantityError, UsageError
+    from cfmkit.specs.units import read_quantity
+
+    if time is None or not isinstance(time, str):
+        return time
+    text = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", time.strip())
+    try:
+        return float(text) if re.fullmatch(r"[\d.]+", text) else read_quantity(text, "time")
+    except (QuantityError, ValueError) as error:
+        raise UsageError(f"{name}: {error}") from None
+
+
 @dataclass(frozen=True)
 class Run:
     """How a function is to be run.
@@ -90,7 +116,7 @@ class Run:
     progress : callable
         Is told a fraction in [0, 1], which never falls, and a short text.
     time_budget : float, optional
-        In seconds; None: no limit.
+        In seconds, a text with its unit is read; None: no limit.
     executor : Executor
         Does independent jobs, in this process or in others.
     notes : Notes
@@ -113,6 +139,7 @@ class Run:
     def __post_init__(self) -> None:
         """Let no search that looks again take its progress back."""
         object.__setattr__(self, "progress", rising(self.progress))
+        object.__setattr__(self, "time_budget", read_time(self.time_budget))
 
     def wants(self, names: Iterable[str]) -> bool:
         """Tell whether any of these metrics is looked at."""

@@ -53,6 +53,8 @@ class Wish:
         Least share of manufactured parts that meet all of it.
     process : str, optional
         By which tolerances they are made; None: those of the process that is usual for the material.
+    reserve : float
+        Share of the allowable stress that designs by beams may use: solids have more stress, in fillets.
     """
 
     kind: Literal["force", "torque"]
@@ -70,6 +72,7 @@ class Wish:
     thinnest: float = 2e-5
     good_parts: float | None = None
     process: str | None = None
+    reserve: float = 1.0
 
     @property
     def depth(self) -> float | None:
@@ -79,7 +82,7 @@ class Wish:
     @property
     def strength_used(self) -> float:
         """The share of the allowable stress that designs may use: made parts are thicker and stiffer than drawn."""
-        return 1.0 if self.good_parts is None else RESERVED
+        return self.reserve * (1.0 if self.good_parts is None else RESERVED)
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,12 @@ class Candidate:
         The smaller, the sooner it is worth a try.
     free : tuple of str
         Paths of values of one that is not designed, which may move where made parts miss a yield.
+    correct : str
+        ``"module:function"``, ``function(spec, wish) -> spec``: solves the part by the finest model of the family and
+        returns it with that model, its window, thicknesses and widths corrected by what was found. Empty: it is judged
+        by that model as it is.
+    reserve : float
+        `Wish.reserve` that it was proposed for, and is designed with.
     """
 
     variant: str
@@ -109,6 +118,8 @@ class Candidate:
     finish: str = ""
     promise: float = 0.0
     free: tuple[str, ...] = ()
+    correct: str = ""
+    reserve: float = 1.0
 
 
 def called(variant: str, wish: Wish, block: MaterialBlock) -> str:

@@ -27,6 +27,8 @@ from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
 
 ZERO = 1e-9
 """An effort at the reference below this share of the largest is rounding: a band in per cent of it has no width."""
+
+STATED_ERROR = 1e-12
+"""Numerical error of a curve whose model states none, in parts of its largest effort: the digits of a file, sums."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,10 @@ class MeasuringFrame:
         Fatigue and relaxation of the material.
     curve : TargetCurve or None
         What it should follow where it is not to be constant.
+    effort_error : float or None
+        Numerical error of the effort [N or N m], below which there is nothing to compare with; None: not stated.
+    part_efforts : callable or None
+        Returns the largest effort of one spring or member of a branch at places of its motion (`Result.part_efforts`).
     """
 
     target: float | None = None
@@ -79,6 +88,15 @@ class MeasuringFrame:
     winding: WindingPath | None = field(default=None, compare=False)
     durability: Durability | None = None
     curve: TargetCurve | None = None
+    over_motion: bool = False
+    """Whether means are over the motion and not over the points: those of a recording stand where its clock put them.
+    """
+    effort_error: float | None = None
+    part_efforts: Callable[[str, FloatArray], FloatArray] | None = field(default=None, compare=False)
+
+    def has_target(self) -> bool:
+        """Return True if there is a target that is not zero within the numerical error of the effort."""
+        return self.target is not None and abs(self.target) > (self.effort_error or 0.0)
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -88,7 +106,7 @@ class MeasuringFrame:
         Undefined
             If there is none.
         """
-        if not self.target:
+        if self.target is None or not self.has_target():
             reported = "the target is zero" if self.target is not None else "there is no target to compare with"
             raise Undefined(f"{reported}; 'deviation_from_curve' compares with a curve" if self.curve else reported)
         return self.target
@@ -170,7 +188,7 @@ class Branch:
         if isfinite(part.effort.sum()):
             return part
         failed = len(part.effort) - int(np.isfinite(part.effort).sum())
-        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no equilibrium"
+        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no known {self.kind}"
 
     @property
     def inside(self) -> BranchTrace:
@@ -244,27 +262,77 @@ class Branch:
             return winding_branches.extremes(path, *self.ends_on_way)
         if model is None:
             return float(part.effort.max()), float(part.effort.min())
-        motion, effort, (low, high) = part.motion, part.effort, self.ends
-        peaks = model.peaks
+        return self._next_to_samples(partial(model.effort, self.name), part.effort, model.peaks)
+
+    def _next_to_samples(
+        self, function: Callable[[FloatArray], FloatArray], values: FloatArray, peaks: FloatArray
+    ) -> tuple[float, float]:
+        """Return the largest and the smallest value of a function of the motion in the window, from its samples on."""
+        motion, (low, high) = self.inside.motion, self.ends
         between = (peaks > low) & (peaks < high)
         if between.any():
-            heights = model.effort(self.name, peaks)
-            motion, effort = (
-                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (effort, heights))
+            heights = function(peaks)
+            motion, values = (
+                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (values, heights))
             )
             motion, chosen = np.unique(motion, return_index=True)
-            motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
+            motion, values = motion[np.isfinite(values[chosen])], values[chosen][np.isfinite(values[chosen])]
         uneven = bool(between.any()) and len(peaks) < continuous_means_and_extremes.FEW
-        top, bottom = continuous_means_and_extremes.extremes(
-            partial(model.effort, self.name), motion[None, :], effort[None, :], uneven
-        )
+        top, bottom = continuous_means_and_extremes.extremes(function, motion[None, :], values[None, :], uneven)
         return float(top[0]), float(bottom[0])
 
     @cached_property
     def spread(self) -> Spread:
         """Mean and extremes in the window."""
         effort = self.inside.effort
-        return Spread.of(float(effort.sum()) / len(effort), *self._extremes)
+        mean = self.mean_over_motion(effort) if self.frame.over_motion else float(effort.sum()) / len(effort)
+        return Spread.of(mean, *self._extremes, self.error)
+
+    def mean_over_motion(self, values: FloatArray) -> float:
+        """Return the mean of values at the points in the window over the motion, by trapezoids."""
+        motion = self.inside.motion
+        width = float(motion[-1] - motion[0])
+        return float(np.trapezoid(values, motion)) / width if width else float(values.mean())
+
+    @cached_property
+    def error(self) -> float:
+        """Numerical error of the effort [N or N m]."""
+        if self.frame.effort_error is not None:
+            return self.frame.effort_error
+        sizes = np.abs(self.trace.effort)
+        return STATED_ERROR * float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+
+    @property
+    def vanishes(self) -> str:
+        """Why a share of this effort has no value: it is zero within its numerical error, or changes its sign."""
+        if max(map(abs, self._extremes)) > self.error:
+            return f"the {self.kind} changes sign or is zero"
+        balancer = "; 'static_balance' judges a balancer" if self.frame.part_efforts else ""
+        return f"the {self.kind} is zero within its numerical error, {self.error_text}{balancer}"
+
+    @property
+    def error_text(self) -> str:
+        """The numerical error of the effort with its unit."""
+        from cfmkit.specs.units import format_short
+
+        return format_short(self.error, self.kind, 2)
+
+    @property
+    def largest_part(self) -> float:
+        """Largest effort of one spring or member in the window [N or N m].
+
+        Raises
+        ------
+        Undefined
+            If the model does not know them, or the branch does not cover the window.
+        """
+        if self.frame.part_efforts is None:
+            raise Undefined("the model does not tell what single springs and members do")
+        function, model = partial(self.frame.part_efforts, self.name), self.frame.closed
+        sizes = function(self.inside.motion)
+        if model is None or not np.isfinite(sizes).all():
+            return float(sizes.max(initial=0.0, where=np.isfinite(sizes)))
+        return self._next_to_samples(function, sizes, model.peaks)[0]
 
     @cached_property
     def level(self) -> float:
@@ -304,8 +372,8 @@ class Branch:
         here = self.at(place)
         if model is not None:  # an interpolated value may hide that there is no effort
             here = float(model.effort(self.name, np.array([place]))[0])
-        if abs(here) <= ZERO * float(np.nanmax(np.abs(self.function.effort))):
-            raise Undefined(f"the {self.kind} at the reference pose is zero")
+        if abs(here) <= max(self.error, ZERO * float(np.nanmax(np.abs(self.function.effort)))):
+            raise Undefined(f"the {self.kind} at the reference pose is zero within its numerical error")
         return here
 
     @cached_property

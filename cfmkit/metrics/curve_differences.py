@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
 
-    Measure = tuple[Callable[[FloatArray], float], str]
+    Measure = tuple[Callable[["Difference"], float], str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,25 +33,28 @@ class Difference:
         One less the other at each place [N or N m]; NaN where one of them has no value.
     reason : str
         Why they cannot be summed up, should one of them be NaN.
+    weights : (n,) array or None
+        How much each place counts, such as the way that it stands for; None: all alike.
     """
 
     values: FloatArray
     reason: str
+    weights: FloatArray | None = None
 
 
-def rms(values: FloatArray) -> float:
+def rms(difference: Difference) -> float:
     """Return the root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.average(difference.values**2, weights=difference.weights)))
 
 
-def largest(values: FloatArray) -> float:
+def largest(difference: Difference) -> float:
     """Return the value that is largest in magnitude, with its sign."""
-    return float(values[np.argmax(np.abs(values))])
+    return float(difference.values[np.argmax(np.abs(difference.values))])
 
 
-def mean(values: FloatArray) -> float:
+def mean(difference: Difference) -> float:
     """Return the mean."""
-    return float(np.mean(values))
+    return float(np.average(difference.values, weights=difference.weights))
 
 
 def summarize(
@@ -64,7 +67,7 @@ def summarize(
     differences : mapping of str to Difference
         By branch.
     measures : mapping of str to (callable, str)
-        Name -> (function of the values, definition; ``{}`` in it becomes the kind).
+        Name -> (function of a difference, definition; ``{}`` in it becomes the kind).
     kind : {"force", "torque"}
         Of the curves.
     tag : str
@@ -75,7 +78,7 @@ def summarize(
     for branch, item in (whole | dict(differences)).items():
         inside = ",".join(part for part in (tag, branch if several else "") if part)
         for name, (function, words) in measures.items():
-            value = function(item.values) if len(item.values) and np.isfinite(item.values).all() else None
+            value = function(item) if len(item.values) and np.isfinite(item.values).all() else None
             reason = item.reason if value is None else ""
             found[f"{name}[{inside}]" if inside else name] = Quantity(value, kind, words.format(kind), reason)
     return found
@@ -85,7 +88,9 @@ def _joined(differences: Mapping[str, Difference]) -> Difference:
     """Return the differences of all branches, with the reason of the first that has a gap."""
     items = list(differences.values())
     gaps = [item.reason for item in items if not np.isfinite(item.values).all()]
-    return Difference(np.concatenate([item.values for item in items]), gaps[0] if gaps else items[0].reason)
+    weights = [np.ones(len(item.values)) if item.weights is None else item.weights for item in items]
+    values = np.concatenate([item.values for item in items])
+    return Difference(values, gaps[0] if gaps else items[0].reason, np.concatenate(weights))
 
 
 def counterpart(curve: Curve, branch: str, way: float) -> str:

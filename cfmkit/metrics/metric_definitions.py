@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.metrics import ranges, window_metrics
+from cfmkit.metrics.spread import STATIC_BALANCE
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Definition:
         Whether it is there only where the material says something about use.
     of_curve : bool
         Whether it is there only where a target curve is.
+    of_parts : bool
+        Whether it is there only where the model knows the efforts of single springs and members.
     """
 
     name: str
@@ -81,6 +84,7 @@ class Definition:
     argument: str = ""
     of_material: bool = False
     of_curve: bool = False
+    of_parts: bool = False
 
     @property
     def per_branch(self) -> bool:
@@ -161,6 +165,14 @@ _IN_WINDOW = (
         "excluded, F* the curve of `design.target` or `analysis.target`",
         window_metrics.rms_to_curve,
         of_curve=True,
+    ),
+    Definition(
+        STATIC_BALANCE,
+        "ratio",
+        "largest |F| of the {effort} in the window over the largest {effort} of one spring or member there, which is "
+        "the derivative of its energy by the {motion}; 0 is a perfect balancer",
+        window_metrics.static_balance,
+        of_parts=True,
     ),
 )
 

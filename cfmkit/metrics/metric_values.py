@@ -161,6 +161,8 @@ def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quanti
         return
     if definition.of_curve and view.subject.frame.curve is None:
         return
+    if definition.of_parts and view.subject.frame.part_efforts is None:
+        return
     if definition.argument:
         for text in map(hold_text, known.holds if known else ()):
             found = view.worst(definition, view.each(definition, text))
@@ -192,6 +194,8 @@ def frame_of(result: Result) -> MeasuringFrame:
         durability=getattr(result.spec, "durability", None),
         ends=result.ends,
         curve=result.target_curve or getattr(result.spec, "target_curve", None),
+        effort_error=result.effort_error,
+        part_efforts=result.part_efforts,
     )
 
 

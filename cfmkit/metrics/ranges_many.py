@@ -48,6 +48,8 @@ class ManyBranches:
         not interpolated.
     excess : callable, optional
         By what share the stress there exceeds what is allowed, likewise.
+    error : (d,) array, optional
+        Numerical error of the effort [N or N m]: an effort that is not above it is none to compare with.
     """
 
     motion: FloatArray
@@ -57,6 +59,7 @@ class ManyBranches:
     exact: Exact | None = None
     excess: Exact | None = None
     pose: FloatArray | None = None
+    error: FloatArray | float = 0.0
 
     @property
     def reference(self) -> FloatArray:
@@ -123,7 +126,7 @@ def _first_95(many: ManyBranches) -> FloatArray:
         return many.rise if len(many.motion) == 1 else many.solved[0]
     nominal, first, step, (earlier, later) = _rise(many)
     crossed = _crossing(step, (earlier - 0.95 * nominal, later - 0.95 * nominal))
-    return np.where(nominal == 0, np.nan, np.where(first == 0, many.motion[:, 0], crossed))
+    return np.where(np.abs(nominal) <= many.error, np.nan, np.where(first == 0, many.motion[:, 0], crossed))
 
 
 def _rise(many: ManyBranches) -> tuple[FloatArray, NDArray[np.intp], Pair, Pair]:
@@ -159,7 +162,7 @@ def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
     high = _edge(many, offset, (right.argmax(axis=1), -1), (index, place), tolerance)
     low = np.where(left.any(axis=1), low, motion[:, 0])
     high = np.where(right.any(axis=1), high, motion[:, -1])
-    return np.where(here == 0, np.nan, high - low)
+    return np.where(np.abs(here) <= many.error, np.nan, high - low)
 
 
 def _edge(
@@ -188,7 +191,7 @@ def _solved(many: ManyBranches, with_rise: bool = True, with_bands: bool = True)
     Without the rise, or the bands, these are NaN.
     """
     nominal, first, (start, stop), _ = _rise(many)
-    start, some = np.where(first == 0, many.motion[:, 0], start), np.isfinite(nominal) & (nominal != 0)
+    start, some = np.where(first == 0, many.motion[:, 0], start), np.isfinite(nominal) & (np.abs(nominal) > many.error)
     stop = np.where(some & (first > 0), stop, start)
     start, stop = (start, stop) if with_rise else (start, start)
     here, inside, outside, ends = _bands(many)
@@ -207,7 +210,8 @@ def _solved(many: ManyBranches, with_rise: bool = True, with_bands: bool = True)
 
     places = last_places(excess, np.column_stack([start, inside]), np.column_stack([stop, outside]))
     found = np.where(np.isnan(ends), places[:, 1:], ends)
-    bands = np.where(here == 0, np.nan, found[:, 1::2] - found[:, ::2])
+    nothing = np.abs(here[:, 0]) <= many.error
+    bands = np.where(nothing[:, None], np.nan, found[:, 1::2] - found[:, ::2])
     return np.where(some & with_rise, places[:, 0], np.nan), bands if with_bands else np.full_like(bands, np.nan)
 
 

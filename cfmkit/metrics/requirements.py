@@ -14,7 +14,7 @@ from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.metric_definitions import Definition, branch_fault, known_metrics, split_name, unknown_metric, words
 from cfmkit.metrics.metric_values import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
-from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
+from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, meant_as_percent, read_one_of, to_border
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
@@ -201,7 +201,12 @@ def _faults(
     """Yield (key, what is wrong) for one requirement."""
     name, branch = split_name(requirement.metric)
     if requirement.metric in OF_MANY_PARTS:
-        yield from _bound_faults(requirement, ("ratio",))
+        faults = tuple(_bound_faults(requirement, ("ratio",)))
+        bounds = {} if faults else {"min": requirement.min, "max": requirement.max}
+        yield from faults
+        for key, text in bounds.items():
+            if (bound(text, ("ratio",)) or 0.0) > 1:
+                yield key, f"{name!r} is a share of parts, at most 100 %: {text} cannot be reached"
         if requirement.over is not None:
             yield "over", f"{name!r} is a share of parts, which has no window; remove 'over'"
         return
@@ -223,6 +228,10 @@ def _bound_faults(requirement: Requirement, dimensions: tuple[str, ...]) -> Iter
             bounds.append(bound(text, dimensions))
         except QuantityError as problem:
             yield key, f"a bound of {requirement.metric!r}: {problem}"
+            return
+        if text is not None and dimensions == ("ratio",) and (meant := meant_as_percent(text)):
+            share = format_short(bounds[-1] or 0.0, "ratio")
+            yield key, f"a bound of {requirement.metric!r}: {text} is {share}; did you mean {meant}?"
             return
     low, high = bounds
     if low is not None and high is not None and low > high:

@@ -3,7 +3,7 @@
 The numbers of a `Spread` are floats for one curve and (d,) arrays for many; every metric is written once, for both.
 An effort whose mean is negative is judged in its own direction: the opposite sign convention gives the same ripple.
 Where the mean is zero, as over a full turn, the larger extreme says the direction; a mean of rounding alone is zero.
-A share of something that is not positive is NaN.
+A share of something that is not above the numerical error of the effort is NaN: rounding over rounding says nothing.
 """
 
 from __future__ import annotations
@@ -35,24 +35,29 @@ class Spread(NamedTuple):
         In the effort's own direction [N or N m].
     sign : float or (d,) array
         1 or -1.
+    error : float or (d,) array
+        Numerical error of the effort [N or N m]: what is not above it is no reference.
     """
 
     mean: Number
     max: Number
     min: Number
     sign: Number
+    error: Number = 0.0
 
     @classmethod
-    def of(cls, mean: Number, largest: Number, smallest: Number) -> Spread:
-        """Return the spread of efforts with this mean and these extremes."""
+    def of(cls, mean: Number, largest: Number, smallest: Number, error: Number = 0.0) -> Spread:
+        """Return the spread of efforts with this mean, these extremes and this numerical error."""
         if isinstance(mean, float):
-            mean = 0.0 if abs(mean) <= ROUNDED * max(abs(largest), abs(smallest)) else mean
+            mean = 0.0 if abs(mean) <= max(ROUNDED * max(abs(largest), abs(smallest)), error) else mean
             down = (mean or largest + smallest) < 0
-            return cls(abs(mean), -smallest, -largest, -1.0) if down else cls(mean, largest, smallest, 1.0)
-        mean = np.where(np.abs(mean) <= ROUNDED * np.maximum(np.abs(largest), np.abs(smallest)), 0.0, mean)
+            high, low = (-smallest, -largest) if down else (largest, smallest)
+            return cls(abs(mean), high, low, -1.0 if down else 1.0, error)
+        rounding = np.maximum(ROUNDED * np.maximum(np.abs(largest), np.abs(smallest)), error)
+        mean = np.where(np.abs(mean) <= rounding, 0.0, mean)
         down = np.where(mean == 0, largest + smallest, mean) < 0
         high, low = np.where(down, -smallest, largest), np.where(down, -largest, smallest)
-        return cls(np.abs(mean), high, low, np.where(down, -1.0, 1.0))
+        return cls(np.abs(mean), high, low, np.where(down, -1.0, 1.0), error)
 
 
 def level(found: Spread) -> Number:
@@ -72,23 +77,28 @@ def smallest(found: Spread) -> Number:
 
 def ripple(found: Spread) -> Number:
     """Return (max - min) / max."""
-    return _share(found.max - found.min, found.max)
+    return _share(found.max - found.min, found.max, found.error)
 
 
 def half_band(found: Spread) -> Number:
     """Return (max - min) / (max + min)."""
-    return _share(found.max - found.min, found.max + found.min)
+    return _share(found.max - found.min, found.max + found.min, found.error)
 
 
 def deviation_from_mean(found: Spread) -> Number:
     """Return the largest ``|F - mean| / mean``."""
-    return _share(_larger(found.max - found.mean, found.mean - found.min), found.mean)
+    return _share(_larger(found.max - found.mean, found.mean - found.min), found.mean, found.error)
 
 
 def deviation_from_target(found: Spread, target: Number) -> Number:
     """Return the largest ``|F - target| / |target|``; NaN where the target is zero."""
     away = _larger(abs(largest(found) - target), abs(smallest(found) - target))
-    return _share(away, abs(target))
+    return _share(away, abs(target), found.error)
+
+
+def static_balance(found: Spread, part: Number) -> Number:
+    """Return the largest effort over the largest of one spring or member, `part`, whatever their signs."""
+    return _share(_larger(abs(found.max), abs(found.min)), part, found.error)
 
 
 def deviation(effort: FloatArray, mean: Number) -> Number:
@@ -107,10 +117,11 @@ def _larger(one: Number, other: Number) -> Number:
     return max(one, other) if isinstance(one, float) else np.maximum(one, other)
 
 
-def _share(part: Number, whole: Number) -> Number:
+def _share(part: Number, whole: Number, error: Number) -> Number:
     if isinstance(part, float):
-        return part / whole if whole > 0 else np.nan
-    return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), np.nan)
+        return part / whole if whole > error else np.nan
+    known = whole > error
+    return np.where(known, part / np.where(known, whole, 1.0), np.nan)
 
 
 class ManyWindows:
@@ -124,11 +135,19 @@ class ManyWindows:
         [N or N m].
     extremes : callable
         Returns their largest and smallest values, (d,) each, next to the samples as well; called when they are needed.
+    error : (d,) array, optional
+        Numerical error of the efforts [N or N m].
     """
 
-    def __init__(self, motion: FloatArray, effort: FloatArray, extremes: Callable[[FloatArray, FloatArray], Pair]):
+    def __init__(
+        self,
+        motion: FloatArray,
+        effort: FloatArray,
+        extremes: Callable[[FloatArray, FloatArray], Pair],
+        error: FloatArray | float = 0.0,
+    ):
         """Keep the efforts."""
-        self.motion, self.effort, self._extremes_of = motion, effort, extremes
+        self.motion, self.effort, self._extremes_of, self.error = motion, effort, extremes, error
 
     @cached_property
     def mean(self) -> FloatArray:
@@ -143,7 +162,7 @@ class ManyWindows:
     @cached_property
     def spread(self) -> Spread:
         """Mean and extremes of each curve."""
-        return Spread.of(self.mean, *self.extremes)
+        return Spread.of(self.mean, *self.extremes, self.error)
 
     @property
     def deviation(self) -> FloatArray:
@@ -173,6 +192,8 @@ OF_EITHER: dict[str, Callable[[ManyWindows], FloatArray]] = {
 """Metrics that are called the same for forces and torques."""
 
 TO_TARGET = "deviation_from_target"
+
+STATIC_BALANCE = "static_balance"
 
 
 def metrics_of(kind: str) -> frozenset[str]:

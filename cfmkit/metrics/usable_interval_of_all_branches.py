@@ -54,7 +54,8 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     that a branch that folds back needs no sorting.
     """
     curve, cycle = cycle.frame.curve, _levelled(cycle)
-    reference = cycle.frame.target or _mean(cycle)
+    reference = cycle.frame.target if cycle.frame.has_target() else _mean(cycle)
+    assert reference is not None
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
     if cycle.frame.winding is not None:
         travel = winding_branches.reach(cycle.frame.winding)
@@ -77,7 +78,7 @@ def _levelled(cycle: Cycle) -> Cycle:
         return cycle
     low, high = max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches)
     low, high = max(low, curve.extent[0]), min(high, curve.extent[1])
-    if not (low < high and (size := curve.largest(low, high))):
+    if not (low < high and (size := curve.largest(low, high)) > (cycle.frame.effort_error or 0.0)):
         raise Undefined("the target curve is not defined for this travel")
     valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
     model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
@@ -119,8 +120,8 @@ class LevelledModel:
 def _mean(cycle: Cycle) -> float:
     """Return the mean of the branches' means, each over its points in the window, or the window where it is solved."""
     value = sum(branch.level for branch in cycle.branches) / len(cycle.branches)
-    if value == 0:
-        raise Undefined("there is no target, and the mean is zero")
+    if abs(value) <= max(branch.error for branch in cycle.branches):
+        raise Undefined("there is no target, and the mean is zero within its numerical error")
     return value
 
 

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from cfmkit.metrics.usable_interval_of_all_branches import Cycle
 
 
+NO_STRESS = 1e-12
+"""Share of the allowable stress that rounding leaves where nothing is stressed."""
+
 UNKNOWN_BESIDE = "the stress of another load case is not known everywhere in the window"
 """Why there is no largest stress, and no life."""
 
@@ -39,6 +42,8 @@ def standard_deviation(branch: Branch) -> float:
     effort = branch.inside.effort
     if len(effort) < 2:
         raise Undefined("a standard deviation needs two points")
+    if branch.frame.over_motion:
+        return sqrt(branch.mean_over_motion((effort - mean(branch)) ** 2))
     return float(spread.deviation(effort, mean(branch)))
 
 
@@ -69,8 +74,16 @@ def deviation_from_mean(branch: Branch) -> float:
 
 def _known(share: float, branch: Branch) -> float:
     if isnan(share):
-        raise Undefined(f"the {branch.kind} changes sign or is zero")
+        raise Undefined(branch.vanishes)
     return float(share)
+
+
+def static_balance(branch: Branch) -> float:
+    """Return the largest ``|F|`` over the largest of one spring or member in the window."""
+    part = branch.largest_part
+    if part <= branch.error:
+        raise Undefined(f"no spring or member bears more than the numerical error, {branch.error_text}")
+    return float(spread.static_balance(branch.spread, part))
 
 
 def deviation_from_target(branch: Branch) -> float:
@@ -99,7 +112,7 @@ def deviation_from_curve(branch: Branch) -> float:
     (low, high), part, model = branch.ends, branch.inside, branch.frame.closed
     curve = branch.frame.needed_curve(low, high, branch.kind)
     size = curve.largest(low, high)
-    if not size:
+    if size <= branch.error:
         raise Undefined("the target curve is zero in the window")
     offset = part.effort - curve.at(part.motion)
     top, bottom = offset.max(), offset.min()
@@ -187,7 +200,7 @@ def safety_factor(branch: Branch) -> float:
     if allowable is None:
         raise Undefined("there is no allowable stress to compare with")
     stress = stress_max(branch)
-    if stress <= 0:
+    if stress <= NO_STRESS * allowable:
         raise Undefined("nothing is stressed")
     return allowable / stress
 

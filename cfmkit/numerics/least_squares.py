@@ -52,6 +52,9 @@ class LeastSquares:
         Typical size of each parameter, positive.
     level : float
         Typical size of the data, in the unit of the residuals.
+    design_effect : float
+        How many residuals count as one because they have unequal weights: the mean square of the weights over the
+        square of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2).
     """
 
     residuals: Callable[[FloatArray], FloatArray]
@@ -60,6 +63,7 @@ class LeastSquares:
     high: FloatArray
     size: FloatArray
     level: float
+    design_effect: float = 1.0
 
     def jacobian(self, values: FloatArray) -> FloatArray:
         """Return the derivatives of the residuals by the parameters in their sizes, by central differences.
@@ -99,7 +103,7 @@ class FittedValues:
     noise : float
         Standard deviation of the residuals, by their median absolute deviation under a robust loss.
     inflation : float
-        Correlation time of the residuals in samples: so many count as one.
+        Correlation time of the residuals in samples, times the effect of their weights: so many count as one.
     at_bound : (p,) array of bool
         Which values lie on a bound.
     freedom : float
@@ -232,7 +236,7 @@ def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
     count, free = len(residuals), len(residuals) - len(values)
     rms = float(np.sqrt((residuals**2).sum() / max(free, 1)))
     noise = rms if loss == "linear" else 1.4826 * float(np.median(np.abs(residuals))) or rms
-    inflation = correlation_time(residuals)
+    inflation = correlation_time(residuals) * problem.design_effect
     # With a robust loss the solver's Jacobian is weighted, so that its square is the curvature of the loss.
     _, singular, right = np.linalg.svd(best.jac, full_matrices=False)
     inverse = (right.T / np.maximum(singular, 1e-14 * singular[0]) ** 2) @ right

@@ -197,11 +197,11 @@ def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> No
 
 
 @styled
-def right_axis(ax: Axes, factor: float, label: str) -> None:
-    """Add an axis at the right for a quantity that is `factor` times the left one, in border units."""
+def right_axis(ax: Axes, factor: float, label: str, at_zero: float = 0.0) -> None:
+    """Add an axis at the right for `at_zero` plus `factor` times the left quantity, in border units."""
     right = ax.twinx()
     right.yaxis.set_major_formatter(WholeNumbers())
-    right.set_ylim(*(factor * value for value in ax.get_ylim()))
+    right.set_ylim(*(at_zero + factor * value for value in ax.get_ylim()))
     right.set_ylabel(label)
     right.spines["right"].set_visible(True)
     right.grid(False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import UsageError, visible
+from cfmkit.errors import UsageError, reason_of, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -183,8 +183,7 @@ def _read(path: str) -> dict[str, Any]:
             warnings.simplefilter("error")
             read: Any = matplotlib.rc_params_from_file(path, fail_on_error=False, use_default_template=False)
     except (OSError, UnicodeDecodeError) as error:
-        reason = str(getattr(error, "strerror", None) or error).lower()
-        raise UsageError(f"--figure-style: {visible(path)} cannot be read: {reason}") from None
+        raise UsageError(f"--figure-style: {visible(path)} cannot be read: {reason_of(error)}") from None
     except Exception as error:
         raise UsageError(f"--figure-style: {visible(path)}: {' '.join(str(error).split())}") from None
     finally:

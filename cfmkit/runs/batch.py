@@ -444,7 +444,8 @@ def batch(
     reported = None if summary is None else prepared(summary, "--summary")
     tolerance = TOLERANCE if compare_tolerance is None else compare_tolerance
     if not 0 <= tolerance < 1:
-        raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1")
+        meant = f"; did you mean '{tolerance:g} %'?" if 1 <= tolerance < 100 else ""
+        raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1{meant}")
     before = None if compare is None else earlier(os.fspath(compare))
     watched = monitor or Unwatched()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, visible
 from cfmkit.runs.html_report_of_run import ENDS, NAME, part, template
 from cfmkit.studies.batch_sources_and_outcomes import message, outcome
 from cfmkit.studies.metric_changes_since_earlier_batch import changes_table
@@ -108,7 +108,9 @@ def _tone(entry: Entry) -> str:
 MOST_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""
 
-MARKUP = re.compile(r"([\\`*_\[\]<>|~&@#])")
+MARKUP = re.compile(r"([\\`*_\[\]<>|~&@#$]|^[=+-])")
+APART = "&#8203;"
+"""A blank of no width: a backslash before it does not keep a page from making a mention of @name."""
 
 
 def summary(entries: Sequence[Entry], compared: BatchComparison | None = None) -> bytes:
@@ -132,7 +134,7 @@ def _lines(entries: Sequence[Entry], compared: BatchComparison | None) -> Iterat
     for one in entries:
         met = len(one.requirements) - len(one.missed)
         required = f"{met} of {len(one.requirements)} met" if one.requirements else ""
-        yield f"| {plain(one.spec)} | {one.verb} | {_mark(one)} | {required} | {plain(one.warned or '')} |"
+        yield f"| {plain(one.spec)} | {plain(one.verb)} | {_mark(one)} | {required} | {plain(one.warned or '')} |"
     troubles = [line for one in entries for line in _troubles(one)]
     if troubles:
         yield from ("", "### What is wrong", "", *troubles)
@@ -175,11 +177,12 @@ def _compared(compared: BatchComparison) -> Iterator[str]:
 
 
 def plain(text: str) -> str:
-    """Return text that Markdown and HTML show as it is, on one line.
+    """Return text that Markdown and HTML show as it is, on one line; it mentions nobody and links nowhere.
 
     Examples
     --------
     >>> plain("a_b | <i>")
     'a\\\\_b \\\\| \\\\<i\\\\>'
     """
-    return MARKUP.sub(r"\\\1", " ".join(text.split()))
+    shown = MARKUP.sub(r"\\\1", visible(" ".join(text.split())))
+    return shown.replace("@", f"@{APART}").replace("://", f":{APART}//").replace("www.", f"www{APART}.")

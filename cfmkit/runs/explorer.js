@@ -34,8 +34,12 @@
   }
 
   async function draw() {
-    // the markup is the server's own drawing, in which every text is escaped
-    try { by("mechanism").innerHTML = (await ask("drawing")).svg || ""; } catch { by("mechanism").textContent = ""; }
+    // the markup is the server's own drawing, in which every text is escaped; the policy of the page admits styles of a
+    // script, not of markup
+    try {
+      by("mechanism").innerHTML = ((await ask("drawing")).svg || "").replaceAll(' style="', ' data-style="');
+      for (const part of by("mechanism").querySelectorAll("[data-style]")) part.style.cssText = part.dataset.style;
+    } catch { by("mechanism").textContent = ""; }
   }
 
   function put(parent, tag, text, attributes = {}) {
@@ -107,7 +111,7 @@
     Object.entries(curve.branches).forEach(([name, lines], number, every) => {
       const colour = COLOURS[number % COLOURS.length];
       put(svg, "path", null, { d: line(lines), stroke: colour, class: "now", ...inside });
-      if (every.length > 1) put(svg, "text", name, { x: 72 + 90 * number, y: 26, style: `fill:${colour}` });
+      if (every.length > 1) put(svg, "text", name, { x: 72 + 90 * number, y: 26 }).style.fill = colour;
     });
     void clip;
   }

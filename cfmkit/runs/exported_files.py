@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import UsageError
+from cfmkit.errors import CfmError, UsageError
 from cfmkit.families import family
 
 if TYPE_CHECKING:
@@ -32,8 +32,11 @@ def exported(
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
     formats: str | Sequence[str] | None = None,
-) -> tuple[dict[str, bytes], Drawing]:
-    """Return the files of `export` by name, and the drawing with its notes and warnings.
+) -> tuple[dict[str, bytes], Drawing, dict[str, CfmError]]:
+    """Return the files of `export` by name, the drawing with its notes and warnings, and why formats could not be made.
+
+    A body, a deck or a drawing on paper that cannot be made does not stop the other formats; if there is nothing else,
+    its error is raised.
 
     Parameters
     ----------
@@ -53,15 +56,27 @@ def exported(
     cfmkit.errors.GeometryError
         If it cannot be cut as it is, or nothing says how thick it is and a format needs that.
     """
-    from cfmkit.export import TOLERANCE, USUAL, files
+    from cfmkit.export import USUAL, files
+    from cfmkit.runs.values_with_units import read_length
 
     wanted = _formats(formats, USUAL)
     if kerf is not None and "dxf" not in wanted:
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
-    width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
+    width, near = read_length(kerf, "--kerf"), read_length(tolerance, "--tolerance")
     drawn = drawing_of(spec, family(spec.family), near)
-    found = files(drawn, width, near or TOLERANCE, wanted) | (_decks(spec) if DECK in wanted else {})
-    return found | _on_paper(drawn, spec, [one for one in PAPER if one in wanted]), drawn
+    found = files(drawn, width, near, [one for one in wanted if one in USUAL])
+    failed: dict[str, CfmError] = {}
+    for name in (one for one in wanted if one not in USUAL):
+        try:
+            if name in PAPER:
+                found |= _on_paper(drawn, spec, name)
+            else:
+                found |= _decks(spec) if name == DECK else files(drawn, None, near, [name])
+        except CfmError as error:
+            failed[name] = error
+    if failed and not found:
+        raise next(iter(failed.values()))
+    return found, drawn, failed
 
 
 def drawing_of(spec: Spec, record: Family, tolerance: float | None = None) -> Drawing:
@@ -87,7 +102,11 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     from cfmkit.specs.units import format_short
 
     process = getattr(getattr(getattr(spec, "mechanism", None), "part", None), "process", None)
-    if process is None or not (least := process.thinnest) or not (walls := thin_walls(drawn.contours, least)):
+    if (
+        process is None
+        or not (least := process.thinnest)
+        or not (walls := thin_walls(drawn.contours, least, drawn.tolerance))
+    ):
         return
     first, *others = [
         f"{format_short(one.thickness, 'length', 3)}{{}} at ({', '.join(format_short(x, 'length') for x in one.at)})"
@@ -103,14 +122,12 @@ def _thin(drawn: Drawing, spec: Spec) -> Iterator[Finding]:
     )
 
 
-def _on_paper(drawn: Drawing, spec: Spec, formats: Sequence[str]) -> dict[str, bytes]:
-    """Return the dimensioned drawing in each of the formats."""
-    if not formats:
-        return {}
+def _on_paper(drawn: Drawing, spec: Spec, name: str) -> dict[str, bytes]:
+    """Return the dimensioned drawing in one format."""
     from cfmkit.plots.figure_options import FigureForm
     from cfmkit.runs.part_on_paper import part_on_paper
 
-    form = FigureForm(formats=tuple(formats))
+    form = FigureForm(formats=(name,))
     return dict(form.files({"drawing": lambda: part_on_paper(drawn, spec)}))
 
 
@@ -142,19 +159,3 @@ def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[s
         if name not in known:
             raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
     return names
-
-
-def _length(length: str | float | None, option: str) -> float | None:
-    """Return a length above zero [m]; None for None."""
-    from cfmkit.errors import QuantityError
-    from cfmkit.specs.units import read_quantity
-
-    if length is None:
-        return None
-    try:
-        value = read_quantity(length, "length") if isinstance(length, str) else float(length)
-    except QuantityError as error:
-        raise UsageError(f"{option}: {error}") from None
-    if not value > 0:
-        raise UsageError(f"{option}: {length} is not allowed: must be > 0")
-    return value

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit import api
+from cfmkit.errors import visible
 from cfmkit.families import family
 from cfmkit.metrics import split_name
 from cfmkit.plots.figures import moving_of
@@ -98,7 +99,13 @@ def template(name: str) -> Any:
     from jinja2 import Environment
 
     # escaping is on for every expression; only what is marked safe in the template is markup, and all of it is ours
-    return Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(part(name))
+    plain = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown_in_page)
+    return plain.from_string(part(name))
+
+
+def _shown_in_page(value: Any) -> Any:
+    """Return a text with its control characters escaped, line feeds and tabs aside; markup and numbers as they are."""
+    return "\n".join(map(visible, value.split("\n"))) if type(value) is str else value
 
 
 def part(name: str) -> str:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.api import resolve
-from cfmkit.errors import QuantityError, UsageError
+from cfmkit.errors import UsageError
 from cfmkit.metrics import Window
+from cfmkit.runs.values_with_units import read_target, read_window
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from cfmkit.api import AnySpec
-    from cfmkit.curves import Kind
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.curves_and_metrics_of_recording import MeasuredCurves
     from cfmkit.experiment.low_pass import LowPass
@@ -34,6 +35,9 @@ def measure(
     flip: str | Iterable[str] = (),
     as_recorded: bool = False,
     one_branch: bool = False,
+    cycles: str | None = None,
+    group: str | None = None,
+    max_hole: str | float | None = None,
 ) -> MeasureReport:
     """Return what a measured force curve says: branches, metrics raw and filtered, hysteresis, repeatability.
 
@@ -57,13 +61,19 @@ def measure(
         Leave out neither spikes nor points next to reversals.
     one_branch : bool
         Accept a recording without a return stroke.
+    cycles : str, optional
+        Which cycles: ``"2:5"``. Default: the complete ones of full travel.
+    group : str, optional
+        Which specimen of several: ``"Specimen=2"``; ``"none"``: all rows are of one.
+    max_hole : str or float, optional
+        Part of the window that may be missing in one piece; default: 2 %. With a larger hole metrics have no value.
 
     Raises
     ------
     cfmkit.errors.UsageError
         If the file cannot be read, or an option is malformed.
     cfmkit.errors.DataError
-        If it holds no curve, or the window was not measured.
+        If it holds no curve, those of several specimens, or the window was not measured.
 
     Examples
     --------
@@ -72,22 +82,59 @@ def measure(
     >>> round(found.numbers.filtered["force_mean[load]"].value, 2)
     50.46
     """
-    from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, require_loop
-    from cfmkit.experiment.low_pass import read_filter
-    from cfmkit.experiment.measurement_and_calibration_outputs import report_on
     from cfmkit.experiment.reading import Recording, read_recording
-    from cfmkit.experiment.zeros_and_signs import corrected
-    from cfmkit.metrics import MeasuringFrame
 
-    low_pass: LowPass | Literal["default"] | None = "default" if filter == "default" else read_filter(filter)
-    recording = data if isinstance(data, Recording) else read_recording(_file(data), units)
-    place = read_window(window, recording.kind)
-    frame = MeasuringFrame(target=read_target(target, recording.kind))
-    recording = corrected(recording, tare, zero, _each(flip))
-    source = measured(recording, low_pass, () if as_recorded else LEFT_OUT)
-    if not one_branch:
-        require_loop(source)
-    return report_on(source, frame, place)
+    recording = data if isinstance(data, Recording) else read_recording(_file(data), units, group)
+    options = MeasurementSettings(
+        window, filter, target, tare, zero, _each(flip), as_recorded, one_branch, cycles, max_hole
+    )
+    return options.report_on(recording)
+
+
+def measure_each(
+    data: str | os.PathLike[str], units: str | None, group: str | None, how: MeasurementSettings
+) -> dict[str, MeasureReport]:
+    """Return what the measured curve of each specimen of a file says, by specimen."""
+    from cfmkit.experiment.reading import read_recordings
+
+    return {name: how.report_on(recording) for name, recording in read_recordings(_file(data), units, group).items()}
+
+
+@dataclass(frozen=True)
+class MeasurementSettings:
+    """How recordings are measured; the fields are as for `measure`."""
+
+    window: str | tuple[float, float] | None = None
+    filter: str = "default"
+    target: str | float | None = None
+    tare: str | float | None = None
+    zero: str | float | None = None
+    flip: tuple[str, ...] = ()
+    as_recorded: bool = False
+    one_branch: bool = False
+    cycles: str | None = None
+    max_hole: str | float | None = None
+
+    def report_on(self, recording: Recording) -> MeasureReport:
+        """Return what a recording says."""
+        from cfmkit.experiment.branches import read_cycles
+        from cfmkit.experiment.coverage import read_largest_hole
+        from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, measured, require_loop
+        from cfmkit.experiment.low_pass import read_filter
+        from cfmkit.experiment.measurement_and_calibration_outputs import report_on
+        from cfmkit.experiment.zeros_and_signs import corrected
+        from cfmkit.metrics import MeasuringFrame
+
+        low_pass: LowPass | Literal["default"] | None
+        low_pass = "default" if self.filter == "default" else read_filter(self.filter)
+        cycles, largest = read_cycles(self.cycles), read_largest_hole(self.max_hole)
+        place = read_window(self.window, recording.kind)
+        frame = MeasuringFrame(target=read_target(self.target, recording.kind))
+        recording = corrected(recording, self.tare, self.zero, self.flip)
+        source = measured(recording, low_pass, () if self.as_recorded else LEFT_OUT, cycles)
+        if not self.one_branch:
+            require_loop(source)
+        return report_on(source, frame, place, largest)
 
 
 def _file(data: str | os.PathLike[str]) -> str:
@@ -113,6 +160,8 @@ def calibrate(
     tare: str | float | None = None,
     zero: str | float | None = None,
     flip: str | Iterable[str] = (),
+    cycles: str | None = None,
+    group: str | None = None,
 ) -> Calibration:
     """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot determine.
 
@@ -131,7 +180,7 @@ def calibrate(
         How large errors count.
     window : (float, float), optional
         Where to compare [m or rad]; default: ``analysis.window``.
-    units, tare, zero, flip
+    units, tare, zero, flip, cycles, group
         As for `measure`.
 
     Raises
@@ -151,6 +200,7 @@ def calibrate(
     >>> round(found.spec.mechanism.rolling_friction, 5)
     0.00224
     """
+    from cfmkit.experiment.branches import read_cycles
     from cfmkit.experiment.calibration import calibrate as fitted
     from cfmkit.experiment.curves_and_metrics_of_recording import LEFT_OUT, MeasuredCurves, measured, read_measured
     from cfmkit.experiment.parameters_to_fit import parameters, read_bounds
@@ -162,11 +212,11 @@ def calibrate(
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
     start = resolve(spec)
     if isinstance(data, Recording):
-        source = measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT)
+        source = measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT, read_cycles(cycles))
+    elif isinstance(data, MeasuredCurves):
+        source = data
     else:
-        source = (
-            data if isinstance(data, MeasuredCurves) else read_measured(_file(data), units, tare, zero, _each(flip))
-        )
+        source = read_measured(_file(data), units, tare, zero, _each(flip), cycles, group)
     given = bounds or {}
     texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
     numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
@@ -174,48 +224,3 @@ def calibrate(
     paths = fit.split(",") if isinstance(fit, str) else fit
     chosen = parameters(start, paths, limits, source.recording)
     return fitted(start, source, chosen, loss, Window(*window) if window else None)
-
-
-def read_window(text: str | tuple[float, float] | None, kind: Kind) -> Window | None:
-    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; None for None.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
-    """
-    from cfmkit.specs.units import read_quantity
-
-    if text is None:
-        return None
-    if not isinstance(text, str):
-        low, high = text
-        return Window(low, high)
-    ends = text.split(":")
-    if len(ends) != 2:
-        raise UsageError(f"--window: {text!r} is not 'from:to'; write e.g. --window '40 mm:210 mm'")
-    try:
-        low, high = (read_quantity(end, "length" if kind == "force" else "angle") for end in ends)
-    except QuantityError as error:
-        raise UsageError(f"--window: {error}") from None
-    if not low < high:
-        raise UsageError(f"--window: {text!r} must be increasing")
-    return Window(low, high)
-
-
-def read_target(text: str | float | None, kind: Kind) -> float | None:
-    """Return the force [N] or torque [N m] that a text says, or a number as it is; None for None.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed.
-    """
-    from cfmkit.specs.units import read_quantity
-
-    if text is None or not isinstance(text, str):
-        return text
-    try:
-        return read_quantity(text, kind)
-    except QuantityError as error:
-        raise UsageError(f"--target: {error}") from None

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 VERDICTS: Mapping[str, str] = {
     "agrees": "computed here; equal to the last printed digit, or within a tolerance for which the row gives a reason",
+    "arithmetic": "follows from other numbers that the paper prints: equal to the last digit, and no result of a model",
     "given": "an input: the example states it as printed, or the command of the row sets it",
     "misprint": "wrong as printed; the row says why, and gives the right value",
     "disagrees": "computed here with a different result; the row says what is known about the reason",
@@ -202,8 +203,12 @@ def _values(row: PrintedRow) -> tuple[float, ...]:
 
 def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
     """Yield what speaks against the verdict of a row."""
+    if row.verdict == "agrees" and not all(map(_asks_model, row.ask)):
+        yield "nothing is computed by a model: its verdict is 'arithmetic'"
+    if row.verdict == "arithmetic" and any(map(_asks_model, row.ask)):
+        yield "a model computes it: its verdict is not 'arithmetic'"
     for value, printed in zip(values, row.printed, strict=True):
-        if row.verdict in ("agrees", "given") and not _matches(value, printed, row.tolerance):
+        if row.verdict in ("agrees", "arithmetic", "given") and not _matches(value, printed, row.tolerance):
             yield f"{_reported(value, printed)} is not {printed}"
         if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
             yield f"{_reported(value, printed)} is what is printed"
@@ -342,6 +347,18 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt")
 } | {"abs": abs, "min": min, "max": max, "count": len}
 _BLOCKS = ("mechanism", "analysis", "design")
+
+
+def _asks_model(text: str) -> bool:
+    """Return True if a question has a name in it, of a metric, a column or a key: not only printed numbers.
+
+    Examples
+    --------
+    >>> _asks_model('("11.26 N" - "10.75 N") / "11.26 N"'), _asks_model('0.95 * force("13.6 mm")')
+    (False, True)
+    """
+    names = {node.id for node in ast.walk(ast.parse(text.strip(), mode="eval")) if isinstance(node, ast.Name)}
+    return not names <= _FUNCTIONS.keys()
 
 
 def _evaluated(text: str, scope: _Scope) -> Any:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import OutputError
 from cfmkit.store import Manifest, RunFolder, safe_disk_changes
 from cfmkit.store.file_names_and_overwrite_checks import JOURNAL, MANIFEST, hash_in, mode_of
-from cfmkit.store.lock import LOCK, has_signed_lock
+from cfmkit.store.lock import lock_files
 from cfmkit.store.safe_disk_changes import reporting
 from cfmkit.studies.journal import has_foreign_lines, is_journal
 
@@ -76,11 +76,10 @@ def remains_in(folder: Path) -> Remains:
         hashes = {name: hash_in(folder, name) for name in listed if mode_of(folder / name) is not None}
         files = [name for name, digest in hashes.items() if digest == listed[name].sha256]
         edited = [name for name in hashes if name not in files]
-        locked = has_signed_lock(folder)
-        if is_journal(folder / JOURNAL) or (locked and _is_empty(folder / JOURNAL)):
+        locks = lock_files(folder)
+        if is_journal(folder / JOURNAL) or (locks and _is_empty(folder / JOURNAL)):
             (edited if has_foreign_lines(folder / JOURNAL) else files).append(JOURNAL)
-        if locked:
-            files.append(LOCK)
+        files += locks
         if manifest is not None:
             files.append(MANIFEST)
         size = sum((folder / name).stat().st_size for name in files)
@@ -117,11 +116,11 @@ def remove(remains: Remains, top: str | os.PathLike[str]) -> Remains:
     # Under the lock everything is looked at again: a run may have been there while the user was asked.
     with RunFolder(root) as folder:
         found = remains_in(folder.path)
-        if set(found.files) - set(remains.files) - {LOCK}:
+        if set(found.files) - set(remains.files) - {folder.lock_file}:
             raise OutputError(f"{root}: a run wrote there after its files were listed: run 'cfmkit clean' again")
         found = replace(found, files=tuple(name for name in found.files if name in remains.files))
         for name in found.files:
-            if name != LOCK:  # which this process holds by now, and takes away at the end of the block
+            if name != folder.lock_file:  # which this process holds by now, and takes away at the end of the block
                 with reporting(root / name, "remove"):
                     safe_disk_changes.system.unlink(root / name)
     inner = {root / above for name in found.files for above in Path(name).parents}

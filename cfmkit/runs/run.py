@@ -70,7 +70,10 @@ class Verb:
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """Everything about a finished run that is shown: the report, where it was written, how long it took."""
+    """Everything about a finished run that is shown: the report, where it was written, how long it took.
+
+    `changes` are those of ``--set``, and of ``--fidelity``.
+    """
 
     verb: Verb
     report: Report
@@ -174,7 +177,7 @@ def carry_out(
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | ending)
         kept = dict(folder.kept)
     seconds = time.perf_counter() - start
-    return FinishedRun(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
+    return FinishedRun(verb, found, wanted.spec, _changes(wanted), wanted.out, manifest, kept, seconds)
 
 
 def _make_ready(spec: Spec) -> None:
@@ -218,12 +221,14 @@ def _placed(document: Document, one: Problem, options: Collection[str]) -> Probl
 
 
 def _document(wanted: RunRequest) -> Document:
-    of_many = getattr(wanted, "of_many", False)
-    if wanted.fidelity is None:
-        return read_spec(wanted.spec, wanted.changes, of_many)
-    if not wanted.fidelity.strip():
+    if wanted.fidelity is not None and not wanted.fidelity.strip():
         raise UsageError("--fidelity is empty; `cfmkit show FAMILY` lists the models")
-    return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
+    return read_spec(wanted.spec, _changes(wanted), getattr(wanted, "of_many", False))
+
+
+def _changes(wanted: RunRequest) -> tuple[str, ...]:
+    """Return what replaces values of a specification: ``--set``, then ``--fidelity``."""
+    return (*wanted.changes, *([] if wanted.fidelity is None else [f"analysis.fidelity={wanted.fidelity}"]))
 
 
 def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import Problem, SpecError, UsageError, visible
+from cfmkit.errors import Problem, SpecError, UsageError, reason_of, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -137,7 +137,7 @@ def content(name: str) -> bytes:
     except FileNotFoundError:
         raise UsageError(f"{visible(name)}: there is no such file{_similar(name)}") from None
     except OSError as error:
-        raise UsageError(f"{visible(name)} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise UsageError(f"{visible(name)} cannot be read: {reason_of(error)}") from None
 
 
 def bind(document: Document) -> Spec:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.designing.run_many_starts import Clock
     from cfmkit.families.run_control import Run
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.suggest.proposal_making_and_judging import Proposal
     from cfmkit.studies.suggest.search import Suggestions
     from cfmkit.studies.suggest.spec import WishBlock
@@ -37,7 +38,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "parts": ("count", ""),
     "life": ("ratio", "1"),
     "yield": ("ratio", "1"),
-    "finer_deviation": ("ratio", "1"),
+    "stiffening": ("ratio", "1"),
 }
 """What is reported of each proposal: its dimension and the unit of the files."""
 
@@ -85,14 +86,14 @@ STATUSES = {
 
 
 def exit_code(found: Suggestions) -> ExitCode:
-    """Return 0 where a proposal does all that is wished, else 70 where a bug ended all, 6 where the time did, and 4."""
+    """Return 0 if a proposal does all that is wished, 70 if a bug ended all, 6 if not all was judged, else 4."""
     if found.proposals:
         return ExitCode.OK
     reasons = [one.offer.reason for one in found.answers if one.offer.reason]
     reasons += [reason for each in found.failed.values() for reason in each]
     if found.bugs and not found.near and all(reason.startswith(BUG) for reason in reasons):
         return ExitCode.BUG
-    return ExitCode.PARTIAL if found.late else ExitCode.NO_SOLUTION
+    return ExitCode.PARTIAL if found.late or found.unjudged else ExitCode.NO_SOLUTION
 
 
 def folder_name(number: int, proposal: Proposal) -> str:
@@ -109,6 +110,9 @@ def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
         "message": message(found),
         "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
+        "unjudged": [
+            _record(found, one, number) for number, one in enumerate(found.unjudged, len(found.proposals) + 1)
+        ],
         "near_misses": [_record(found, one) for one in found.near],
         "families": [
             {
@@ -121,7 +125,7 @@ def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
             }
             for one in found.answers
         ],
-        "warnings": list(_warnings(found, block)),
+        "warnings": list(_warnings(found)),
     }
 
 
@@ -130,16 +134,22 @@ def message(found: Suggestions) -> str:
     if found.proposals:
         late = "; the time budget ended the search before everything was tried" if found.late else ""
         count = len(found.proposals)
-        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the wish{late}"
+        more = f", {len(found.unjudged)} more not judged in full" if found.unjudged else ""
+        return f"{count} mechanism{' meets' if count == 1 else 's meet'} the wish{more}{late}"
     if exit_code(found) is ExitCode.BUG:
         return "bugs in cfmkit ended every candidate"
+    if found.unjudged:
+        count = len(found.unjudged)
+        late = "; increase the time budget (--time-budget)" if found.late else ""
+        were = "was" if count == 1 else "were"
+        return f"no mechanism is known to meet the wish, {count} {were} not judged in full{late}"
     if found.late:
         return "the time budget ended the search before a mechanism met the wish; increase it (--time-budget)"
     return "no mechanism meets the wish"
 
 
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
-    if out_of_reach or any(one.family == name for one in found.proposals):
+    if out_of_reach or any(one.family == name for one in found.listed):
         return out_of_reach
     untried = sum(len(one.offer.candidates) for one in found.answers if one.family == name and not one.made)
     if untried:
@@ -148,25 +158,19 @@ def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
     return (near or list(found.failed.get(name, ())) or [""])[0]
 
 
-def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
-    if found.late and found.proposals:
+def _warnings(found: Suggestions) -> Iterator[dict[str, str]]:
+    if found.late and found.listed:
         yield {
             "name": "search_cut_short",
             "message": "the time budget ended the search: increase it with --time-budget",
-        }
-    judged = all(one.numbers.get("life") is not None for one in found.proposals)
-    if block.cycles is not None and not judged:
-        yield {
-            "name": "cycles_not_judged",
-            "message": "proposals for which no number is given were not checked for their life: state the material's "
-            "'fatigue' data",
         }
 
 
 def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
     about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
     place = {} if number is None else {"folder": folder_name(number, one)}
-    return about | place | {"misses": list(one.missed), "notes": list(one.notes)}
+    judged = {"model": one.model, "unjudged": list(one.open), "warnings": list(one.warnings)}
+    return about | place | judged | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
 def files(
@@ -190,19 +194,19 @@ def files(
     yield "metrics.json", json_bytes(as_json(found, block))
     yield "suggestions.csv", table(found)
     in_time = not deadlines.figures.late()
-    drawn = _pictures(found) if found.proposals and in_time and (plots or command is not None) else {}
+    drawn = _pictures(found) if found.listed and in_time and (plots or command is not None) else {}
     if plots:
         from cfmkit.plots.style import png
 
         for name, figure in drawn.items():
             yield f"figures/{name}.png", png(figure)
     if command is not None:
-        texts = {folder_name(number, one): one.text for number, one in enumerate(found.proposals, 1)}
+        texts = {folder_name(number, one): one.text for number, one in enumerate(found.listed, 1)}
         unit = "N" if found.wish.kind == "force" else "N*mm"
         yield NAME, page(as_json(found, block), texts, drawn, unit, command)
-    work = partial(_made, (plots, command is not None), deadlines, found.proposals)
-    made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.proposals))), lambda: False))
-    for index, one in enumerate(found.proposals):
+    work = partial(_made, (plots, command is not None), deadlines, found.listed)
+    made = dict(until(run.executor, deadlines.files.deadline)(work, iter(range(len(found.listed))), lambda: False))
+    for index, one in enumerate(found.listed):
         files = made.get(index)
         for name, data in files if isinstance(files, list) else [("design.yaml", one.text.encode())]:
             yield f"{folder_name(index + 1, one)}/{name}", data
@@ -213,8 +217,8 @@ def _pictures(found: Suggestions) -> dict[str, Figure]:
     from cfmkit.studies.suggest import pareto_and_scale_drawings
 
     return {
-        "pareto": pareto_and_scale_drawings.pareto(found.proposals, found.wish),
-        "proposals": pareto_and_scale_drawings.to_one_scale(found.proposals, found.wish),
+        "pareto": pareto_and_scale_drawings.pareto(found.listed, found.wish),
+        "proposals": pareto_and_scale_drawings.to_one_scale(found.listed, found.wish),
     }
 
 
@@ -231,19 +235,43 @@ def _made(
     if deadlines.files.late():
         return [("design.yaml", proposal.text.encode())]
     spec = proposal.spec
-    # springs at pins have links that no drawing shows: nothing of them is cut
-    design = None if "at pins" in proposal.variant else Design(spec, Status.COMPLETE)
+    design = Design(spec, Status.COMPLETE)
+    left = deadlines.files.left()
+    if left is not None and left < SLOWER * proposal.seconds:  # its analysis would not end in time, its drawing does
+        return [
+            ("design.yaml", proposal.text.encode()),
+            *_drawn(spec, plots=wanted[0] and not deadlines.figures.late()),
+        ]
     plots, page = wanted
     found = dict(files(report_on(api.analyze(spec), design), plots and not deadlines.figures.late(), page))
     return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 
+SLOWER = 2.0
+"""How much longer than before an analysis may take: others run beside it, and figures are drawn."""
+
+
+def _drawn(spec: Spec, plots: bool) -> Iterator[tuple[str, bytes]]:
+    """Yield the files to cut or print, and the drawing, which need no analysis."""
+    from cfmkit.runs.files_a_run_writes import geometry, part_of
+    from cfmkit.runs.part_on_paper import part_on_paper
+
+    drawing = part_of(spec)
+    if drawing is None:
+        return
+    yield from geometry(drawing)
+    if plots:
+        from cfmkit.plots.style import png
+
+        yield "figures/drawing.png", png(part_on_paper(drawing, spec))
+
+
 def table(found: Suggestions) -> bytes:
-    """Return suggestions.csv: a row a proposal, then the near misses."""
+    """Return suggestions.csv: a row a proposal, then those that were not judged in full, then the near misses."""
     from cfmkit.tables import to_csv
     from cfmkit.tables.table import Table, TableColumn
 
-    rows = [(number, one) for number, one in enumerate(found.proposals, 1)] + [(None, one) for one in found.near]
+    rows = [*enumerate(found.listed, 1), *((None, one) for one in found.near)]
     numbers = [with_force(found, one) for _, one in rows]
     unit = "N" if found.wish.kind == "force" else "N*mm"
     columns = [
@@ -255,9 +283,17 @@ def table(found: Suggestions) -> bytes:
         head = f"{found.wish.kind}_mean" if name == "mean" else name
         values = tuple(each.get(name) for each in numbers)
         columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
+    columns.append(TableColumn("verdict", tuple(_verdict(one) for _, one in rows)))
+    columns.append(TableColumn("model", tuple(one.model for _, one in rows)))
+    columns.append(TableColumn("warnings", tuple("; ".join(one.warnings) for _, one in rows)))
+    columns.append(TableColumn("unjudged", tuple("; ".join(one.open) for _, one in rows)))
     columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
     columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
     return to_csv(Table(tuple(columns)))
+
+
+def _verdict(one: Proposal) -> str:
+    return "meets" if one.good else "open" if one.passes else "fails"
 
 
 TONES = {"complete": "good", "partial": "warn"}
@@ -290,15 +326,16 @@ def page(
     columns = (*_COLUMNS, *(("yield",) if "yield" in record["wish"] else ()))
     rows = [
         (one, [_cell(one, name, unit) for name in columns], quote(f"{one['folder']}/{NAME}"), texts[one["folder"]])
-        for one in record["proposals"]
+        for one in (*record["proposals"], *record["unjudged"])
     ]
+    named = {one["family"] for one in (*record["proposals"], *record["unjudged"])}
     text: str = template("suggestions.html.j2").render(
         reported=record,
         tone=TONES.get(record["status"], "bad"),
         wish=_listed(record["wish"]),
         heads=[f"mean [{unit}]", *(name.replace("_", " ") for name in columns[1:])],
         rows=rows,
-        silent=[(one, _listed(one["nearest"])) for one in record["families"] if not one["proposals"]],
+        silent=[(one, _listed(one["nearest"])) for one in record["families"] if one["family"] not in named],
         pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
         command=command,
         style=part("report.css"),

@@ -3,10 +3,6 @@
 The chains are so dense that the true edge lies within the outline's tolerance of their lines. A vertex at which the
 direction turns by more than `CORNER` is a corner and becomes a node; everything else is a smooth edge, whose radius is
 read off the turn between neighbouring lines.
-
-Where fillets are made by growing and shrinking a polygon, each is an arc whose vertices are exact, but there are so few
-of them that lines turn by 3 degrees at a fillet of 0.5 mm and by 20 at one of 0.02 mm. Meshed like that the largest
-stress would be that of the corners between the lines: `with_arcs` makes their arcs denser.
 """
 
 from __future__ import annotations
@@ -32,18 +28,12 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 CORNER = math.radians(25.0)
-"""Turn of a true corner [rad]. An arc of 0.5 mm within 1 um of its lines turns by 7 degrees a vertex, one of 0.1 mm
-by 16; sharp corners of parts are rounded by the cutter or stand at pads, square."""
+"""Turn of a true corner [rad]: lines that stand for arcs turn by a degree, sharp corners of parts are rounded by the
+cutter or stand at pads, square."""
 
 GRADING = 0.25
 """How fast element sizes may grow [m per m]: 0.2 to 0.3 keeps triangles near the boundary above 25 degrees."""
 
-
-STEP = 1e-6
-"""Steps of an edge up to which they are the drawing's rounding [m]: outlines are that far from the true edge.
-
-Where the disc at a node of two beams just misses the corners of their ends, a step of 0.6 um is left over.
-"""
 
 MOST_PLACES = 20_000
 """Places round the boundary at which sizes are looked up; more take seconds."""
@@ -54,10 +44,6 @@ TOGETHER = 128
 MOST_REFINED = 1000.0
 """Largest elements in parts of the smallest: beyond it grading alone takes half a minute, and what is so thin beside
 the rest of a part is a flaw of its drawing."""
-
-AGREE = 1e-3
-"""Distance between the centres of an arc's neighbouring lines, in radii: vertices are exact to rounding, and the
-shortest line of an arc, a 128th of a circle, is 49 times as long."""
 
 
 @dataclass(frozen=True)
@@ -73,11 +59,14 @@ class Ring:
     points: FloatArray
 
     @classmethod
-    def of(cls, points: FloatArray, hole: bool) -> Ring:
-        """Return the ring through closed points (n, 2) [m], turned so that the material is on its left."""
+    def of(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
+        """Return the ring through closed points (n, 2) [m], turned so that the material is on its left.
+
+        Of a `step` [m] or less, two opposite corners, one vertex is left.
+        """
         ring = np.asarray(points, float)
         ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-        found = cls(read_only(_without_steps(ring)))
+        found = cls(read_only(_without_steps(ring, step)))
         return found if (found.area > 0) != hole else cls(read_only(found.points[::-1]))
 
     @property
@@ -117,6 +106,14 @@ class Ring:
         with np.errstate(divide="ignore"):
             return np.asarray(np.where(turn > 1e-9, reach / np.maximum(turn, 1e-300), math.inf))
 
+    @cached_property
+    def curvature_jumps(self) -> FloatArray:
+        """By how much the curvature of the lines behind and before each vertex differs, (n,) [1/m]; 0 at corners."""
+        turn = np.where(np.abs(self.turns) > CORNER, 0.0, self.turns)
+        curvature = 0.5 * (turn + np.roll(turn, -1)) / self.lengths
+        jumps = np.abs(curvature - np.roll(curvature, 1))
+        return np.asarray(np.where(np.abs(self.turns) > CORNER, 0.0, jumps))
+
     def at(self, arc: FloatArray) -> FloatArray:
         """Return the points (k, 2) [m] at arc lengths (k,) [m], taken round the ring."""
         closed = np.concatenate([self.points, self.points[:1]])
@@ -133,63 +130,15 @@ class Ring:
         return np.column_stack([-along[:, 1], along[:, 0]])
 
 
-def _without_steps(ring: FloatArray) -> FloatArray:
-    """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners within `STEP`."""
+def _without_steps(ring: FloatArray, least: float) -> FloatArray:
+    """Return a closed chain (n, 2) [m] with one vertex for the two of a step: opposite corners `least` [m] apart."""
     chain = Ring(ring)
     corner, turns = np.abs(chain.turns) > CORNER, chain.turns
-    step = (chain.lengths <= STEP) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
+    step = (chain.lengths <= least) & corner & np.roll(corner, -1) & (turns * np.roll(turns, -1) < 0.0)
     if not step.any():
         return ring
     ring = np.where(step[:, None], 0.5 * (ring + np.roll(ring, -1, axis=0)), ring)
     return np.asarray(ring[~np.roll(step, 1)])
-
-
-def with_arcs(ring: Ring, radius: float, turn: float) -> Ring:
-    """Return a boundary whose fillets of a radius [m] turn by at most `turn` [rad] from line to line.
-
-    An arc is recognised by two lines or more, one after the other, whose ends are on one circle of that radius
-    outside the material.
-
-    Parameters
-    ----------
-    ring : Ring
-        Its material is on the left, so that fillets have their centres on the right.
-    radius : float
-        Of the fillets; 0 for none [m].
-    turn : float
-        Positive.
-    """
-    if radius <= 0.0 or len(ring.points) < 3:
-        return ring
-    start = ring.points[:, 0] + 1j * ring.points[:, 1]
-    end = np.roll(start, -1)
-    chord = end - start
-    length = np.abs(chord)
-    fits = (length > 0.0) & (length < 2.0 * radius)
-    across = np.sqrt(np.where(fits, radius**2 - 0.25 * length**2, 0.0))
-    centre = 0.5 * (start + end) - 1j * across * chord / np.where(fits, length, 1.0)
-    same = fits & np.roll(fits, -1) & (np.abs(np.roll(centre, -1) - centre) < AGREE * radius)
-    on_arc = same | np.roll(same, 1)
-    angle = np.where(on_arc, 2.0 * np.arcsin(np.where(on_arc, 0.5 * length / radius, 0.0)), 0.0)
-    pieces = np.where(on_arc, np.ceil(angle / turn - 1e-6), 1).astype(int)
-    found: list[complex] = []
-    for k, count in enumerate(pieces.tolist()):
-        ways = np.arange(count) / max(count, 1)
-        spokes = (start[k] - centre[k]) * np.exp(-1j * angle[k] * ways)  # clockwise, as the centre is on the right
-        found += (centre[k] + spokes).tolist() if count > 1 else [complex(start[k])]
-    points = np.array(found)
-    return Ring(read_only(np.column_stack([points.real, points.imag]))) if len(points) > len(start) else ring
-
-
-def smallest_arc(rough: float) -> float:
-    """Return the radius [m] below which an outline that is drawn within `rough` [m] has corners instead of fillets.
-
-    A quarter of a circle needs two lines to be recognised: one alone would be within half of `rough` of it.
-
-    >>> round(1e6 * smallest_arc(1e-6), 2)
-    1.71
-    """
-    return 0.5 * rough / (1.0 - math.cos(math.radians(45.0)))
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,13 @@ def slopes(at: FloatArray) -> FloatArray:
     return np.stack([np.stack(along_r, -1), np.stack(along_s, -1)], -1)
 
 
+def shape_functions(at: FloatArray) -> FloatArray:
+    """Return the shape functions (..., 6) at places (..., 2) of the parent triangle."""
+    r, s = np.moveaxis(np.asarray(at, float), -1, 0)
+    t = 1.0 - r - s
+    return np.stack([t * (2 * t - 1), r * (2 * r - 1), s * (2 * s - 1), 4 * r * t, 4 * r * s, 4 * s * t], -1)
+
+
 @dataclass(frozen=True)
 class Elements:
     """All elements of a mesh, ready for many states.
@@ -56,10 +63,6 @@ class Elements:
     mesh: TriangleMesh
     law: Law
     width: FloatArray
-
-    def without(self, held: NDArray[np.bool_]) -> Elements:
-        """Return the elements of which not all nodes move as one: all others never strain."""
-        return self.only(np.asarray(~held[self.mesh.triangles].all(axis=1)))
 
     def only(self, chosen: NDArray[np.bool_]) -> Elements:
         """Return some of the elements (m,), on all nodes."""
@@ -133,16 +136,19 @@ class Elements:
 
         def changed(direction: FloatArray) -> FloatArray:
             df = self._sloped(gradient, direction)
-            de = np.stack(
-                [
-                    (f[:, 0] * df[:, 0]).sum(0),
-                    (f[:, 1] * df[:, 1]).sum(0),
-                    (f[:, 0] * df[:, 1] + f[:, 1] * df[:, 0]).sum(0),
-                ]
-            )
-            return self._gathered(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, de)))
+            return self._gathered(_times(df, s) + _times(f, np.einsum("ijk,jk->ik", d, _strain_change(f, df))))
 
         return self._gathered(_times(f, s)), changed
+
+    def tangent_energies(self, moved: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Return first' K second of every element (m,) [N m], K its tangent at displacements; each (n, 2) [m]."""
+        gradient, volume = self._parent
+        f, strain = self._strained(gradient, moved)
+        stress, modulus, _ = self.law(strain)
+        df, dg = self._sloped(gradient, first), self._sloped(gradient, second)
+        energy = (df * _times(dg, stress)).sum((0, 1))
+        energy += np.einsum("ik,ijk,jk->k", _strain_change(f, df), modulus, _strain_change(f, dg))
+        return np.asarray((volume * energy).reshape(len(POINTS), -1).sum(0))
 
     def _gathered(self, p: FloatArray) -> FloatArray:
         """Return nodal forces (n, 2) [N] from the first Piola-Kirchhoff stress times volume (2, 2, k) [N m]."""
@@ -242,6 +248,17 @@ class Elements:
         return np.concatenate(found), np.concatenate(nodes)
 
 
+def _strain_change(f: FloatArray, df: FloatArray) -> FloatArray:
+    """Return the change of Green's strain (3, k) of gradients (2, 2, k) that change so."""
+    return np.stack(
+        [
+            (f[:, 0] * df[:, 0]).sum(0),
+            (f[:, 1] * df[:, 1]).sum(0),
+            (f[:, 0] * df[:, 1] + f[:, 1] * df[:, 0]).sum(0),
+        ]
+    )
+
+
 def _times(f: FloatArray, s: FloatArray) -> FloatArray:
     """Return F S (2, 2, k) of a gradient (2, 2, k) and a symmetric stress (3, k)."""
     return np.stack([f[:, 0] * s[0] + f[:, 1] * s[2], f[:, 0] * s[2] + f[:, 1] * s[1]], 1)
@@ -275,7 +292,8 @@ class Pattern:
         """Return the pattern of a matrix with entries in these rows and columns, and as many below its diagonal."""
         pairs, slots = np.unique(np.maximum(rows, columns) * size + np.minimum(rows, columns), return_inverse=True)
         above, below = pairs % size * size + pairs // size, pairs
-        keys = np.unique(np.concatenate([above, below]))  # column by column
+        keys = np.sort(np.concatenate([above, below]))  # column by column
+        keys = keys[np.diff(keys, prepend=-1) > 0]
         column, row = keys // size, keys % size
         found = np.searchsorted(pairs, np.maximum(row, column) * size + np.minimum(row, column))
         starts = np.searchsorted(keys, np.arange(size + 1) * size)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.solid.meshed_part import Meshed, Part
     from cfmkit.solid.plane_stress_law import Law
     from cfmkit.solid.rigid_groups import Group
-    from cfmkit.solid.two_meshes import DrivenPart
 
 THIN = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""
@@ -42,7 +42,7 @@ FLAT = 1e-6
 
 
 def deck(name: str, driven: DrivenPart) -> bytes:
-    """Return a deck of the finer mesh that runs as it is.
+    """Return a deck that runs as it is, of the mesh of an analysis before it is refined where the error asks for it.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def deck(name: str, driven: DrivenPart) -> bytes:
     part, stops = driven.part, driven.stops
     if any(place.load.any() for place in part.places):
         raise UsageError("--format inp: decks have no constant loads; leave out 'mechanism.loads'")
-    lines = _lines(name, part, part.meshed(driven.size), stops[-1], len(stops))
+    lines = _lines(name, part, part.meshed().refined()[0], stops[-1], len(stops))
     return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 

@@ -25,28 +25,27 @@ from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
-from cfmkit.solid.path_following import advanced, follow
+from cfmkit.solid.mesh_refinement import refine
+from cfmkit.solid.path_following import PathEnd, PosePath, advanced, follow
 from cfmkit.solid.rigid_groups import Group, Supports, within
+from cfmkit.solid.sections_of_mesh import check_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
     from cfmkit.solid.mesh import TriangleMesh
-    from cfmkit.solid.path_following import PosePath
+    from cfmkit.solid.mesh_refinement import RefinedMesh
     from cfmkit.solid.plane_stress_law import Law
 
 
-ACROSS, SHARE = 2.5, 0.2
-"""Elements across the thinnest place, and side of an element on a fillet in radii, of the finer mesh: the force of
-Lan's part at 2 mm is then within 3e-4 of that of elements of 0.6 times the size (4.94735 N)."""
-LEAST_ACROSS = 2.0
-"""Elements across the thickness, whatever the requested size: fewer are too stiff."""
-COARSER = 1.5
-"""Sides of the coarser mesh in those of the finer one: half as many nodes, so that the check costs a third more."""
+ACROSS, SHARE = 1.5, 0.4
+"""Elements across the thinnest place, and side of an element on a fillet in radii, of the mesh that is refined: split
+once, the force of Lan's part is within 1e-4 of that of much finer meshes."""
 TURN = math.radians(1.0)
 """Turn between the lines that stand for an arc, at most [rad]: beside corners of 9 degrees the largest stress of a
 strip with fillets of 0.3 mm was 4 % too low, and rose with finer meshes to 6 % too much."""
@@ -59,8 +58,16 @@ TANGENT = 0.5
 BULKY, COARSE = 2.0, 4.0
 """Area of a part, in that of strips of its thinnest size along its edges, from which on blocks have elements so many
 times as large: mechanisms of beams have 1.0 to 1.4, that of Lan 1.9 with fillets of 5 mm, 19 with fillets of 20 mm."""
-ON = 5e-6
-"""Nodes nearer to a pad or a hole than this belong to it [m]: outlines are drawn within that."""
+SINGULAR_SPLITS = 3
+"""How often triangles at singular points are split before a part is solved: each costs some fifteen nodes a point, and
+halves the error from there."""
+ALLOWED = 5e-4
+"""Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough."""
+ON = 1e-3
+"""Nodes nearer to a pad or a hole than this belong to it, and smaller steps of an edge are none: in thicknesses of the
+thinnest place."""
+RING = 2e-5
+"""How far the lines of a boundary may be from its arcs, in the same: their bending stiffness is then within 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +119,8 @@ class Part:
         Side of an element where the part is thick, in those of its thinnest place.
     obstacles : tuple of (n, 2) arrays
         Polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one.
+    sections : tuple of BeamSection
+        Of its beams: meshes must have their thickness.
     """
 
     rings: tuple[Ring, ...]
@@ -122,42 +131,85 @@ class Part:
     regions: tuple[tuple[FloatArray, float], ...] = ()
     largest: float = 1.0
     obstacles: tuple[FloatArray, ...] = ()
+    sections: tuple[BeamSection, ...] = ()
 
-    def meshed(self, size: float, across: float = LEAST_ACROSS) -> Meshed:
+    @property
+    def near(self) -> float:
+        """How far nodes of a pad or a hole may be from it [m]."""
+        return ON * self.thinnest
+
+    @cached_property
+    def faces(self) -> tuple[FloatArray, ...]:
+        """Lines at which rigid pieces begin (2, 2) [m]: seams, and of those on an edge of a pad the whole edge.
+
+        The feet of fillets stand on the pad beside the beam. Elements across it there made a strip 8e-4 too soft.
+        """
+        from shapely import LineString, MultiPoint
+
+        found = []
+        for place in self.places:
+            pads = [shape for shape in place.shapes if len(shape) > 2]
+            edges = [np.array(edge) for pad in pads for edge in zip(pad, np.roll(pad, -1, axis=0), strict=True)]
+            for seam in place.seams:
+                ends = MultiPoint(seam)
+                whole = [
+                    edge for edge in edges if max(LineString(edge).distance(end) for end in ends.geoms) <= self.near
+                ]
+                found.append(whole[0] if whole else seam)
+        return tuple(found)
+
+    def meshed(self, size: float | None = None, across: float = ACROSS) -> Meshed:
         """Return the part with elements of a size [m], and of so many across the thickness at least.
 
-        A part with blocks has as many across as the size leaves.
+        A part with blocks has as many across as the size leaves. Without a size there are `ACROSS` across the thinnest
+        place.
 
         Raises
         ------
         cfmkit.errors.GeometryError
             If the outline cannot be meshed so, or no node is where the part is held.
         """
+        size = self.thinnest / ACROSS if size is None else size
         share = SHARE * size / (self.thinnest / ACROSS)
         across = self.thinnest / size if self.largest > 1.0 else across
-        seams = [seam for place in self.places for seam in place.seams]
-        grid = mesh(self.rings, self.largest * size, share, across, seams, ON)
-        groups, held = self._groups(grid.nodes)
-        elements = Elements(grid, self.law, self._widths(grid)).without(held)
-        unjudged = held | self._beside_clamps(grid, held)
-        return Meshed(self, SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles), unjudged)
+        grid = mesh(self.rings, self.largest * size, share, across, self.faces, self.near)
+        check_mesh(grid, sum(ring.area for ring in self.rings), self.sections)
+        meshed = self.on(grid, np.ones(len(grid.nodes), bool))
+        for _ in range(SINGULAR_SPLITS):
+            if meshed.singular.any():
+                meshed, _ = meshed.refined(meshed.singular)
+        return meshed
+
+    def on(self, grid: TriangleMesh, holdable: NDArray[np.bool_]) -> Meshed:
+        """Return the part on a mesh, of whose nodes some (n,) can be held; GeometryError if none is at a place."""
+        groups, held = self._groups(grid.nodes, holdable)
+        moving = np.asarray(~held[grid.triangles].all(axis=1))
+        elements = Elements(grid, self.law, self._widths(grid)).only(moving)
+        problem = SolidProblem(elements, Supports(grid.nodes, groups), self.obstacles)
+        return Meshed(self, grid, held, moving, problem, held | self._beside_clamps(grid, held))
+
+    def clamp_ends(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the nodes (k,) at which an edge runs into the face of a rigid piece, not along it."""
+        from shapely import LineString
+
+        found = []
+        for edge in grid.edges[held[grid.edges[:, 0]] != held[grid.edges[:, 1]]]:
+            ends = grid.nodes[edge[:2]]
+            along = ends[1] - ends[0]
+            for seam in self.faces:
+                face = seam[1] - seam[0]
+                sine = abs(face[0] * along[1] - face[1] * along[0]) / (np.hypot(*face) * np.hypot(*along))
+                if sine > TANGENT and LineString(seam).distance(LineString(ends)) < self.near:
+                    found.append(edge[0] if held[edge[0]] else edge[1])
+        return np.array(found, np.int64)
 
     def _beside_clamps(self, grid: TriangleMesh, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Tell which nodes are close to where an edge runs into the face of a rigid piece, not along it."""
         from scipy.spatial import cKDTree
-        from shapely import LineString, Point
 
         near, tree = np.zeros(len(grid.nodes), bool), cKDTree(grid.nodes)
-        starts = [k for k, edge in enumerate(grid.edges) if held[edge[0]] != held[edge[1]]]
-        for k in starts:
-            ends = grid.nodes[grid.edges[k, :2]]
-            along = ends[1] - ends[0]
-            for seam in (seam for place in self.places for seam in place.seams):
-                face = seam[1] - seam[0]
-                sine = abs(face[0] * along[1] - face[1] * along[0]) / (np.hypot(*face) * np.hypot(*along))
-                if sine > TANGENT and LineString(seam).distance(LineString(ends)) < ON:
-                    around = LineString(seam).interpolate(LineString(seam).project(Point(ends.mean(axis=0))))
-                    near[tree.query_ball_point(around.coords[0], BESIDE * self.thinnest)] = True
+        for place in grid.nodes[self.clamp_ends(grid, held)]:
+            near[tree.query_ball_point(place, BESIDE * self.thinnest)] = True
         return near
 
     def _widths(self, grid: TriangleMesh) -> FloatArray:
@@ -171,18 +223,18 @@ class Part:
                 widths[contains_xy(Polygon(polygon), middles)] = width
         return widths
 
-    def _groups(self, nodes: FloatArray) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
+    def _groups(self, nodes: FloatArray, holdable: NDArray[np.bool_]) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
         """Return the groups of nodes that are held or driven, and which nodes are in one."""
-        taken = np.zeros(len(nodes), bool)
+        taken = ~holdable
         found: list[Group] = []
         for place in self.places:
-            inside = np.flatnonzero(within(nodes, place.shapes, ON) & ~taken)
+            inside = np.flatnonzero(within(nodes, place.shapes, self.near) & ~taken)
             if len(inside):
                 found.append(Group(place.name, inside, place.at, place.driven, place.free, place.load))
                 taken[inside] = True
             elif not any(one.name == place.name.rstrip("'") for one in found):
                 raise GeometryError(f"no node of the mesh lies where {place.name} is held")
-        return tuple(found), taken
+        return tuple(found), taken & holdable
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,22 +244,66 @@ class Meshed:
     Attributes
     ----------
     part : Part
+    grid : TriangleMesh
+    held : (n,) array of bool
+        Nodes that are held or driven.
+    moving : (m,) array of bool
+        Triangles that can strain: not all of their nodes move as one.
     problem : SolidProblem
+        Of these triangles.
     unjudged : (n,) array of bool
         Nodes whose stress is not read: they are held or driven, or at the end of a rigid piece.
     """
 
     part: Part
+    grid: TriangleMesh
+    held: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
     problem: SolidProblem
     unjudged: NDArray[np.bool_]
 
-    def followed(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
-        """Return the poses at some travels, from rest on in one direction [m or rad]."""
-        return MeshSolution(self.part, self.problem, follow(self.problem, stops, report), self.unjudged)
+    def refined(self, marked: NDArray[np.bool_] | None = None) -> tuple[Meshed, RefinedMesh]:
+        """Return the part on a mesh with some triangles (m,) split in four, all without `marked`, and that mesh."""
+        finer = refine(self.grid, self.part.rings, self.moving if marked is None else marked)
+        return self.part.on(finer.mesh, finer.between(self.held)), finer
 
-    def densely(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
+    @cached_property
+    def singular(self) -> NDArray[np.bool_]:
+        """Triangles at a point where the stress is unbounded, (m,): a reentrant corner or the end of a clamp."""
+        return np.asarray(self._singular_nodes[self.grid.triangles[:, :3]].any(axis=1))
+
+    @cached_property
+    def _singular_nodes(self) -> NDArray[np.bool_]:
+        from scipy.spatial import cKDTree
+
+        corners = [ring.points[ring.corners[ring.turns[ring.corners] < 0.0]] for ring in self.part.rings]
+        ends = self.part.clamp_ends(self.grid, self.held)
+        places = np.concatenate([*corners, self.grid.nodes[ends]])
+        found = np.zeros(len(self.grid.nodes), bool)
+        found[cKDTree(self.grid.nodes).query(places)[1]] = True
+        return found
+
+    def at(self, *poses: Balance) -> MeshSolution:
+        """Return some poses as a solution."""
+        return MeshSolution(self.part, self.problem, PosePath(poses, PathEnd.COMPLETE), self.unjudged)
+
+    def followed(
+        self,
+        stops: Sequence[float],
+        report: Callable[[float], None] = lambda _share: None,
+        guide: Callable[[float], FloatArray | None] = lambda _travel: None,
+    ) -> MeshSolution:
+        """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
+        return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)
+
+    def densely(
+        self,
+        stops: Sequence[float],
+        report: Callable[[float], None] = lambda _share: None,
+        allowed: float = ALLOWED,
+    ) -> MeshSolution:
         """Return the same with poses in between, as many as the curve needs, and what it is off between poses."""
-        course, off = refined(self.problem, follow(self.problem, stops, report))
+        course, off = refined(self.problem, follow(self.problem, stops, report), allowed)
         return MeshSolution(self.part, self.problem, course, self.unjudged, off)
 
 
@@ -274,30 +370,30 @@ def largest_in(rings: Sequence[Ring], thinnest: float) -> float:
     return COARSE if area > BULKY * 0.5 * around * thinnest else 1.0
 
 
-def rings_of(contours: Sequence[Contour], sagitta: float = 1e-6) -> tuple[Ring, ...]:
+def rings_of(contours: Sequence[Contour], thinnest: float = math.inf) -> tuple[Ring, ...]:
     """Return the boundary that closed contours draw, as rings.
 
     Parameters
     ----------
     contours : sequence of Contour
         Outlines and holes.
-    sagitta : float
-        Largest distance of the rings from arcs [m]; smooth edges are taken by their points.
+    thinnest : float
+        Thinnest place of the part [m]: rings are within `RING` of it from arcs; smooth edges are taken by their
+        points.
     """
-    return tuple(Ring.of(contour.points(sagitta, TURN), contour.hole) for contour in contours)
+    step = ON * thinnest if math.isfinite(thinnest) else 0.0
+    return tuple(Ring.of(contour.points(RING * thinnest, TURN), contour.hole, step) for contour in contours)
 
 
-ALLOWED = 5e-4
-"""Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough."""
 HALVED = 16.0
 """Factor by which half an interval has less error."""
 CHECKS = 3
-"""Intervals that must be below `ALLOWED`, one after the other, those with the largest estimates first."""
+"""Intervals that must be below what is allowed, one after the other, those with the largest estimates first."""
 SHORTEST = 2.0**-10
 """Intervals are not halved below this part of the travel: there the curve has a corner, which is a pose."""
 
 
-def refined(problem: SolidProblem, course: PosePath) -> tuple[PosePath, float]:
+def refined(problem: SolidProblem, course: PosePath, allowed: float = ALLOWED) -> tuple[PosePath, float]:
     """Return a path with poses added where the curve needs them, and what the curve is off between poses.
 
     Parameters
@@ -305,6 +401,8 @@ def refined(problem: SolidProblem, course: PosePath) -> tuple[PosePath, float]:
     problem : SolidProblem
     course : PosePath
         At most as many poses are added as it has.
+    allowed : float
+        Difference of cubic and pose, in parts of the largest effort, below which poses are dense enough.
 
     Returns
     -------
@@ -327,7 +425,7 @@ def refined(problem: SolidProblem, course: PosePath) -> tuple[PosePath, float]:
             break
         course, difference = found
         off.append(difference / size)
-        if len(off) >= CHECKS and max(off[-CHECKS:]) <= ALLOWED:
+        if len(off) >= CHECKS and max(off[-CHECKS:]) <= allowed:
             break
     return course, max(off[-CHECKS:], default=float("nan"))
 

@@ -34,9 +34,14 @@ FARTHEST = 2.5
 """Step, in those of the last one, up to which a cubic is a better prediction than a tangent."""
 GROWTH = 2.0
 """Of the step after one that was easy."""
-CORNER, SEEN, SHORT = 0.3, 0.1, 8.0
-"""Change of the stiffness, in parts of the larger one and of the largest so far, for which steps are cut, down to so
-many smallest ones: a smooth curve changes less and less, one that does not has a corner, as at a bifurcation."""
+CORNER, SEEN = 0.3, 0.1
+"""Change of the stiffness, in parts of the larger one and of the largest so far, for which steps are cut: that of a
+smooth curve gets smaller and smaller, one that does not has a corner, as at a bifurcation."""
+CORNERS_APART = 2.0**-6
+"""Distance between corners, in parts of the whole travel: a corner is seen by its neighbours, too."""
+CORNER_WIDTH = 1e-9
+"""Distance between the two poses at a corner, one with the stiffness before it and one with that behind it, in parts of
+the whole travel."""
 PUSHES = np.geomspace(1e-4, 0.1, 13)
 """Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
 NEAR = 1e-3
@@ -120,6 +125,7 @@ def follow(
     stops: Sequence[float],
     report: Callable[[float], None] = lambda _share: None,
     enough: Callable[[float], bool] = lambda _effort: False,
+    guide: Callable[[float], FloatArray | None] = lambda _travel: None,
 ) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch.
 
@@ -133,6 +139,8 @@ def follow(
         Is given the share of the travel that is done.
     enough : callable
         Is given the effort of a pose [N or N m], and tells whether it is the last.
+    guide : callable
+        Predicts the unknowns (q,) at a travel; None if it cannot.
     """
     start = _start(problem, stops[0])
     if start is None:
@@ -143,7 +151,8 @@ def follow(
     for stop in stops[1:]:
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
-            found = advanced(problem, state, ahead, _base(smooth, state, ahead))
+            found = _guided(problem, state, ahead, guide)
+            found = advanced(problem, state, ahead, _base(smooth, state, ahead)) if found is None else found
             steepest = max(abs(pose.stiffness) for pose in course.poses)
             spot = None if found is None else touching(problem, found)
             if spot is not None:
@@ -152,7 +161,7 @@ def follow(
                 step = 0.5 * (ahead - state.travel)
                 continue
             if found is not None and found.unstable <= state.unstable:
-                if bends(state, found, steepest) and abs(ahead - state.travel) > SHORT * SMALLEST * abs(span):
+                if bends(state, found, steepest) and abs(ahead - state.travel) > SMALLEST * abs(span):
                     step = 0.5 * (ahead - state.travel)  # between poses the curve is a cubic: none has a corner
                     continue
                 step = max(step, GROWTH * (ahead - state.travel), key=abs)  # a stop close by makes no step shorter
@@ -169,8 +178,11 @@ def follow(
             if bends(state, found, steepest):
                 smooth = []  # no cubic leads round a corner
                 last = course.bifurcations[-1] if course.bifurcations else math.inf
-                if abs(state.travel - last) > 8 * SHORT * SMALLEST * abs(span):  # a corner is seen by its neighbours
-                    course = replace(course, bifurcations=(*course.bifurcations, state.travel))
+                if abs(state.travel - last) > CORNERS_APART * abs(span):
+                    corner = _corner(problem, state, found, CORNER_WIDTH * span)
+                    place = corner[0].travel if corner else state.travel
+                    poses = (*course.poses, *(pose.kept() for pose in corner))
+                    course = replace(course, poses=poses, bifurcations=(*course.bifurcations, place))
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
             if enough(state.effort):
@@ -266,6 +278,60 @@ def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balan
     moves = len(problem.supports.loose)  # behind them are turns, whose radians are no metres
     correction = float(np.abs((found.unknowns - state.unknowns - predicted)[:moves]).max())
     return found if correction <= STRAY * float(np.abs(predicted[:moves]).max()) + SOFTLY * size else None
+
+
+def _corner(problem: SolidProblem, state: Balance, found: Balance, width: float) -> tuple[Balance, ...]:
+    """Return the poses just before and behind a corner between two poses, where their tangents meet; none if elsewhere.
+
+    The branch beyond is looked for some steps behind its bifurcation, so that its tangent is taken closer to it.
+    """
+    place = _where_tangents_meet(state, found)
+    if place is not None and abs(found.travel - place) > 2.0 * abs(place - state.travel):
+        closer = advanced(problem, found, place + 0.25 * (found.travel - place))
+        if closer is not None and closer.unstable <= found.unstable and _where_tangents_meet(state, closer) is not None:
+            place, found = _where_tangents_meet(state, closer), closer
+    if place is None or min(abs(place - state.travel), abs(found.travel - place)) < 2.0 * abs(width):
+        return ()
+    way = place - state.travel
+    effort = state.effort + way * state.stiffness
+    unknowns = state.unknowns + way * state.slope
+    before = replace(state, travel=place, effort=effort, unknowns=unknowns)
+    ahead = found.travel - place
+    behind = replace(
+        before,
+        travel=place + width,
+        effort=effort + width * found.stiffness,
+        stiffness=found.stiffness,
+        slope=(found.unknowns - unknowns) / ahead,
+    )
+    return before, behind
+
+
+def _where_tangents_meet(state: Balance, found: Balance) -> float | None:
+    """Return the travel between two poses at which the tangents of the curve meet; None if they do not."""
+    way = found.travel - state.travel
+    if state.stiffness == found.stiffness:
+        return None
+    share = (found.effort - state.effort - found.stiffness * way) / (way * (state.stiffness - found.stiffness))
+    return state.travel + share * way if 0.0 < share < 1.0 else None
+
+
+def _guided(
+    problem: SolidProblem, state: Balance, travel: float, guide: Callable[[float], FloatArray | None]
+) -> Balance | None:
+    """Return the stable pose near that of a guide at a travel; None if there is none, or no such guide."""
+    here, there = guide(state.travel), guide(travel)
+    if there is None:
+        return None
+    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
+    moves = len(problem.supports.loose)
+    for guess in (there,) if here is None else (state.unknowns + there - here, there):
+        found = problem.solve(guess, travel)
+        if found is not None and found.unstable <= state.unstable:
+            step = float(np.abs((guess - state.unknowns)[:moves]).max())
+            if float(np.abs((found.unknowns - guess)[:moves]).max()) <= STRAY * step + SOFTLY * size:
+                return found
+    return None
 
 
 def _base(smooth: Sequence[Balance], state: Balance, travel: float) -> Balance | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.solid.elements import slopes
+from cfmkit.solid.elements import shape_functions, slopes
 from cfmkit.solid.rigid_groups import turned
 
 if TYPE_CHECKING:
@@ -123,10 +123,10 @@ class MaterialPoint:
             at = np.full(2, 1.0 / 3.0)
             for _ in range(ROUNDS):
                 jacobian = slopes(at[None])[0].T @ x  # rows: by r, by s
-                at = at + np.linalg.solve(jacobian.T, place - _shares(at) @ x)
+                at = at + np.linalg.solve(jacobian.T, place - shape_functions(at) @ x)
             if min(*at, 1.0 - at.sum()) >= -INSIDE:
                 parent = slopes(at[None])[0]
-                return cls(nodes, _shares(at), parent @ np.linalg.inv(parent.T @ x).T)
+                return cls(nodes, shape_functions(at), parent @ np.linalg.inv(parent.T @ x).T)
         return None
 
     def motion(self, moved: FloatArray) -> FloatArray:
@@ -134,10 +134,3 @@ class MaterialPoint:
         own = moved[self.nodes]
         f = np.eye(2) + own.T @ self.gradient
         return np.array([*(self.shares @ own), np.arctan2(f[1, 0] - f[0, 1], f[0, 0] + f[1, 1])])
-
-
-def _shares(at: FloatArray) -> FloatArray:
-    """Return the shape functions (6,) at a place (2,) of the parent triangle."""
-    r, s = at
-    t = 1.0 - r - s
-    return np.array([t * (2 * t - 1), r * (2 * r - 1), s * (2 * s - 1), 4 * r * t, 4 * r * s, 4 * s * t])

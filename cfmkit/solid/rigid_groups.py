@@ -201,12 +201,16 @@ class Carried:
         slope = np.concatenate([beside[:, -1], corner[:-1, -1]])
         return beside[:, :-1], corner[:-1, :-1], slope, float(corner[-1, -1])
 
+    def moves(self, vector: FloatArray) -> FloatArray:
+        """Return how the nodes move (n, 2) in a direction of unknowns and travel (l + f + 1,)."""
+        moves = self.ways @ vector[len(self.loose) :]
+        moves[self.loose] += vector[: len(self.loose)]
+        return moves.reshape(-1, 2)
+
     def times(self, pull: Callable[[FloatArray], FloatArray], vector: FloatArray) -> FloatArray:
         """Return how residuals and effort (l + f + 1,) change in a direction of unknowns and travel (l + f + 1,).
 
         `pull` gives the change of the nodes' forces (n, 2) in a direction of the nodes.
         """
-        moves = self.ways @ vector[len(self.loose) :]
-        moves[self.loose] += vector[: len(self.loose)]
-        forces = pull(moves.reshape(-1, 2)).ravel()
+        forces = pull(self.moves(vector)).ravel()
         return np.concatenate([forces[self.loose], self.ways.T @ forces + self.curved @ vector[len(self.loose) :]])

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.solid.meshed_part import ON
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -32,8 +31,9 @@ BEYOND = math.radians(6.0)
 RIGID = 1e-9
 """Fillets with less than this share of the part's largest stress join pieces that move as one: it is rounding."""
 
-TOUCHING = 1e-5
-"""Ends of a fillet nearer to a piece than this are on its edge [m]: twice what outlines may be off."""
+ON = 0.01
+"""Points nearer to the circle of a fillet than this are on it, and ends of a fillet nearer to a piece are on its edge;
+in radii."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,9 @@ class FilletArc:
         """Tell which points (n, 2) [m] are on it."""
         way, middle = points - self.center, self.middle - self.center
         off = np.abs(np.arctan2(middle[0] * way[:, 1] - middle[1] * way[:, 0], way @ middle))
-        return np.asarray((np.abs(np.hypot(*way.T) - self.radius) < ON) & (off <= 0.5 * self.turn + BEYOND))
+        return np.asarray(
+            (np.abs(np.hypot(*way.T) - self.radius) < ON * self.radius) & (off <= 0.5 * self.turn + BEYOND)
+        )
 
     def touched(self, pieces: Mapping[str, Sequence[FloatArray]]) -> tuple[str, ...]:
         """Return the names of the pieces, closed polygons (n, 2) [m] each, on whose edges it begins or ends."""
@@ -84,7 +86,7 @@ class FilletArc:
         return tuple(
             name
             for name, polygons in pieces.items()
-            if any(LinearRing(polygon).distance(end) < TOUCHING for polygon in polygons for end in ends)
+            if any(LinearRing(polygon).distance(end) < ON * self.radius for polygon in polygons for end in ends)
         )
 
 

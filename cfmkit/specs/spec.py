@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
@@ -97,11 +97,16 @@ SweepValue = str | int | float | bool
 class SolidAnalysis(Model):
     """How the part is solved as a planar solid."""
 
+    removed_keys: ClassVar[dict[str, str]] = {
+        "mesh": "write 'error', the error allowed in the force: the mesh is refined to it (default: 5e-4)"
+    }
     poses: int = Field(
         21, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
     )
-    mesh: Annotated[Length, Field(gt=0)] | None = Field(
-        None, description="side of an element; default: 0.4 of the thickness of the thinnest beam, leaf or strip"
+    error: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        5e-4,
+        description="error of the force, in parts of the largest, to which the mesh is refined; a warning says if it "
+        "cannot be reached",
     )
 
 
@@ -256,6 +261,10 @@ else:
     )
 
 
+AS_MADE = "as_made"
+"""Key of the context in which a manufactured part is validated: see `Spec.replace`."""
+
+
 class Spec(Model):
     """A complete specification of one mechanism; families narrow the blocks."""
 
@@ -367,10 +376,11 @@ class Spec(Model):
             value = _child(value, part, path)
         return value
 
-    def replace(self, changes: Mapping[str, Any]) -> Self:
+    def replace(self, changes: Mapping[str, Any], as_made: bool = False) -> Self:
         """Return a validated copy with the values at some dotted paths changed.
 
-        Values may be SI numbers or text with a unit (``"190 mm"``).
+        Values may be SI numbers or text with a unit (``"190 mm"``). `as_made`: the values are those of one manufactured
+        part, which need not agree with each other as stated ones do: a spring's rate is not exactly that of its wire.
 
         Raises
         ------
@@ -381,7 +391,7 @@ class Spec(Model):
         for path, value in changes.items():
             data = _with(data, path.split("."), value, path)
         try:
-            return type(self).model_validate(data)
+            return type(self).model_validate(data, context={AS_MADE: as_made})
         except ValidationError as error:
             from cfmkit.specs.yamlio import spec_error
 

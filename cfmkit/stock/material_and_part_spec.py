@@ -350,10 +350,10 @@ class CutPart(Model):
         "thickness: 0.02 mm}; its tolerances are used if there are no `design.tolerances`",
     )
 
-    fillet: FromZero = Field(
-        0.0005,
+    fillet: FromZero | None = Field(
+        None,
         description="radius of inside corners, at least that of the cutter; 0: sharp, the stress there has no "
-        "value; default: the smallest radius of `process` if stated, or 0.5 mm",
+        "value; default: the smallest radius of `process` if stated, or half of the smallest thickness",
     )
     sheet: AboveZero | None = Field(
         None,
@@ -380,6 +380,33 @@ class PaddedPart(CutPart):
     frame: AroundFrame | None = Field(
         None, description="{wall, shuttle, ground}: depths of the pads, and a frame around the part that joins them"
     )
+
+
+USUAL_FILLET = 0.5
+"""Radius of inside corners in smallest thicknesses, where nothing else is stated."""
+
+
+def fillet_of(part: CutPart | None, thinnest: float) -> float:
+    """Return the radius of the inside corners of a part whose smallest thickness is known [m]."""
+    return USUAL_FILLET * thinnest if part is None or part.fillet is None else part.fillet
+
+
+class RoundedCorners:
+    """What a mechanism that has `part` and `thinnest` knows of the inside corners of its part."""
+
+    @property
+    def fillet(self: Any) -> float:
+        """Radius of the inside corners of what is cut [m]."""
+        return fillet_of(self.part, self.thinnest)
+
+
+def usual_fillet(thinnest: float) -> str:
+    """Return how a specification states the usual radius of inside corners, of a part with a smallest thickness [m].
+
+    >>> usual_fillet(0.1e-3)
+    'mechanism.part.fillet=0.05 mm'
+    """
+    return f"mechanism.part.fillet={format_short(USUAL_FILLET * thinnest, 'length')}"
 
 
 def sheet_of(part: CutPart | None) -> float | None:

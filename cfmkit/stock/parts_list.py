@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.tables import Table, TableColumn
+from cfmkit.tables import Table, TableColumn, text_column
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -35,8 +35,8 @@ class BoughtPart:
 
 def parts_table(parts: Sequence[BoughtPart]) -> Table:
     """Return the list as a table: place, name, count, data."""
-    columns = ("place", "name", "count", "data")
-    return Table(tuple(TableColumn(name, tuple(getattr(part, name) for part in parts)) for name in columns))
+    place, name, data = (text_column(key, (getattr(one, key) for one in parts)) for key in ("place", "name", "data"))
+    return Table((place, name, TableColumn("count", tuple(one.count for one in parts)), data))
 
 
 def listed(parts: Sequence[BoughtPart]) -> dict[str, Callable[[], Table]]:

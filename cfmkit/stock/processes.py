@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
+from cfmkit.stock.materials import MATERIALS
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -61,9 +63,57 @@ _ALL = (
 PROCESSES: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _ALL})
 """All by name."""
 
+SPRING_RATE = 0.05
+"""Half width of the range in which the rate of a spring is found, over its nominal rate: all values are equally likely.
+
+Assumed for springs wound to measure, helical and torsion: EN 15800 (which replaced DIN 2095) gives the loads of cold
+coiled springs in grade 2, the usual one, tolerances of this size; it is written for compression springs. Stock springs
+are wider: Lee Spring states 10 % of the rate.
+"""
+
 PRINTED = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
 METAL = 20e9
 """Young's modulus above which a material is taken for a metal [Pa]: no plastic reaches it, no metal is as soft."""
+
+
+POWDERS = ("pa12-sls", "pa12-mjf")
+"""Materials whose values are those of sintered powder."""
+
+RUBBERS = ("tpu-95a",)
+"""Materials that yield to a cutter."""
+
+
+def why_not_made(process: str, material: str | None, youngs_modulus: float) -> str:
+    """Return why a process makes no part of a material, and which processes do; empty if it does.
+
+    Wires erode what conducts, which is metals; nozzles and powder beds make plastics. A powder with values of its own
+    is sintered only, and filaments are not.
+
+    Examples
+    --------
+    >>> why_not_made("fdm", "titanium-6al-4v", 114e9)
+    'titanium-6al-4v is not made by fdm, but by laser, wire-edm or mill'
+    >>> why_not_made("fdm", "pla", 3e9)
+    ''
+    """
+    made_by = _processes_of(material, youngs_modulus)
+    if process in made_by:
+        return ""
+    *others, last = made_by
+    name = material or ("this metal" if youngs_modulus > METAL else "this plastic")
+    return f"{name} is not made by {process}, but by {', '.join(others)}{' or ' if others else ''}{last}"
+
+
+def _processes_of(material: str | None, youngs_modulus: float) -> tuple[str, ...]:
+    """Return by which processes parts of a material are made."""
+    if youngs_modulus > METAL:
+        return ("laser", "wire-edm", "mill")
+    if material in POWDERS:
+        return ("sls",)
+    if material in RUBBERS:
+        return ("laser", "fdm")
+    # a material of one's own may be a powder, too
+    return ("laser", "fdm", "mill") if material in MATERIALS else ("laser", "fdm", "sls", "mill")
 
 
 def usual(material: str | None, youngs_modulus: float) -> ProcessAccuracy:

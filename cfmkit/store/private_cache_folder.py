@@ -10,31 +10,36 @@ from pathlib import Path
 from cfmkit.store import safe_disk_changes
 
 
-def trusted(path: Path) -> bool:
-    """Return whether only this user, or the system's owner, can have put what stands at a path there.
+def resolve_trusted(path: Path) -> Path | None:
+    """Return a path without its links if only this user, or the system's owner, can have put there what stands there.
 
-    Code is loaded only from such places. Everything on the way counts: who can rename a folder can put another one in
-    its place, unless the folder that it stands in lets nobody touch what is not theirs (as the temporary one does).
+    None if others can. Code is loaded from the path that is returned, never from the one that was given: a link that
+    is followed twice may lead elsewhere the second time. Everything on the way counts, from the root downwards: who can
+    rename a folder can put another one in its place, unless the folder that it stands in lets nobody touch what is
+    not theirs (as the temporary one does). What has been judged therefore cannot be exchanged by others afterwards.
     """
-    if not hasattr(os, "getuid"):
-        return True
     try:
         real = path.resolve(strict=True)
-        for step in (real, *real.parents):
-            about = step.stat()
-            shared = about.st_mode & 0o022 and not (step != real and about.st_mode & stat.S_ISVTX)
-            if shared or about.st_uid not in (os.getuid(), 0):
-                return False
+        if hasattr(os, "getuid") and not all(_is_safe(step, step == real) for step in (*reversed(real.parents), real)):
+            return None
     except OSError:
-        return False
-    return True
+        return None
+    return real
+
+
+def _is_safe(step: Path, is_last: bool) -> bool:
+    """Return whether others can change neither a file or folder nor what it is; a link is new since it was resolved."""
+    about = step.lstat()
+    shared = about.st_mode & 0o022 and (is_last or not about.st_mode & stat.S_ISVTX)
+    return not shared and not stat.S_ISLNK(about.st_mode) and about.st_uid in (os.getuid(), 0)
 
 
 def private_folder(name: str, make: bool = True) -> Path | None:
     """Return a folder for files that this user's later runs may use again; None where there is no room for any.
 
     It has a fixed name, so that it serves every process of the user. What stands there and belongs to somebody
-    else, or can be written by others, is not trusted (code is loaded from it): then the folder is a new one.
+    else, or can be written by others, is not trusted (code and settings are loaded from it): then the folder is a new
+    one. Where others can rename it, in a folder of temporary files that is shared without protection, there is none.
 
     Parameters
     ----------
@@ -46,13 +51,13 @@ def private_folder(name: str, make: bool = True) -> Path | None:
     try:
         folder = place(name)
         if not make:
-            return folder if _is_ours(folder) else None
+            return resolve_trusted(folder) if _is_ours(folder) else None
         try:
             safe_disk_changes.system.mkdir(folder, 0o700)
         except FileExistsError:
             if not _is_ours(folder):
-                return Path(tempfile.mkdtemp(prefix=f"cfmkit-{name}-"))
-        return folder
+                folder = Path(tempfile.mkdtemp(prefix=f"cfmkit-{name}-"))
+        return resolve_trusted(folder)
     except OSError:
         return None
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import signal
+import threading
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
@@ -86,19 +88,27 @@ class RunFolder:
         self._clock = time.monotonic()
         try:
             with _undisturbed(), reporting(self.path, "use the folder"):
+                atexit.register(self._leave)
                 self._create_and_lock()
                 self._take_over()
             self._owner = os.getpid()
+            return self
         except BaseException:
-            self._leave()
+            with _undisturbed():
+                self._leave()
             raise
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Drop what was not committed and unlock the folder."""
-        self._leave()
+        """Drop what was not committed and unlock the folder; a signal that comes meanwhile acts afterwards."""
+        try:
+            with _undisturbed():
+                self._leave()
+        except BaseException:
+            with _undisturbed():  # the signal may have come just before
+                self._leave()
+            raise
 
     def check(self, *names: str) -> None:
         """Raise now what `write` would raise later: call it before a long computation.
@@ -143,6 +153,11 @@ class RunFolder:
         """
         self._require_open()
         return self.path / JOURNAL
+
+    @property
+    def lock_file(self) -> str:
+        """The name of the file that is the lock; "" if the folder is not locked."""
+        return self._lock.name
 
     def commit(self, info: Mapping[str, Any]) -> Manifest:
         """Put the files and a manifest in place of those of the run before, all or none; once.
@@ -246,29 +261,48 @@ class RunFolder:
             raise CfmError(f"cannot write to {shown(self.path)}: the run folder {state}")
 
     def _leave(self) -> None:
-        """Drop the working folder, unlock, and remove what was created for nothing."""
-        if not self._lock.mine:
-            return
-        self._owner = 0
-        transaction.clear(self.path)
-        self._lock.release()
-        safe_disk_changes.remove_empty(self._created)
+        """Drop the working folder, unlock, and remove what was created for nothing; once.
+
+        It is called again at the end of the process for a folder that a signal has kept from being left: Python may act
+        on a signal before the first statement of `__exit__`.
+        """
+        if self._lock.mine:
+            self._owner = 0
+            transaction.clear(self.path)
+            self._lock.release()
+            safe_disk_changes.remove_empty(self._created)
+        atexit.unregister(self._leave)
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Hold back the signals that end a run: between making a folder and remembering it they would leave it there."""
-    if not hasattr(signal, "pthread_sigmask"):
+    """Hold back the signals that end a run: between making a folder and remembering it they would leave it there.
+
+    Not by the mask of signals of this thread: another thread would take them, and Python acts on them in this one.
+    """
+    if threading.current_thread() is not threading.main_thread():  # where Python acts on none
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
+    came: list[int] = []
+
+    def deliver() -> None:
+        for number in came:
+            signal.raise_signal(number)
+
+    with ExitStack() as afterwards:
+        afterwards.callback(deliver)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if (usual := signal.getsignal(number)) is not None:  # None: of another language, it could not be put back
+                afterwards.callback(signal.signal, number, usual)
+                signal.signal(number, lambda number, _frame: came.append(number))
         yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _alive(process: int) -> bool:
+    """Return whether a process lives; of Windows False, where a signal to find out would reach it, and where no file
+    is removed that a process has open."""
+    if os.name == "nt":
+        return False
     try:
         os.kill(process, 0)
     except ProcessLookupError:

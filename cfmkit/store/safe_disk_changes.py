@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from cfmkit.errors import OutputError
+from cfmkit.errors import OutputError, reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -43,6 +43,7 @@ _REASONS = {
     errno.ENOLCK: "the file system has no locks",
 }
 _NO_LINKS = {errno.EPERM, errno.EACCES, errno.EXDEV, errno.EMLINK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+_NO_LINKS |= {errno.EINVAL}  # what Windows says of a drive without links
 _NO_FOLDER_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
 
 
@@ -70,7 +71,7 @@ def reporting(path: str | os.PathLike[str], doing: str = "write") -> Iterator[No
 
 def reason(error: OSError) -> str:
     """Return why an operation of the system failed, for a message."""
-    return _REASONS.get(error.errno or 0) or (error.strerror or str(error)).lower()
+    return _REASONS.get(error.errno or 0) or reason_of(error)
 
 
 def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
@@ -97,8 +98,8 @@ def atomic_write(path: str | os.PathLike[str], data: Data) -> FileRecord:
     temporary = target.parent / TEMPORARY.format(pid=os.getpid(), count=next(_counter))
     with reporting(path):
         _refuse_special(target)
-        record = write_new(temporary, data)
         try:
+            record = write_new(temporary, data)
             system.replace(temporary, target)
         except BaseException:
             discard(temporary)
@@ -151,7 +152,9 @@ def discard(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Bring the names in a folder down to the disk."""
+    """Bring the names in a folder down to the disk; Windows opens no folders and does this by itself."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
     descriptor = system.open(path, os.O_RDONLY)
     try:
         system.fsync(descriptor)
@@ -160,6 +163,12 @@ def sync_folder(path: Path) -> None:
             raise
     finally:
         system.close(descriptor)
+
+
+def read_at(descriptor: int, count: int, place: int) -> bytes:
+    """Return up to `count` bytes from a place of an open file; Windows has no `os.pread`. The position changes."""
+    os.lseek(descriptor, place, os.SEEK_SET)
+    return os.read(descriptor, count)
 
 
 def make_folders(path: Path) -> list[Path]:

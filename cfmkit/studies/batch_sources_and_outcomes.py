@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import glob
 import os
-from collections import Counter
+import re
+from collections import Counter, deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.results import Status
 from cfmkit.studies.row_blocks_for_journal import WARNINGS_JOINT
-from cfmkit.tables import Table, TableColumn
+from cfmkit.tables import Table, TableColumn, text_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -176,12 +177,51 @@ def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
     """Return the files that match a pattern, but those that a run wrote."""
     inside = os.path.realpath(out) + os.sep
     found = []
-    for path in sorted(glob.glob(pattern, root_dir=root, recursive=True)):
+    for path in sorted(_paths(pattern, root or "")):
         whole = os.path.join(root, path) if root else path
         ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
         if os.path.isfile(whole) and not ours and not is_figure(whole):
             found.append(path)
     return found
+
+
+def _paths(pattern: str, root: str) -> set[str]:
+    """Return the paths that match a pattern; `glob` itself would follow links that lead upwards again and again."""
+    start, *rest = _ANY_DEPTH.split(pattern, maxsplit=1)
+    if not rest:
+        return set(glob.glob(pattern, root_dir=root or None))
+    tops = glob.glob(start, root_dir=root or None) if start else [""]
+    folders = (folder for top in tops for folder in _folders_below(top, root))
+    return {path for folder in folders for path in _paths(glob.escape(folder) + (rest[0] or "*"), root)}
+
+
+_SEPARATORS = re.escape(os.sep + (os.altsep or ""))
+_ANY_DEPTH = re.compile(rf"(?:^|(?<=[{_SEPARATORS}]))\*\*(?:[{_SEPARATORS}]|$)")
+"""The part of a pattern that stands for any number of folders."""
+
+
+def _folders_below(top: str, root: str) -> Iterator[str]:
+    """Yield a folder and those below it, with a separator at the end, but hidden ones and those of results.
+
+    Links are followed, after all real folders; each folder is visited once, so that links may lead in circles.
+    """
+    seen: set[tuple[int, int]] = set()
+    waiting = deque([top])
+    while waiting:
+        folder = waiting.popleft()
+        try:
+            about = os.stat(os.path.join(root, folder) or os.curdir)
+            if (about.st_dev, about.st_ino) in seen:
+                continue
+            seen.add((about.st_dev, about.st_ino))
+            entries = sorted(os.scandir(os.path.join(root, folder) or os.curdir), key=lambda entry: entry.name)
+        except OSError:  # as `glob` does: what cannot be read holds nothing
+            continue
+        yield folder
+        kept = (one for one in entries if not one.name.startswith(".") and one.name != OUTPUTS)
+        below = [one for one in kept if os.path.isdir(one)]  # one.is_dir() fails where a link leads to itself
+        waiting.extendleft(os.path.join(folder, one.name, "") for one in reversed(below) if not one.is_symlink())
+        waiting.extend(os.path.join(folder, one.name, "") for one in below if one.is_symlink())
 
 
 def is_figure(path: str) -> bool:
@@ -243,17 +283,17 @@ def results_table(entries: Sequence[Entry]) -> Table:
     """Return results.csv: one row per specification."""
     return Table(
         (
-            TableColumn("spec", tuple(one.spec for one in entries)),
-            TableColumn("folder", tuple(one.folder for one in entries)),
-            TableColumn("verb", tuple(one.verb for one in entries)),
-            TableColumn("family", tuple(one.family for one in entries)),
-            TableColumn("name", tuple(one.name for one in entries)),
-            TableColumn("status", tuple(one.status for one in entries)),
+            text_column("spec", (one.spec for one in entries)),
+            text_column("folder", (one.folder for one in entries)),
+            text_column("verb", (one.verb for one in entries)),
+            text_column("family", (one.family for one in entries)),
+            text_column("name", (one.name for one in entries)),
+            text_column("status", (one.status for one in entries)),
             TableColumn("exit_code", tuple(None if one.skipped else int(one.code) for one in entries)),
             TableColumn("requirements", tuple(len(one.requirements) for one in entries)),
             TableColumn("missed", tuple(len(one.missed) for one in entries)),
-            TableColumn("warnings", tuple(one.warned for one in entries)),
-            TableColumn("message", tuple(one.message for one in entries)),
+            text_column("warnings", (one.warned for one in entries)),
+            text_column("message", (one.message for one in entries)),
         )
     )
 
@@ -268,9 +308,10 @@ def requirements_table(entries: Sequence[Entry]) -> Table:
     over = [one["over"] or (None, None) for _, one in rows]
     return Table(
         (
-            TableColumn("spec", tuple(entry.spec for entry, _ in rows)),
-            column("metric"),
-            *(column(key) for key in ("value", "min", "max", "unit")),
+            text_column("spec", (entry.spec for entry, _ in rows)),
+            text_column("metric", (one["metric"] for _, one in rows)),
+            *(column(key) for key in ("value", "min", "max")),
+            text_column("unit", (one["unit"] for _, one in rows)),
             TableColumn("over_from", tuple(ends[0] for ends in over)),
             TableColumn("over_to", tuple(ends[1] for ends in over)),
             column("over_unit"),

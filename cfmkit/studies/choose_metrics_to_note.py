@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError
 from cfmkit.families import family
+from cfmkit.families.base import ENVELOPE
 from cfmkit.metrics import definition_of, definitions, metrics_by_name, values_of_family
+from cfmkit.metrics.spread import STATIC_BALANCE
 from cfmkit.studies.point_evaluation import Metric, Study
 
 if TYPE_CHECKING:
@@ -62,12 +64,13 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
 
 
 def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
-    """Return the metrics that no point of such a study can have: block models need not know them."""
+    """Return the metrics that no point of such a study can have, or only if named: they cost time."""
     stressed = sample is None or "max_stress" in sample.extra
     lasting = getattr(spec, "durability", None)
     lives = () if lasting is not None and lasting.fatigue is not None else NEED_FATIGUE
     followed = () if getattr(spec, "target_curve", None) is not None else NEED_CURVE
-    return frozenset((*followed, *(() if stressed else NEED_STRESS), *lives, *NEED_TIME))
+    by_name = (STATIC_BALANCE, *ENVELOPE)
+    return frozenset((*followed, *(() if stressed else NEED_STRESS), *lives, *NEED_TIME, *by_name))
 
 
 def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:

@@ -30,7 +30,7 @@ from zlib import crc32
 import numpy as np
 
 from cfmkit.errors import OutputError
-from cfmkit.store.safe_disk_changes import atomic_write, discard, reporting
+from cfmkit.store.safe_disk_changes import atomic_write, discard, read_at, reporting
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -96,7 +96,7 @@ class Journal:
 
     def __enter__(self) -> Self:
         """Open the file, drop a torn last line, and learn which records are there."""
-        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
         with reporting(self.path, "open"):
             self._file = os.open(self.path, flags, 0o666)
             try:
@@ -112,10 +112,11 @@ class Journal:
         """Bring the file down to the disk and close it; one that holds nothing is removed."""
         try:
             self.sync()
-            if not os.fstat(self._file).st_size:
-                discard(self.path)
+            empty = not os.fstat(self._file).st_size
         finally:
             os.close(self._file)
+        if empty:
+            discard(self.path)
 
     def __len__(self) -> int:
         """Return the number of sound records that were there when the file was opened."""
@@ -127,7 +128,7 @@ class Journal:
         number = np.uint64(int(key[:16], 16))
         at = int(keys.searchsorted(number, side="right")) - 1
         while at >= 0 and keys[at] == number:
-            if os.pread(self._file, _KEYS, _key_place(int(places[at]))) == key.encode():
+            if read_at(self._file, _KEYS, _key_place(int(places[at]))) == key.encode():
                 return int(places[at])
             at -= 1
         return -1
@@ -190,9 +191,9 @@ class Journal:
     def _line(self, place: int, key: str = "") -> bytes:
         """Return a sound line, which has a certain key if one is given."""
         with reporting(self.path, "read"):
-            line = os.pread(self._file, 4096, place)
+            line = read_at(self._file, 4096, place)
             while (end := line.find(b"\n")) < 0:
-                more = os.pread(self._file, max(_CHUNK, len(line)), place + len(line))
+                more = read_at(self._file, max(_CHUNK, len(line)), place + len(line))
                 if not more:
                     break
                 line += more

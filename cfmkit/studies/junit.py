@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from cfmkit.errors import ExitCode, OutputError, UsageError
+from cfmkit.errors import ExitCode, OutputError, UsageError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -116,8 +116,8 @@ def requirement_name(one: Mapping[str, Any]) -> str:
 
 
 def clean(text: str) -> str:
-    """Return text without what XML cannot hold."""
-    return NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+    """Return text in which control characters are escaped, but line feeds, and without what XML cannot hold."""
+    return NOT_XML.sub("\N{REPLACEMENT CHARACTER}", "\n".join(map(visible, text.split("\n"))))
 
 
 def prepared(path: str, option: str = "--junit") -> Callable[[bytes], None]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError, visible
 from cfmkit.results import Status
-from cfmkit.tables import Table, TableColumn
+from cfmkit.tables import Table, TableColumn, text_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +48,7 @@ class MetricChange:
     unit : str
         Of both.
     relative : float or None
-        The difference over the larger of both; None where they are not numbers.
+        The difference over what it was: 1 where it doubled; None where they are not numbers, or it was zero.
     beyond : bool
         Whether it is more than the tolerance.
     """
@@ -183,8 +183,8 @@ def _of_metrics(
             yield MetricChange(spec, name, old, new, unit, None, True)
             continue
         if abs(new - old) > NOTHING:
-            relative = (new - old) / max(abs(old), abs(new))
-            yield MetricChange(spec, name, old, new, unit, relative, abs(relative) > tolerance)
+            relative = (new - old) / abs(old) if old else None
+            yield MetricChange(spec, name, old, new, unit, relative, relative is None or abs(relative) > tolerance)
 
 
 def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
@@ -197,11 +197,11 @@ def changes_table(found: Sequence[MetricChange]) -> Table:
     """Return changes.csv: one row per value that is not as it was."""
     return Table(
         (
-            TableColumn("spec", tuple(one.spec for one in found)),
-            TableColumn("metric", tuple(one.name for one in found)),
-            TableColumn("before", tuple(_cell(one.before) for one in found)),
-            TableColumn("after", tuple(_cell(one.after) for one in found)),
-            TableColumn("unit", tuple(one.unit for one in found)),
+            text_column("spec", (one.spec for one in found)),
+            text_column("metric", (one.name for one in found)),
+            text_column("before", (_cell(one.before) for one in found)),
+            text_column("after", (_cell(one.after) for one in found)),
+            text_column("unit", (one.unit for one in found)),
             TableColumn("relative_change", tuple(one.relative for one in found)),
             TableColumn("beyond_tolerance", tuple(one.beyond for one in found)),
         )

@@ -137,6 +137,8 @@ class Study:
         Whether metrics and requirements alone are looked at: models then leave out what those do not need.
     deliver : callable
         What makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes.
+    made : bool
+        Whether points are manufactured parts, whose values need not agree as stated ones do.
     """
 
     spec: Spec
@@ -147,6 +149,7 @@ class Study:
     seed: int = 0
     lean: bool = False
     deliver: Deliver = of_perfect_parts
+    made: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -178,7 +181,7 @@ class Study:
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
         computing = [origin(), family_origin(self.spec.family)]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.lean, computing, data]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, self.lean, self.made, computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:
@@ -194,7 +197,7 @@ class Study:
         cfmkit.errors.SpecError
             If it is not valid.
         """
-        return self.spec.replace(dict(zip(self.paths, values, strict=True)))
+        return self.spec.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
 
     def evaluate(self, values: Sequence[Any]) -> Row:
         """Return what becomes of one point; nothing is raised but what ends the process."""
@@ -211,11 +214,11 @@ class Study:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed, wanted=self.wanted, columns=self.curves or not self.lean)
         if not self.design or record.design is None:
-            return windows_judged(record.analyze(spec, run))
+            return windows_judged(record.with_envelope(record.analyze(spec, run), self.names))
         design = self.deliver(spec, record.design, Run(self.seed))
         if design.spec is None:
             return Result(spec, design.status, design.explanation, warnings=design.warnings)
-        result = windows_judged(record.analyze(design.spec, run))
+        result = windows_judged(record.with_envelope(record.analyze(design.spec, run), self.names))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 
     def row(self, result: Result) -> Row:

@@ -1,7 +1,8 @@
 """A pool of processes that loses nothing but what a dead process was working on.
 
-Each worker has pipes of its own, and no lock is shared: killing one at any moment
-leaves the others untouched. A worker says when it starts a job, so that its death
+Each worker has pipes of its own, its standard input and output, and no lock is shared: killing one at any moment
+leaves the others untouched. A thread for each worker sends it the work and waits for what it says: there is no other
+way to wait for several pipes on Windows. A worker says when it starts a job, so that its death
 is held against that job alone; jobs that were only waiting in its pipe go to others.
 A job is tried a second time on a new worker and given up after two deaths. A job that
 exceeds the time allowed, or runs when the time of all is up, is given up at once, with its worker.
@@ -14,13 +15,12 @@ import os
 import pickle
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections import Counter, deque
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection, wait
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError, UsageError
@@ -31,9 +31,10 @@ from cfmkit.studies.serial_and_cluster_executors import BUG, Lost, never
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from typing import BinaryIO
 
     from cfmkit.studies.serial_and_cluster_executors import Executor, Stopping, Work
+
+    Messages = SimpleQueue[tuple["_Worker", bytes | None]]
 
 DEATHS = 2
 """A job is given up after so many of its workers have died."""
@@ -50,31 +51,54 @@ MOST_STILLBORN = {True: 60, False: 4}
 """Workers in a row that may die before their first job: by a signal, and by themselves."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Worker:
-    """A process with its pipes and the jobs it was given, the one it works on first."""
+    """A process, the thread that listens to it, and the jobs it was given, the one it works on first."""
 
     process: subprocess.Popen[bytes]
-    jobs: Connection
-    outcomes: Connection
-    life: int
     given: deque[Any] = field(default_factory=deque)
     ready: bool = False
     started: float | None = None
+    listener: threading.Thread = field(init=False)
+
+    def listen(self, work: bytes, messages: Messages) -> None:
+        """Send the work, then put (worker, message) on a queue whenever the worker says something; None at its end."""
+
+        def serve() -> None:
+            with suppress(OSError):
+                worker_process.send(self.process.stdin, work)
+                while (message := worker_process.receive(self.process.stdout)) is not None:
+                    messages.put((self, message))
+            messages.put((self, None))
+
+        self.listener = threading.Thread(target=serve, daemon=True)
+        self.listener.start()
 
     def give(self, job: Any) -> None:
+        """Send a job, or keep it until the worker has the work."""
         self.given.append(job)
+        if self.ready:
+            self.send(job)
+
+    def begin(self) -> None:
+        """Send the jobs that were kept."""
+        self.ready = True
+        for job in self.given:
+            self.send(job)
+
+    def send(self, job: Any) -> None:
         # A broken pipe shows as the end of the other one in a moment.
         with suppress(OSError):
-            self.jobs.send_bytes(pickle.dumps(job))
+            worker_process.send(self.process.stdin, pickle.dumps(job))
 
     def end(self) -> None:
         """Kill the process and close the pipes."""
         self.process.kill()
         self.process.wait()
-        self.jobs.close()
-        self.outcomes.close()
-        os.close(self.life)
+        self.listener.join()
+        for pipe in (self.process.stdin, self.process.stdout):
+            with suppress(OSError):  # what the dead process has not read
+                pipe.close()  # type: ignore[union-attr]
 
 
 @dataclass(frozen=True)
@@ -119,9 +143,8 @@ class _Crew:
         self.stillborn = 0
         self.pace: float | None = None
         self.empty = False
-        self.what: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__
-        pickle.dump(work, self.what, pickle.HIGHEST_PROTOCOL)
-        self.what.flush()
+        self.messages: Messages = SimpleQueue()
+        self.what = pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
 
     def __enter__(self) -> _Crew:
         return self
@@ -129,7 +152,6 @@ class _Crew:
     def __exit__(self, *_: object) -> None:
         for one in self.workers:
             one.end()
-        self.what.close()
 
     def hire(self) -> bool:
         """Hand out jobs, to new workers where there are too few; tell whether anything is going on."""
@@ -137,8 +159,9 @@ class _Crew:
             while len(one.given) < self._ahead() and (job := self._next()) is not None:
                 one.give(job)
         while len(self.workers) < self.pool.processes and (job := self._next()) is not None:
-            self.workers.append(_started(self.what))
+            self.workers.append(_started())
             self.workers[-1].give(job)
+            self.workers[-1].listen(self.what, self.messages)
         return any(one.given for one in self.workers)
 
     def _ahead(self) -> int:
@@ -156,21 +179,18 @@ class _Crew:
 
     def finished(self) -> Iterator[tuple[Any, Any]]:
         """Yield what has finished since the last look, or nothing after a short while."""
-        busy = {one.outcomes: one for one in self.workers if one.given}
-        for pipe in wait(list(busy), PATIENCE):
-            one = busy[pipe]  # type: ignore[index]
-            try:
-                message = one.outcomes.recv_bytes()
-            except (EOFError, OSError):
-                yield from self._buried(one)
-                continue
-            yield from self._heard(one, message)
+        with suppress(Empty):
+            one, message = self.messages.get(timeout=PATIENCE)
+            while True:
+                if one in self.workers:
+                    yield from self._buried(one) if message is None else self._heard(one, message)
+                one, message = self.messages.get_nowait()
         yield from self._late()
 
     def _heard(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
         if kind == worker_process.READY:
-            one.ready = True
+            one.begin()
         elif kind == worker_process.STARTED:
             one.started, self.stillborn = time.monotonic(), 0
         else:
@@ -218,7 +238,7 @@ class _Crew:
         # a worker that has not begun yet is still loading: with all time up nobody waits for it
         for one in [one for one in self.workers if one.given and (over or one.started is not None)]:
             late = over or (allowed is not None and now - (one.started or now) > allowed)
-            if late and not one.outcomes.poll():
+            if late:
                 self.workers.remove(one)
                 one.end()
                 job = one.given.popleft()
@@ -242,24 +262,17 @@ def _cause(code: int) -> str:
     return f"signal {-code}"
 
 
-def _started(what: BinaryIO) -> _Worker:
-    """Return a new worker for the work that a file holds: `what`."""
+def _started() -> _Worker:
+    """Return a new worker."""
     if not sys.executable:
         raise UsageError("this Python cannot start other processes; use one job (-j 1)")
-    jobs_out, jobs_in = os.pipe()
-    outcomes_out, outcomes_in = os.pipe()
-    life_out, life_in = os.pipe()
-    theirs = [what.fileno(), jobs_out, outcomes_in, life_out]
     parent = os.getpid() if threading.current_thread() is threading.main_thread() else 0
-    given = json.dumps({"path": sys.path, "pipes": theirs, "parent": parent})
-    try:
-        process = subprocess.Popen(
+    given = json.dumps({"path": sys.path, "parent": parent})
+    return _Worker(
+        subprocess.Popen(
             [sys.executable, "-P", "-c", worker_process.START, given],
-            stdin=subprocess.DEVNULL,
-            pass_fds=theirs,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
             env=os.environ | ONE_THREAD,
         )
-    finally:
-        for descriptor in theirs[1:]:
-            os.close(descriptor)
-    return _Worker(process, Connection(jobs_in, readable=False), Connection(outcomes_out, writable=False), life_in)
+    )

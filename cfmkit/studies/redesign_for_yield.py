@@ -113,7 +113,7 @@ class Sight:
         for path, error, at in zip(self.made.paths, errors.tolist(), self.made.nominal.tolist(), strict=True):
             if error:
                 changes[path] = changes.get(path, at) + error
-        return self.spec.replace(changes)
+        return self.spec.replace(changes, as_made=bool(errors.any()))
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
         """Return the numbers of a part; None where it has none."""

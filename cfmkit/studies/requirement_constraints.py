@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from cfmkit.families import family
-from cfmkit.families.base import Sampled, function_named
+from cfmkit.families.base import ENVELOPE, Sampled, function_named
 from cfmkit.metrics import check, split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Status
@@ -88,6 +88,8 @@ class _RowsOfMargins:
     def add(self, one: Requirement, number: int) -> None:
         """Add the rows of a requirement."""
         name, branch = split_name(one.metric)
+        if name in ENVELOPE:  # tolerances move the box by next to nothing, and it takes a drawing of each part
+            return
         (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
         limits = Bounds.of(one, metric.dimension)
         plain = name.replace("torque_", "force_", 1)

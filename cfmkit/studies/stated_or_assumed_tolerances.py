@@ -8,7 +8,7 @@ Beside them stands the spread of the modulus that `show materials` has a source 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from cfmkit.families.base import function_named
 from cfmkit.specs.spec import Sensitivity, Tolerance
 from cfmkit.stock.material_and_part_spec import PartProcess
 from cfmkit.stock.materials import MATERIALS
-from cfmkit.stock.processes import PROCESSES, usual
+from cfmkit.stock.processes import PROCESSES, SPRING_RATE, usual
 from cfmkit.studies.sensitivity.distributions import draw, values_at
 from cfmkit.studies.sensitivity.parameters import correlations, groups, parameters_of
 
@@ -177,6 +177,8 @@ class Assumed:
         How it is made.
     kinds : mapping of str to str
         Path -> in what it errs, "thickness" or "position".
+    rates : mapping of str to float
+        Path of a spring's rate -> its nominal value [N/m or N m/rad]: found within `SPRING_RATE` of it.
     modulus : (float, float) or None
         From where to where the modulus at `MODULUS` is found [Pa]; None where no source says it.
     as_stated : bool
@@ -187,11 +189,19 @@ class Assumed:
     kinds: Mapping[str, str]
     modulus: tuple[float, float] | None
     as_stated: bool = False
+    rates: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def deviations(self) -> dict[str, float]:
         """Path -> standard deviation [m]."""
         return {path: getattr(self.process, kind) for path, kind in self.kinds.items()}
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Path of a value whose every value in a range is equally likely -> that range: modulus and springs' rates."""
+        found = {} if self.modulus is None else {MODULUS: self.modulus}
+        ends = 1.0 - SPRING_RATE, 1.0 + SPRING_RATE
+        return found | {path: (ends[0] * rate, ends[1] * rate) for path, rate in self.rates.items()}
 
 
 def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
@@ -216,7 +226,9 @@ def assumed(spec: Spec, process: str | None = None) -> Assumed | None:
     elif own is not None:
         accuracy = own.accuracy(accuracy)
     band = next((found for one in shared if (found := _band(one))), None)
-    return Assumed(accuracy, kinds, band, any(map(_band, owned)))
+    rates = {path: float(spec.at(path)) for path, kind in kinds.items() if kind == "rate"}
+    made = {path: kind for path, kind in kinds.items() if kind != "rate"}
+    return Assumed(accuracy, made, band, any(map(_band, owned)), rates)
 
 
 def _materials(spec: Spec) -> tuple[tuple[MaterialSpec, ...], tuple[MaterialSpec, ...]]:
@@ -238,7 +250,8 @@ def _band(material: MaterialSpec) -> tuple[float, float] | None:
 def process_of_part(spec: Spec) -> PartProcess | None:
     """Return how a part is made, as `mechanism.part.process` or its old name `mechanism.process` says; None: unsaid."""
     mechanism = getattr(spec, "mechanism", None)
-    said: PartProcess | None = getattr(getattr(mechanism, "part", None), "process", None)
+    blocks = (getattr(mechanism, name, None) for name in ("part", "plate"))
+    said: PartProcess | None = next((one for block in blocks if (one := getattr(block, "process", None))), None)
     old = getattr(mechanism, "process", None)
     if said is None and old is not None:
         return PartProcess(position=old.layer, least_feature=old.thinnest)
@@ -256,4 +269,4 @@ def tolerances(spec: Spec, process: str | None = None) -> dict[str, Any]:
     if found.modulus is not None:
         low, high = found.modulus
         stated[MODULUS] = (f"{low / 1e6:.9g} MPa", f"{high / 1e6:.9g} MPa")
-    return stated
+    return stated | {path: Tolerance(uniform=f"{100.0 * SPRING_RATE:g} %") for path in found.rates}

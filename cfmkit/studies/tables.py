@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.specs.units import border_unit
 from cfmkit.studies.row_blocks_for_journal import WARNINGS_JOINT
-from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv
+from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv, text_column
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,7 +52,7 @@ def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows
     reported = [rows.status(k) for k in range(len(rows))] if rows.odd else None
     status = tuple(one.key for one, _ in reported) if reported else ("complete",) * len(rows)
     message = tuple(text or None for _, text in reported) if reported else (None,) * len(rows)
-    ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), TableColumn("message", message)
+    ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), text_column("message", message)
     return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
 
 

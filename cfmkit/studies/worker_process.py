@@ -1,8 +1,9 @@
-"""The worker process of a pool: reads jobs from a pipe, does them, and writes the outcomes to another.
+"""The worker process of a pool: reads the work and then jobs from standard input, and writes the outcomes to standard
+output, each with its length in front.
 
-It ends when its parent does, however that ends: a thread waits for the end of a third
-pipe, which the operating system closes with the parent; on Linux the kernel is asked to
-end the process, too, in case a solver never lets that thread run.
+It ends when its parent does, however that ends: the thread that reads finds the end of the pipe, which the operating
+system closes with the parent; on Linux the kernel is asked to end the process, too, in case a solver never lets that
+thread run.
 """
 
 from __future__ import annotations
@@ -15,50 +16,78 @@ import sys
 import threading
 import traceback
 import warnings
-from multiprocessing.connection import Connection
-from typing import Any
+from queue import SimpleQueue
+from typing import IO, Any
+
+from cfmkit.studies.serial_and_cluster_executors import garbage_collector
 
 START = (
     "import json, sys; given = json.loads(sys.argv[1]); sys.path[:] = given['path']; "
-    "from cfmkit.studies.worker_process import main; main(given['pipes'], given['parent'])"
+    "from cfmkit.studies.worker_process import main; main(given['parent'])"
 )
-"""The program of a worker; its only argument says where to find modules and which pipes to use."""
+"""The program of a worker; its only argument says where to find modules and whose process it is."""
 
 READY, STARTED, DONE, BROKEN = b"r", b"s", b"d", b"b"
+LENGTH_BYTES = 8
 
 
-def main(pipes: list[int], parent: int) -> None:
-    """Serve jobs until there are no more, or the parent has gone.
+def send(pipe: IO[bytes] | None, message: bytes) -> None:
+    """Write a message to a pipe."""
+    assert pipe is not None
+    pipe.write(len(message).to_bytes(LENGTH_BYTES, "little"))
+    pipe.write(message)
+    pipe.flush()
+
+
+def receive(pipe: IO[bytes] | None) -> bytes | None:
+    """Return the next message of a pipe; None if the process at its other end has gone."""
+    assert pipe is not None
+    head = pipe.read(LENGTH_BYTES)
+    length = int.from_bytes(head, "little")
+    message = pipe.read(length) if len(head) == LENGTH_BYTES else b""
+    return message if head and len(message) == length else None
+
+
+def main(parent: int) -> None:
+    """Serve jobs until the parent ends this process, or has gone.
 
     Parameters
     ----------
-    pipes : list of int
-        Descriptors: what to do (pickled), jobs, outcomes, and the pipe that ends with the parent.
     parent : int
         The parent's process id if the kernel may watch it, else 0.
     """
-    what, jobs, outcomes, life = pipes
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore")
-    threading.Thread(target=_end_with_parent, args=(life,), daemon=True).start()
     _ask_the_kernel(parent)
-    # What a library prints must not get between the results of the program.
-    os.dup2(sys.stderr.fileno(), 1)
-    # All workers share the file and its position; reading at an offset leaves that alone.
-    work = pickle.loads(os.pread(what, os.fstat(what).st_size, 0))
+    inlet, outlet = _pipes()
+    received: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_read, args=(inlet, received), daemon=True).start()
+    work = pickle.loads(received.get())
     with contextlib.suppress(BrokenPipeError):
-        _serve(work, Connection(jobs, writable=False), Connection(outcomes, readable=False))
+        _serve(work, received, outlet)
 
 
-def _serve(work: Any, jobs: Connection, outcomes: Connection) -> None:
-    outcomes.send_bytes(READY)
-    while True:
-        try:
-            job = pickle.loads(jobs.recv_bytes())
-        except EOFError:
-            return
-        outcomes.send_bytes(STARTED)
-        outcomes.send_bytes(_outcome(work, job))
+def _pipes() -> tuple[IO[bytes], IO[bytes]]:
+    """Return the pipes from and to the parent, which nothing else in this process or below it reads or writes.
+
+    What a library prints must not get between the outcomes: it goes to standard error.
+    """
+    pipes = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nowhere, 0)
+    os.dup2(sys.stderr.fileno(), 1)
+    os.close(nowhere)
+    return pipes
+
+
+def _serve(work: Any, received: SimpleQueue[bytes], outlet: IO[bytes]) -> None:
+    send(outlet, READY)
+    with garbage_collector() as collect:
+        while True:
+            job = pickle.loads(received.get())
+            send(outlet, STARTED)
+            send(outlet, _outcome(work, job))
+            collect()
 
 
 def _outcome(work: Any, job: Any) -> bytes:
@@ -69,9 +98,10 @@ def _outcome(work: Any, job: Any) -> bytes:
         return BROKEN + pickle.dumps((reported, "".join(traceback.format_exception(error))))
 
 
-def _end_with_parent(life: int) -> None:
-    while os.read(life, 1):
-        pass
+def _read(inlet: IO[bytes], received: SimpleQueue[bytes]) -> None:
+    """Read on; end the process with its parent."""
+    while (message := receive(inlet)) is not None:
+        received.put(message)
     os._exit(1)
 
 

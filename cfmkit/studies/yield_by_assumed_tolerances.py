@@ -15,6 +15,7 @@ from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.metrics import window_of
 from cfmkit.specs.units import format_short
+from cfmkit.stock.processes import SPRING_RATE
 from cfmkit.studies.design_derivatives import exact_slopes, most_parts, slopes, step_of
 from cfmkit.studies.parts_scaled_by_a_factor import SCALED
 from cfmkit.studies.requirement_constraints import (
@@ -109,9 +110,11 @@ def _reported(found: Assumed, shares: FirstOrderShares) -> str:
     if found.modulus is not None:
         low, high = (format_short(end, "stress") for end in found.modulus)
         reported.append(f"modulus {low} to {high}")
+    if found.rates:
+        reported.append(f"rates of springs within {100.0 * SPRING_RATE:g} %")
     if found.as_stated:
         reported.append("moduli of beams' own materials as stated")
-    reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
+    reason = f": {process.reason}" if "thickness" in used else ""
     text = f"{_share(shares.good)} parts would meet the requirements if made by {process.name} "
     text += f"({', '.join(reported)}; assumed{reason}; to first order)"
     return text if found.modulus is None else f"{text}, {_share(shares.measured)} parts once the modulus is measured"
@@ -142,7 +145,7 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> FirstOrderSh
         If it would take long, or a part near the design has no curve.
     """
     spec = result.spec
-    paths = [*found.deviations, *([MODULUS] if found.modulus else [])]
+    paths = [*found.deviations, *found.ranges]
     places = places_of(result)
     quick = quickly_sampled(spec, places)
     first = sampled_on_curves(result, places, ()) if quick is None else quick
@@ -164,15 +167,15 @@ def first_order_shares(result: Result, found: Assumed, run: Run) -> FirstOrderSh
     moved, by_modulus, proportional = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle))), False
     nominal = {path: float(spec.at(path)) for path in paths}
     steps = {path: (nominal[path], step_of(sigma)) for path, sigma in found.deviations.items()}
-    if found.modulus:
-        steps[MODULUS] = nominal[MODULUS], 1e-3 * nominal[MODULUS]
+    steps |= {path: (nominal[path], 1e-3 * nominal[path]) for path in found.ranges}
     for path, slope in _slopes(spec, rows, steps, exact, run).items():
-        if path == MODULUS and found.modulus is not None:
-            errors = generator.uniform(*found.modulus, PARTS) - nominal[path]
-            efforts = slice(len(rows.branches) * len(rows.places))
-            proportional = np.allclose(nominal[path] * slope[efforts], middle[efforts], rtol=PROPORTIONAL, atol=0.0)
+        if path in found.ranges:
+            errors = generator.uniform(*found.ranges[path], PARTS) - nominal[path]
         else:
             errors = found.deviations[path] * generator.standard_normal(PARTS)
+        if path == MODULUS:
+            efforts = slice(len(rows.branches) * len(rows.places))
+            proportional = np.allclose(nominal[path] * slope[efforts], middle[efforts], rtol=PROPORTIONAL, atol=0.0)
         change = np.outer(errors, slope)
         moved += change
         by_modulus = change if path == MODULUS else by_modulus

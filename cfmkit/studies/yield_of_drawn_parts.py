@@ -148,7 +148,8 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
         What progress calls them.
     """
     metrics, spec = _noted(made.spec, nominal), made.spec
-    work = Work(Study(spec, made.paths, metrics, seed=run.seed, lean=True), plan_of(made.parameters, values))
+    study = Study(spec, made.paths, metrics, seed=run.seed, lean=True, made=True)
+    work = Work(study, plan_of(made.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
     records = computed(work, run.executor, journal, _Told(run, what, len(values)))
     count = len(spec.part_requirements)
@@ -172,7 +173,7 @@ def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run,
 
 def _why_lacking(made: DesignTolerances, values: FloatArray, run: Run) -> str:
     """Return what a part's analysis says of a window beyond its curve; empty where something else is the matter."""
-    part = made.spec.replace(dict(zip(made.paths, values.tolist(), strict=True)))
+    part = made.spec.replace(dict(zip(made.paths, values.tolist(), strict=True)), as_made=True)
     try:
         result = windows_judged(family(part.family).analyze(part, run))
     except CfmError as error:

@@ -7,7 +7,7 @@ or an empty text) is an empty cell.
 """
 
 from cfmkit.tables.csvtext import csv_chunks, read_csv, to_csv
-from cfmkit.tables.table import Cell, Table, TableColumn, Values, border_column, border_values, curve_table
+from cfmkit.tables.table import Cell, Table, TableColumn, Values, border_column, border_values, curve_table, text_column
 
 __all__ = [
     "Cell",
@@ -19,5 +19,6 @@ __all__ = [
     "csv_chunks",
     "curve_table",
     "read_csv",
+    "text_column",
     "to_csv",
 ]

@@ -2,8 +2,10 @@
 
 Floats stand in the fewest digits that read back as the same float, integers
 without a dot, and what is missing is an empty cell. A cell is quoted where the
-format needs it, and where a text would otherwise read as a number; so `read_csv`
-gives back exactly what `to_csv` was given.
+format needs it, and where a text would otherwise read as a number. A text that a
+spreadsheet would compute as a formula has an apostrophe before it: names come from
+other people, and a formula can fetch what is in other cells. `read_csv` takes it
+away, and gives back exactly what `to_csv` was given.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import CfmError, DataError, UsageError
+from cfmkit.errors import CfmError, DataError, UsageError, reason_of
 from cfmkit.tables.table import HEADER, Cell, Table, TableColumn, Values
 
 if TYPE_CHECKING:
@@ -29,6 +31,9 @@ _CHUNK = 8192
 _INTEGER = re.compile(r"-?(?:0|[1-9][0-9]*)")
 _NUMBER = re.compile(_INTEGER.pattern + r"(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?|-?inf")
 _SPECIAL = re.compile(r'[",\r\n]')
+_FORMULA = re.compile("'*\\s*[=+\\-@\uff1d\uff0b\uff0d\uff20].", re.DOTALL)
+"""How a formula begins in a spreadsheet, blanks and full-width signs included, after any number of apostrophes."""
+
 _TOKEN = re.compile(r'("(?:[^"]|"")*"|[^",\r\n]*)([,\n])')
 
 
@@ -71,7 +76,10 @@ def _text(cell: Cell) -> str:
         return ""
     if not isinstance(cell, str):
         return repr(cell)
-    if _SPECIAL.search(cell) or _NUMBER.fullmatch(cell):
+    is_number = _NUMBER.fullmatch(cell)
+    if not is_number and _FORMULA.match(cell):
+        cell = f"'{cell}"
+    if is_number or _SPECIAL.search(cell):
         return '"' + cell.replace('"', '""') + '"'
     return cell
 
@@ -113,7 +121,7 @@ def _decoded(source: str | bytes | Path, name: str) -> str:
         data = source.read_bytes() if isinstance(source, Path) else source
         text = data.decode("utf-8") if isinstance(data, bytes) else data
     except OSError as error:
-        raise UsageError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise UsageError(f"{name}: cannot be read: {reason_of(error)}") from None
     except UnicodeDecodeError as error:
         raise DataError(f"{name}: byte {error.start + 1} is not UTF-8") from None
     if not text.endswith("\n"):
@@ -172,4 +180,5 @@ def _value(raw: str) -> Cell:
 
 
 def _unquoted(raw: str) -> str:
-    return raw[1:-1].replace('""', '"') if raw.startswith('"') else raw
+    text = raw[1:-1].replace('""', '"') if raw.startswith('"') else raw
+    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text

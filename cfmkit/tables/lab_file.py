@@ -1,13 +1,14 @@
-"""From the bytes of a lab file to lines of text, to what separates numbers in them, and to what its columns are.
+"""From the bytes of a lab file to its tables: rows of cells below a header.
 
-Nothing is assumed about a file but that it ends in a block of lines with the same
-number of cells, at least two of which are numbers in every line. What stands above
-that block is a header or of no concern; a few lines of text below it may follow.
+Nothing is assumed about a file but that it holds a table: lines with the same number of cells, at least two of which
+are numbers, in the same places. Six rules read all exports that we know:
 
-What the columns of a lab file are: names, units and roles. Units are read or stated by the user, never guessed. A
-unit stands in the header as ``Force [N]``, ``Kraft (N)``, ``s/mm`` or ``travel in mm``, in a line of its own below
-the names, or in ``--units``. A column's role follows from the dimension of its unit; where several columns qualify,
-from its name; where that does not decide either, the file is refused with the choices.
+1. A cell is a number if it is one, perhaps with a unit behind it. Any of the signs that look like a minus is one.
+2. Separator and decimal sign are those with which most lines of the file's middle have numbers in most cells.
+3. A line without a value is no line. A table is an unbroken run of lines with numbers in its places.
+4. Names and units stand in the nearest lines above a table that have its width.
+5. A column of units beside a column of numbers belongs to it.
+6. What these rules leave open is refused, with the choices; nothing is guessed.
 """
 
 from __future__ import annotations
@@ -17,51 +18,58 @@ import csv
 import re
 from collections import Counter
 from dataclasses import dataclass
-from difflib import get_close_matches
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import DataError, QuantityError, UsageError
+import numpy as np
+
+from cfmkit.errors import DataError
 from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.tables.lab_columns import CELLS, ColumnInfo, describe, dimension_of, is_unit_row, spelt, split_header
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from cfmkit.arrays import FloatArray
 
-SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", " ": "spaces"}
+
+SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "spaces"}
 """What may stand between cells, in the order in which it is tried, and its name."""
 
 LONGEST_LINE = 100_000
 """Characters of a line that is read: the reader of quoted cells takes 131072 in one."""
 
-MOST_FOOT_LINES = 20
+HEADER_LINES = 5
+"""So many lines above the numbers are searched for their names."""
+
+UNIT_LINES = 40
+"""So many lines above the numbers are searched for a line of units that says so: LabVIEW's are far up."""
+
+FEWEST_ROWS = 8
+"""A shorter run of lines with numbers is a part of some preamble where there is a longer one."""
+
 _SAMPLE = 40
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_DIGITS = r"[-+]?(?:[0-9]+(?:{0}[0-9]+)?{1}|{0}[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_DIGITS = r"([-+]? ?(?:[0-9]+(?:{0}[0-9]+)?{1}|{0}[0-9]+)(?:[eE][-+]?[0-9]+)?)(?:\s*([^\s\d.,;:+-]\S*(?: \S+)?))?"
 _NUMBERS = {".": re.compile(_DIGITS.format(r"\.", r"\.?")), ",": re.compile(_DIGITS.format(",", ""))}
+_PLAIN = frozenset("0123456789.+-eE\n")
 _GROUPED = re.compile(r"[-+]?[0-9]{1,3}(?:([.,' \u00a0\u2009\u202f])[0-9]{3})+(?:[.,][0-9]*)?")
+_MINUS = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=\s?[0-9.,])")
+EMPTY = ' \t\r;,|"\u00a0-=:+*_'
+"""What a line without a value may hold."""
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How the numbers of a file are written.
+    """How the numbers of a file are written."""
 
-    Attributes
-    ----------
-    separator : str
-        Between cells; a space stands for any number of spaces and tabs.
-    decimal : {".", ","}
-        The decimal sign.
-    quoted : bool
-        Whether cells are quoted.
-    """
-
-    separator: str
-    decimal: str
-    quoted: bool = False
+    separator: str  # between cells; a space stands for any number of spaces and tabs
+    decimal: str  # "." or ","
+    quoted: bool = False  # whether there are quoted cells
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of one line, without the blanks around them."""
@@ -71,32 +79,148 @@ class Dialect:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=self.separator), [])]
         return [cell.strip() for cell in line.split(self.separator)]
 
+    def number(self, cell: str) -> tuple[float, str] | None:
+        """Return the number in a cell and the unit behind it, "" where there is none; None if it is no number."""
+        match = _NUMBERS[self.decimal].fullmatch(cell)
+        if match is None or (match[2] and dimension_of(match[2]) is None):
+            return None
+        return float(match[1].replace(",", ".").replace(" ", "")), spelt(match[2]) if match[2] else ""
+
     def is_number(self, cell: str) -> bool:
-        """Return whether a cell is a number in this dialect."""
-        return _NUMBERS[self.decimal].fullmatch(cell) is not None
+        """Return whether a cell is a number in this dialect, perhaps with a unit."""
+        match = _NUMBERS[self.decimal].fullmatch(cell)
+        return match is not None and (not match[2] or dimension_of(match[2]) is not None)
 
 
 @dataclass(frozen=True)
-class TextBlock:
-    """The block of numbers in a file.
-
-    Attributes
-    ----------
-    dialect : Dialect
-        How it is written.
-    first, last : int
-        Indices of its first line and of the line after its last one.
-    width : int
-        Cells in each line.
-    numeric : tuple of int
-        The columns that hold numbers.
-    """
+class RowPattern:
+    """What the lines of a table have in common."""
 
     dialect: Dialect
-    first: int
-    last: int
-    width: int
-    numeric: tuple[int, ...]
+    width: int  # cells in each line
+    numeric: tuple[int, ...]  # columns that hold numbers
+    blank: tuple[int, ...]  # columns left of them that hold nothing: what stands there labels a line of a preamble
+
+    def row(self, line: str) -> list[str]:
+        """Return the cells of a line, as many as there are columns or more."""
+        cells = self.dialect.cells(line)
+        return cells + [""] * (self.width - len(cells))
+
+    def numbers_in(self, line: str) -> int:
+        """Return how many of the columns with numbers have one in a line."""
+        cells = self.row(line)
+        return sum(self.dialect.is_number(cells[column]) for column in self.numeric)
+
+    def is_row(self, line: str) -> bool:
+        """Return whether a line has what every row has, and no word where rows have nothing."""
+        cells = self.row(line)
+        full = len(self.dialect.cells(line)) == self.width and self.numbers_in(line) == len(self.numeric)
+        return full and not any(cells[column] for column in self.blank)
+
+    def labels_itself(self, line: str) -> bool:
+        """Return whether a word stands where the first number is to be, as in ``Rate; 20`` above a table."""
+        return self.row(line)[self.numeric[0]][:1].isalpha()
+
+
+@dataclass(frozen=True, eq=False)
+class LabTable:
+    """A table of a lab file."""
+
+    file: str  # for messages
+    shape: RowPattern
+    lines: list[str]  # all of the file
+    rows: tuple[int, ...]  # indices of the lines of the table
+    columns: tuple[ColumnInfo, ...]
+    header: int | None  # index of the line with the names
+
+    @cached_property
+    def cells(self) -> list[list[str]]:
+        """The cells of every row."""
+        return [self.shape.row(self.lines[index]) for index in self.rows]
+
+    @property
+    def numeric(self) -> tuple[ColumnInfo, ...]:
+        """The columns that hold numbers."""
+        return tuple(self.columns[index] for index in self.shape.numeric)
+
+    def only(self, keep: Iterable[bool]) -> LabTable:
+        """Return the table with some of its rows."""
+        chosen = tuple(index for index, kept in zip(self.rows, keep, strict=True) if kept)
+        return LabTable(self.file, self.shape, self.lines, chosen, self.columns, self.header)
+
+    def with_values(self, columns: Sequence[ColumnInfo]) -> LabTable:
+        """Return the table without the rows that are empty in all of some columns."""
+        wanted = [column.index for column in columns]
+        keep = [any(cells[index] for index in wanted) for cells in self.cells]
+        return self if all(keep) else self.only(keep)
+
+    def numbers(self, column: ColumnInfo) -> FloatArray:
+        """Return the numbers of a column in SI.
+
+        Raises
+        ------
+        cfmkit.errors.DataError
+            Naming the first cell that is no number, or has another unit than the column.
+        """
+        cells = [row[column.index] for row in self.cells]
+        plain = None if column.unit_column is not None else self._plain_numbers(cells)
+        if plain is not None and not any(len(row) > self.shape.width for row in self.cells):
+            return in_si(plain, column.dimension or "", column.unit or "")
+        return np.array([self._value(number, column) for number in range(len(cells))])
+
+    def _plain_numbers(self, cells: list[str]) -> FloatArray | None:
+        """Return all cells as numbers at once; None where one of them is more or less than a number."""
+        text = "\n".join(cells)
+        if self.shape.dialect.decimal == ",":
+            if "." in text:
+                return None
+            text = text.replace(",", ".")
+        if not _PLAIN.issuperset(text):
+            return None
+        try:
+            return np.array(text.split("\n"), dtype=float)
+        except ValueError:
+            return None
+
+    def _value(self, number: int, column: ColumnInfo) -> float:
+        """Return the number in one cell in SI."""
+        row, place = self.cells[number], f"{self.file}: line {self.rows[number] + 1}"
+        filled = len(self.shape.dialect.cells(self.lines[self.rows[number]]))
+        if column.index >= filled or any(map(self.shape.dialect.is_number, row[self.shape.width :])):
+            raise DataError(f"{place} has {filled} cells, the others have {self.shape.width}")
+        cell = row[column.index]
+        found = self.shape.dialect.number(cell)
+        if found is None:
+            refuse_group(cell, self.file)
+            what = "is empty" if not cell else f"holds {shown(cell)}, which is not a number"
+            raise DataError(f"{place}: column {column.label} {what}; remove the line or correct it")
+        value, unit = found
+        if column.unit_column is not None:
+            unit = spelt(row[column.unit_column])
+        if unit and unit != column.unit and (column.source != CELLS or not self._alike(unit, column)):
+            column.states(unit, "the cell", self.file, f"line {self.rows[number] + 1}: ")
+        return float(in_si(np.array(value), column.dimension or "", unit or column.unit or ""))
+
+    def _alike(self, unit: str, column: ColumnInfo) -> bool:
+        """Return whether a gauge that changed its range on the way shows the same kind of quantity."""
+        return dimension_of(unit) == column.dimension
+
+    def texts(self, column: ColumnInfo) -> list[str]:
+        """Return the cells of a column as they are."""
+        return [row[column.index] for row in self.cells]
+
+
+def in_si(values: FloatArray, dimension: str, unit: str) -> FloatArray:
+    """Return values with a unit as SI, exactly where the unit is that of cfmkit's own files."""
+    from cfmkit.specs.units import from_border
+    from cfmkit.specs.units.table import COMMON, border_unit
+    from cfmkit.specs.units.unit_size import unit_size
+
+    if unit == border_unit(dimension):
+        converted: FloatArray = from_border(values, dimension)
+        return converted
+    factor = COMMON[dimension, unit] if (dimension, unit) in COMMON else unit_size(unit).factor
+    return values * float(factor)
 
 
 def decoded(data: bytes, name: str) -> tuple[str, str]:
@@ -121,90 +245,186 @@ def decoded(data: bytes, name: str) -> tuple[str, str]:
     raise DataError(f"{name}: is not a text file; export the measurement as CSV")
 
 
-def block_of(lines: list[str], name: str) -> TextBlock:
-    """Return where the numbers are and how they are written.
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text, with an ASCII minus before numbers that have another one."""
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return (text if text.isascii() else _MINUS.sub("-", text)).split("\n")
+
+
+def tables_in(lines: list[str], name: str, units: Mapping[str, str] | None = None) -> list[LabTable]:
+    """Return the tables of a file; with one that is long enough, shorter runs of numbers above it are none.
+
+    Parameters
+    ----------
+    lines : list of str
+        Of the file.
+    name : str
+        For messages.
+    units : mapping of str to str, optional
+        What ``--units`` says, by name or by number from 1.
 
     Raises
     ------
     cfmkit.errors.DataError
-        If there are none, or a thousands separator leaves their meaning open.
+        If there is none, or what a line means is open.
     """
-    filled = [index for index, line in enumerate(lines) if line.strip()]
+    filled = [index for index, line in enumerate(lines) if line.strip(EMPTY)]
     if not filled:
         raise DataError(f"{name}: the file is empty")
     long = next((index for index in filled if len(lines[index]) > LONGEST_LINE), None)
     if long is not None:
         raise DataError(f"{name}: line {long + 1} has {len(lines[long])} characters; at most {LONGEST_LINE} are read")
+    shape = _shape(lines, filled, name)
+    runs = _runs(lines, filled, shape)
+    enough = min(2, len(shape.numeric))
+    long_ones = [run for run in runs if sum(shape.numbers_in(lines[index]) >= enough for index in run) >= FEWEST_ROWS]
+    chosen = long_ones or [max(runs, key=len)]
+    for run in runs:
+        most = max(shape.numbers_in(lines[index]) for index in run)
+        if run not in chosen and (most > 1 if run[0] > chosen[0][0] else shape.is_row(lines[run[-1]])):
+            raise DataError(
+                f"{name}: line {max(run[0], chosen[0][0]) + 1}: numbers go on here after a text that interrupts them; "
+                "remove the text, or the numbers that do not belong to the table"
+            )
+    starts = [0, *(run[-1] + 1 for run in chosen)]
+    return [_table(lines, shape, run, start, units or {}, name) for run, start in zip(chosen, starts, strict=False)]
+
+
+def _shape(lines: list[str], filled: list[int], name: str) -> RowPattern:
+    """Return how the numbers of a file are written."""
     # Most lines before the last few are data, whatever stands above and below them.
     middle = filled[len(filled) // 3 : max(len(filled) - 2, 1)] or filled
     sample = [lines[index] for index in middle[:: max(len(middle) // _SAMPLE, 1)]]
-    found = [(score, dialect) for dialect in _dialects(sample) if (score := _score(dialect, sample))[0] > 0]
-    if not found:
+    quoted = any('"' in line for line in sample)
+    dialects = [Dialect(separator, decimal, quoted) for separator in SEPARATORS for decimal in ".,"]
+    dialects = [item for item in dialects if item.separator != "," or item.decimal == "." or quoted]
+    scores = [(*_score(dialect, sample), dialect) for dialect in dialects]
+    count, _, width, dialect = max(scores, key=lambda item: item[:2])
+    if not count:
         _refuse_groups(sample, name)
         raise DataError(
-            f"{name}: there is no block of lines with at least two numbers, separated by semicolon, tab, comma or "
+            f"{name}: there is no block of lines with at least two numbers, separated by semicolon, tab, comma, bar or "
             "spaces"
         )
-    (share, width), dialect = max(found, key=lambda item: item[0][0])
-    if share < 0.5 * len(sample) or not all(map(dialect.is_number, dialect.cells(sample[0]))):
+    rows = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
+    if count < 0.5 * len(sample) or not all(map(dialect.is_number, dialect.cells(sample[0]))):
         _refuse_groups(sample, name)
-    return _bounded(lines, dialect, width, name)
+    rows = [cells for cells in rows if len(cells) == width]
+    numeric = tuple(k for k in range(width) if 2 * sum(dialect.is_number(row[k]) for row in rows) > len(rows))
+    blank = tuple(k for k in range(numeric[0] if numeric else 0) if not any(row[k] for row in rows))
+    return RowPattern(dialect, width, numeric, blank)
 
 
-def _dialects(sample: list[str]) -> list[Dialect]:
-    quoted = any('"' in line for line in sample)
-    found = [Dialect(separator, decimal, quoted) for separator in SEPARATORS for decimal in ".,"]
-    return [item for item in found if item.separator != "," or item.decimal == "." or quoted]
+def _is_data(cells: Sequence[str], dialect: Dialect) -> bool:
+    return sum(map(dialect.is_number, cells)) >= 2
 
 
-def _score(dialect: Dialect, sample: list[str]) -> tuple[int, int]:
-    """Return how many lines are data in this dialect, and how many cells they have."""
-    rows = [dialect.cells(line) for line in sample]
-    good = [len(row) for row in rows if sum(map(dialect.is_number, row)) >= 2]
+def _score(dialect: Dialect, sample: list[str]) -> tuple[int, float, int]:
+    """Return how many lines are data in this dialect, which part of their cells is numbers, and their width."""
+    good = [cells for line in sample if _is_data(cells := dialect.cells(line), dialect)]
     if not good:
-        return 0, 0
-    width, count = Counter(good).most_common(1)[0]
-    return count, width
+        return 0, 0.0, 0
+    width, count = Counter(map(len, good)).most_common(1)[0]
+    filled = [cell for cells in good if len(cells) == width for cell in cells if cell]
+    return count, sum(map(dialect.is_number, filled)) / len(filled), width
 
 
-def _bounded(lines: list[str], dialect: Dialect, width: int, name: str) -> TextBlock:
-    """Return the block between the first and the last line of data."""
-    filled = [index for index, line in enumerate(lines) if line.strip()]
-
-    def usual(index: int) -> bool:
-        row = dialect.cells(lines[index])
-        return len(row) == width and sum(map(dialect.is_number, row)) >= 2
-
-    first = next(index for index in filled if usual(index))
-    last = next(index for index in reversed(filled) if usual(index))
-    # Cut off at the end a table has a line that is neither data nor text: it belongs to the block, to be found there.
-    foot = [index for index in filled if index > last]
-    if foot and any(map(dialect.is_number, dialect.cells(lines[foot[0]]))):
-        last = foot[0]
-    if (left := len([index for index in filled if index > last])) > MOST_FOOT_LINES:
-        raise DataError(f"{name}: line {last + 2}: the numbers end, but {left} more lines follow; remove them")
-    inside = [index for index in filled if first <= index <= last]
-    chosen = [dialect.cells(lines[index]) for index in inside[:: max(len(inside) // _SAMPLE, 1)]]
-    rows = [row for row in chosen if len(row) == width]
-    numeric = tuple(
-        column for column in range(width) if 2 * sum(dialect.is_number(row[column]) for row in rows) > len(rows)
-    )
-    return TextBlock(dialect, first, last + 1, width, numeric)
+def _runs(lines: list[str], filled: list[int], shape: RowPattern) -> list[list[int]]:
+    """Return the unbroken runs of lines with numbers; an empty line ends one unless numbers in all places follow."""
+    runs: list[list[int]] = []
+    before = -2
+    for index in filled:
+        count = shape.numbers_in(lines[index])
+        if count and runs and runs[-1][-1] == before and (before == index - 1 or count == len(shape.numeric)):
+            runs[-1].append(index)
+        elif count and not (count < 2 and shape.labels_itself(lines[index])):
+            runs.append([index])
+        before = index
+    return runs
 
 
-def header_cells(line: str, block: TextBlock) -> list[str]:
-    """Return the cells of a header, as many as the block is wide where that can be done.
+def _table(
+    lines: list[str], shape: RowPattern, run: list[int], start: int, units: Mapping[str, str], name: str
+) -> LabTable:
+    """Return one table with what the lines above it and its cells say of its columns."""
+    names, unit_row, header = _header(lines, shape, range(start, run[0]), run[0] + 1, name)
+    rows = [shape.row(lines[index]) for index in run[:: max(len(run) // _SAMPLE, 1)]]
+    beside = _unit_columns(rows, shape, names)
+    inside = {k: next(spelt(row[unit]) for row in rows if row[unit]) for k, unit in beside.items()}
+    for k in shape.numeric:
+        found = [number[1] for row in rows if (number := shape.dialect.number(row[k]))]
+        inside |= {k: found[0]} if found and found[0] else {}
+    columns = describe(names, unit_row, inside, units, name)
+    placed = tuple(ColumnInfo(**{**vars(item), "unit_column": beside.get(item.index)}) for item in columns)
+    return LabTable(name, shape, lines, tuple(run), placed, header)
+
+
+_COUNTER = re.compile(r"(?i)(no|nr|n|#|idx|index|reading|row|point|count|sample|record|data no|lfd\.? ?nr)\W*")
+"""Names of columns that count the rows: a unit to their right is not theirs."""
+
+
+def _unit_columns(rows: list[list[str]], shape: RowPattern, names: Sequence[str]) -> dict[int, int]:
+    """Return the columns of numbers beside which the unit of each cell stands, and where: to their right, else left."""
+    found: dict[int, int] = {}
+    for k in sorted(set(range(shape.width)).difference(shape.numeric)):
+        filled = [row[k] for row in rows if any(row[column] for column in shape.numeric)]
+        if filled and all(map(dimension_of, filled)):
+            left = [k - 1] if not _COUNTER.fullmatch(names[k - 1].strip(' "')) else []
+            beside = [c for c in (*left, k + 1) if c in shape.numeric and c not in found]
+            found |= {beside[0]: k} if beside else {}
+    return found
+
+
+def _header(
+    lines: list[str], shape: RowPattern, above: range, first_line: int, name: str
+) -> tuple[list[str], list[str], int | None]:
+    """Return the names, the units and the index of the line with the names."""
+    filled = [index for index in above if lines[index].strip(EMPTY)]
+    rows = [(index, _header_cells(lines[index], shape)) for index in reversed(filled[-UNIT_LINES:])]
+    near = rows[:HEADER_LINES]
+    fitting = [(index, cells) for index, cells in near if len(cells) == shape.width]
+    # A column of remarks that stayed empty: its title stands beyond the numbers and has no unit.
+    fitting = fitting or [
+        (index, cells[: shape.width])
+        for index, cells in near
+        if len(cells) > shape.width and not any(split_header(cell)[1] for cell in cells[shape.width :])
+    ]
+    if not fitting:
+        if near and shape.dialect.separator == "," and _halved(near[0][1], shape.width):
+            raise DataError(
+                f"{name}: line {first_line} has {shape.width} cells but the header {len(near[0][1])}: comma seems to "
+                "be both separator and decimal sign; export with another separator"
+            )
+        return [""] * shape.width, [""] * shape.width, None
+    (header, names), unit_row = fitting[0], [""] * shape.width
+    if len(fitting) > 1 and is_unit_row(names):
+        unit_row, (header, names) = names, fitting[1]
+    elif not any(split_header(cell)[1] for cell in names):
+        units = [cells for index, cells in rows if index != header and len(cells) == shape.width and is_unit_row(cells)]
+        unit_row = ["", *units[0][1:]] if units else unit_row
+    return names, unit_row, header
+
+
+def _halved(header: Sequence[str], width: int) -> bool:
+    """Return whether a header has half the cells of the numbers below it, and is not just a title."""
+    return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
+
+
+def _header_cells(line: str, shape: RowPattern) -> list[str]:
+    """Return the cells of a header, as many as the table is wide where that can be done.
 
     Quotes are understood even where the numbers have none, and a leading ``#`` or ``%`` is dropped.
     """
     line = line.strip().lstrip("#%!").strip() if line.lstrip()[:1] in ("#", "%", "!") else line
-    separator = block.dialect.separator
+    separator = shape.dialect.separator
     if separator != " ":
         cells = Dialect(separator, ".", '"' in line).cells(line)
-        short = range(len(cells), block.width)
-        return cells + [""] * len(short) if len(cells) > 1 and not set(short) & set(block.numeric) else cells
+        if len(cells) == 2 * shape.width and all(dimension_of(cell) for cell in cells[1::2]):
+            return [f"{one} [{unit}]" for one, unit in zip(cells[::2], cells[1::2], strict=True)]  # Travel, mm, Load, N
+        short = range(len(cells), shape.width)
+        return cells + [""] * len(short) if len(cells) > 1 and not set(short) & set(shape.numeric) else cells
     ways = (line.split(), re.split(r"\s{2,}|\t", line.strip()), re.findall(r"[^\[(]*[\[(][^\])]*[\])]", line))
-    return next((cells for cells in ways if len(cells) == block.width), ways[0])
+    return next((cells for cells in ways if len(cells) == shape.width), ways[0])
 
 
 def _refuse_groups(sample: list[str], name: str) -> None:
@@ -227,219 +447,3 @@ def refuse_group(cell: str, name: str) -> None:
     match = _GROUPED.fullmatch(cell)
     if match and (match[1] not in ".," or sum(map(cell.count, ".,")) > 1):
         raise DataError(f"{name}: {cell!r} has a thousands separator; export the numbers without one")
-
-
-ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
-"""What a column of a dimension can be."""
-
-_IN_HEADER = (
-    re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]"),
-    re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)"),
-    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),
-    re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"),
-)
-_SPELLINGS = {
-    "Nm": "N*m", "Nmm": "N*mm", "N m": "N*m", "N mm": "N*mm", "Ncm": "N*cm", "N cm": "N*cm", "°": "deg", "sec": "s",
-    "Sek": "s", "-": "1", "": "1", "mm/mm": "1", "degree": "deg", "degrees": "deg",
-}  # fmt: skip
-_WORDS = {
-    "time": ("time", "t", "zeit", "temps", "tiempo"),
-    "length": (
-        "displacement", "travel", "stroke", "position", "extension", "deflection", "crosshead", "s", "u", "x",
-        "weg", "traverse", "traversenweg", "hub", "deplacement", "desplazamiento",
-    ),
-    "angle": ("angle", "rotation", "phi", "theta", "winkel", "drehwinkel"),
-    "force": ("force", "load", "f", "kraft", "standardkraft", "load cell", "fuerza", "carga"),
-    "torque": ("torque", "moment", "m", "drehmoment", "par"),
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class ColumnInfo:
-    """One column of a lab file as its header describes it.
-
-    Attributes
-    ----------
-    index : int
-        Its place in the file, from 0.
-    name : str
-        As in the header, without the unit; ``column 1`` where there is none.
-    unit : str or None
-        As cfmkit spells it; None if nobody says.
-    dimension : str or None
-        Of the unit; None if that is of no use here.
-    reported : bool
-        Whether ``--units`` names the column.
-    """
-
-    index: int
-    name: str
-    unit: str | None = None
-    dimension: str | None = None
-    reported: bool = False
-
-    @property
-    def label(self) -> str:
-        """Name and unit for messages: ``'Kraft' [N]``."""
-        return f"{shown(self.name)} [{self.unit}]" if self.unit else f"{shown(self.name)} without a unit"
-
-
-def read_units(text: str | None) -> dict[str, str]:
-    """Return what ``--units`` says: ``"s=mm,F=N"`` by column.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If it is malformed or names a unit that there is not.
-    """
-    found: dict[str, str] = {}
-    for part in (text or "").split(","):
-        name, equals, unit = (piece.strip() for piece in part.partition("="))
-        if not part.strip() and not (text or "").strip():
-            continue
-        if not equals or not name or not unit or name in found:
-            raise UsageError(f"--units: {shown(part)} is not 'column=unit'; write e.g. --units \"s=mm,F=N\"")
-        if _dimension(unit) is None:
-            raise UsageError(f"--units: {shown(unit)} is not a unit of a time, displacement, angle, force or torque")
-        found[name] = _spelt(unit)
-    return found
-
-
-def describe(names: Sequence[str], unit_row: Sequence[str], units: Mapping[str, str], file: str) -> list[ColumnInfo]:
-    """Return the columns that a header describes.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Cells of the line with the names; empty texts where there is none.
-    unit_row : sequence of str
-        Cells of the line with the units; empty texts where there is none.
-    units : mapping of str to str
-        What ``--units`` says, by name or by number from 1.
-    file : str
-        For messages.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If ``--units`` names a column that is not there, or contradicts the header.
-    """
-    pairs = zip(names, unit_row, strict=True)
-    found = [_described(index, name, unit) for index, (name, unit) in enumerate(pairs)]
-    left = dict(units)
-    chosen = [_reported(column, left, file) for column in found]
-    if left:
-        there = ", ".join(shown(column.name) for column in found)
-        wrong = next(iter(left))
-        near = get_close_matches(wrong, [column.name for column in found], n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; there are {there}"
-        raise DataError(f"{file}: --units names a column {shown(wrong)} that is not there{hint}")
-    return chosen
-
-
-def _described(index: int, text: str, below: str) -> ColumnInfo:
-    name, unit = split_header(text)
-    unit = unit if unit is not None else _bare_unit(below)
-    name = " ".join(name.split()) or f"column {index + 1}"
-    if unit is None:
-        return ColumnInfo(index, name)
-    return ColumnInfo(index, name, _spelt(unit), _dimension(unit))
-
-
-def split_header(text: str) -> tuple[str, str | None]:
-    """Return name and unit of a header's cell; the unit is None where there is none.
-
-    Examples
-    --------
-    >>> split_header("Kraft (N)"), split_header("s/mm"), split_header("Force")
-    (('Kraft', 'N'), ('s', 'mm'), ('Force', None))
-    """
-    text = text.strip().strip('"').strip()
-    for number, pattern in enumerate(_IN_HEADER):
-        match = pattern.fullmatch(text)
-        # A word after "in" or a slash is a unit only if there is such a unit.
-        if match and (number < 2 or _is_unit(match["unit"])):
-            return match["name"], match["unit"].strip()
-    return text, None
-
-
-def is_unit_row(cells: Iterable[str]) -> bool:
-    """Return whether a line holds nothing but units, bare or in brackets, and at least one of them."""
-    units = [_bare_unit(cell) for cell in cells]
-    bare = [cell.strip(' "') for cell in cells]
-    known = [unit is not None and _is_unit(unit) for unit in units]
-    return any(known) and all(good or not cell or _bracketed(cell) for good, cell in zip(known, bare, strict=True))
-
-
-def _bracketed(cell: str) -> bool:
-    return cell[:1] + cell[-1:] in ("[]", "()")
-
-
-def _bare_unit(cell: str) -> str | None:
-    cell = cell.strip(' "')
-    return (cell[1:-1].strip() if _bracketed(cell) else cell) or None
-
-
-def _reported(column: ColumnInfo, left: dict[str, str], file: str) -> ColumnInfo:
-    """Return a column with what ``--units`` says of it; taken from `left`."""
-    for key in (column.name, str(column.index + 1)):
-        if key in left:
-            unit = left.pop(key)
-            if column.unit is not None and column.unit != unit:
-                raise DataError(
-                    f"{file}: the header gives {shown(column.name)} in {column.unit}, --units in {unit}; "
-                    "correct the one that is wrong"
-                )
-            return ColumnInfo(column.index, column.name, unit, _dimension(unit), reported=True)
-    return column
-
-
-def _spelt(unit: str) -> str:
-    """Return a unit as cfmkit spells it."""
-    unit = unit.strip().replace("·", "*").replace("⋅", "*").replace("µ", "u").replace("μ", "u").replace("²", "^2")
-    return _SPELLINGS.get(unit, unit)
-
-
-def _is_unit(unit: str) -> bool:
-    """Tell whether a text is a unit, in any of the spellings that are read."""
-    from cfmkit.specs.units.unit_size import is_unit
-
-    spelt = _spelt(unit)
-    return spelt == "1" or is_unit(spelt)
-
-
-def _dimension(unit: str) -> str | None:
-    """Return which of the dimensions of interest a unit has."""
-    from cfmkit.specs.units.table import COMMON
-    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
-
-    spelt = _spelt(unit)
-    common = next((name for name in ROLES if (name, spelt) in COMMON), None)
-    if common or not is_unit(spelt):
-        return common
-    try:
-        powers = unit_size(spelt).powers
-    except QuantityError:
-        return None
-    return next((name for name in ROLES if border_size(name).powers == powers), None)
-
-
-def column_of(columns: Sequence[ColumnInfo], dimension: str, file: str) -> ColumnInfo | None:
-    """Return the column of a dimension, None if there is none.
-
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If several qualify; the message names them.
-    """
-    found = [column for column in columns if column.dimension == dimension]
-    found = [column for column in found if column.reported] or found
-    named = [column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _WORDS[dimension]]
-    chosen = found if len(found) < 2 else named
-    if len(chosen) == 1 or not found:
-        return chosen[0] if chosen else None
-    options = " or ".join(f'--units "{column.name}={column.unit}"' for column in found)
-    raise DataError(
-        f"{file}: {len(found)} columns could be the {ROLES[dimension]}: "
-        f"{', '.join(column.label for column in found)}; choose with {options}"
-    )

@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.errors import DataError
-from cfmkit.tables.lab_file import TextBlock, block_of, decoded, header_cells, refuse_group, split_header
+from cfmkit.errors import DataError, reason_of
+from cfmkit.tables.lab_file import decoded, lines_of, tables_in
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.tables.lab_columns import ColumnInfo
+    from cfmkit.tables.lab_file import LabTable
 
 FEWEST = 20
 """Points on a side without which it cannot be told from noise."""
@@ -37,11 +40,9 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
         If there are no points, no units, or too few on a side.
     """
     name = path.name
-    points, columns, rows = _points(path)
-    if "side" in columns:
-        sides = np.array([_side(cells, int(columns["side"][0]), name, number) for number, cells in rows])
-    else:
-        sides = np.where(points[:, 0] > 0, "right", "left")
+    points, table = _points(path)
+    side = next((column for column in table.columns if column.name.lower() == "side"), None)
+    sides = np.where(points[:, 0] > 0, "right", "left") if side is None else _sides(table, side)
     right, left = _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
     if right[:, 0].mean() < left[:, 0].mean():
         raise DataError(
@@ -64,71 +65,50 @@ def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:
     cfmkit.errors.DataError
         If there are no units, fewer than two points, or places that do not increase.
     """
-    points, _, rows = _points(path)
+    points, table = _points(path)
     back = np.flatnonzero(np.diff(points[:, 0]) <= 0)
     if len(points) < 2:
         raise DataError(f"{path.name}: a profile needs at least two points")
     if len(back):
-        line = rows[int(back[0]) + 1][0] + 1
+        line = table.rows[int(back[0]) + 1] + 1
         raise DataError(f"{path.name}: line {line}: x must increase from point to point; sort the file or split it")
     return points[:, 0], points[:, 1]
 
 
-def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[tuple[int, list[str]]]]:
-    """Return the points of a file [m], its columns, and the line number and cells of each point."""
+def _points(path: Path) -> tuple[FloatArray, LabTable]:
+    """Return the points of a file [m] and its table."""
     name = path.name
     try:
         text, _ = decoded(path.read_bytes(), name)
     except OSError as error:
-        raise DataError(f"{name}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    block = block_of(lines, name)
-    columns = _columns(lines, block, name)
-    rows = [(number, block.dialect.cells(lines[number])) for number in range(block.first, block.last)]
-    rows = [(number, cells) for number, cells in rows if cells and lines[number].strip()]
-    points = np.array(
-        [[_coordinate(cells, columns[axis], block, name, number) for axis in "xy"] for number, cells in rows]
-    )
-    return points, columns, rows
+        raise DataError(f"{name}: cannot be read: {reason_of(error)}") from None
+    tables = tables_in(lines_of(text), name)
+    if len(tables) > 1:
+        raise DataError(f"{name}: there are {len(tables)} tables, where one is needed; split the file")
+    axes = [_axis(tables[0].columns, axis, name) for axis in "xy"]
+    table = tables[0].with_values(axes)
+    return np.column_stack([table.numbers(axis) for axis in axes]), table
 
 
-def _columns(lines: list[str], block: TextBlock, name: str) -> dict[str, tuple[int, float]]:
-    """Return index and unit of x and y, and the index of the side."""
-    from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
-
-    above = [index for index in range(block.first) if lines[index].strip()][-5:]
-    cells = next(
-        (row for row in (header_cells(lines[i], block) for i in reversed(above)) if len(row) == block.width), []
-    )
-    found: dict[str, tuple[int, float]] = {}
-    for index, cell in enumerate(cells):
-        title, unit = split_header(cell)
-        key = title.strip().lower()
-        if key == "side":
-            found[key] = (index, 1.0)
-        elif key in ("x", "y"):
-            if unit is None or not is_unit(unit) or unit_size(unit).powers != border_size("length").powers:
-                raise DataError(f"{name}: the column {key!r} needs a unit of length in the header: '{key} [mm]'")
-            found[key] = (index, float(unit_size(unit).factor))
-    if not {"x", "y"} <= set(found):
+def _axis(columns: Sequence[ColumnInfo], axis: str, name: str) -> ColumnInfo:
+    """Return the column of a coordinate."""
+    found = next((column for column in columns if column.name.lower() == axis), None)
+    if found is None:
         raise DataError(f"{name}: needs a header with columns 'x [mm]' and 'y [mm]', and perhaps 'side'")
+    if found.dimension != "length":
+        raise DataError(f"{name}: the column {axis!r} needs a unit of length in the header: '{axis} [mm]'")
     return found
 
 
-def _coordinate(cells: list[str], column: tuple[int, float], block: TextBlock, name: str, number: int) -> float:
-    index, unit = column
-    cell = cells[index] if index < len(cells) else ""
-    if not block.dialect.is_number(cell):
-        refuse_group(cell, name)
-        raise DataError(f"{name}: line {number + 1}: {cell!r} is not a number; remove the line or correct it")
-    return float(cell.replace(",", ".")) * unit
-
-
-def _side(cells: list[str], index: int, name: str, number: int) -> str:
-    cell = cells[index] if index < len(cells) else ""
-    if cell.lower() not in SIDES:
-        raise DataError(f"{name}: line {number + 1}: the side is {cell!r}; it must be 'left' or 'right'")
-    return SIDES[cell.lower()]
+def _sides(table: LabTable, column: ColumnInfo) -> NDArray[np.str_]:
+    """Return the side of each point."""
+    words = [text.lower() for text in table.texts(column)]
+    number = next((number for number, word in enumerate(words) if word not in SIDES), None)
+    if number is not None:
+        raise DataError(
+            f"{table.file}: line {table.rows[number] + 1}: the side is {words[number]!r}; it must be 'left' or 'right'"
+        )
+    return np.array([SIDES[word] for word in words])
 
 
 def _ordered(points: FloatArray, chosen: NDArray[np.bool_], name: str) -> FloatArray:

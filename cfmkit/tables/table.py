@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cfmkit.arrays import Several, ShortRepr, read_only
 from cfmkit.curves import Column, Curve
-from cfmkit.errors import CfmError
+from cfmkit.errors import CfmError, visible
 from cfmkit.specs.units.decimal_scaling_and_grids import shift_decimal
 
 if TYPE_CHECKING:
@@ -181,6 +181,17 @@ def curve_table(curves: Sequence[Curve]) -> Table:
     labels: list[Part] = [(_label_columns(curve), len(curve)) for curve in curves]
     columns: list[Part] = [(dict(curve.columns()), len(curve)) for curve in curves]
     return Table((*_stacked(labels), *_stacked(columns)))
+
+
+def text_column(name: str, values: Iterable[str | None]) -> TableColumn:
+    """Return names and messages as a column; control characters are escaped: such texts come from outside.
+
+    Examples
+    --------
+    >>> text_column("spec", ["a.yaml", "b\\x1b.yaml"]).values
+    ('a.yaml', 'b\\\\x1b.yaml')
+    """
+    return TableColumn(name, tuple(None if text is None else visible(text) for text in values))
 
 
 def border_column(name: str, values: Any, dimension: str) -> TableColumn:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import cfmkit
-from cfmkit.runs.explorer_server import Explorer, ExplorerServer
+from cfmkit.runs.explorer import Explorer
+from cfmkit.runs.explorer_server import ExplorerServer
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -36,14 +37,16 @@ def page(tmp_path):
         opened.on("request", lambda one: urls.append(one.url))
         opened.on("console", lambda one: errors.append(one.text) if one.type == "error" else None)
         opened.on("pageerror", lambda one: errors.append(str(one)))
-        opened.goto(server.address)
+        file = server.write_redirect().as_uri()
+        opened.goto(file)
+        opened.wait_for_url(server.address)
         yield opened
         browser.close()
     server.shutdown()
     server.server_close()
     thread.join()
     assert errors == []
-    assert [url for url in urls if not url.startswith(f"http://127.0.0.1:{server.server_port}/")] == []
+    assert [url for url in urls if not url.startswith(f"http://127.0.0.1:{server.server_port}/")] == [file]
 
 
 def test_a_slider_moves_and_the_curve_and_the_badges_follow(page, tmp_path):
@@ -62,6 +65,8 @@ def test_a_slider_moves_and_the_curve_and_the_badges_follow(page, tmp_path):
     expect(page.locator("#verdict strong")).to_have_text("a requirement is missed")
     assert page.locator("#badges li.bad").count() > 0
     expect(page.locator("#mechanism svg")).to_be_visible()
+    styled = "e => [...e.querySelectorAll('[data-style]')].every((part) => part.style.length > 0)"
+    assert page.locator("#mechanism").evaluate(styled)
     page.locator("#copy").click()
     expect(page.locator("#yaml")).to_contain_text("stiffness:")
     page.locator("#name").fill("mine.yaml")

@@ -147,3 +147,23 @@ def test_what_cannot_be_fitted_is_said_in_one_line_and_nothing_is_written(cli, c
 def test_json_holds_the_parameters(cli, cam, rig):
     done = cli("calibrate", cam, rig, *FIT, "-o", "fit", "--no-plots", "--json")
     assert [item["path"] for item in done.document["parameters"]] == FIT[1].split(",")
+
+
+def test_specimen_and_cycles_are_chosen_as_for_measure_and_a_hole_ends_with_6(cli, cam, rig):
+    head, *lines = (cli.folder / rig).read_text().splitlines()
+    both = [f"{name};{line}" for name in "AB" for line in lines]
+    (cli.folder / "both.csv").write_text("\n".join([f"Part;{head}", *both]) + "\n")
+    for verb in (("analyze", cam, "--data", "both.csv"), ("calibrate", cam, "both.csv", *FIT)):
+        refused = cli(*verb, "-o", "out", "--no-plots")
+        assert refused.code == 3
+        assert '--group "Part=A" or --group "Part=B"' in refused.err
+        assert cli(*verb, "--cycles", "2", "--group", "Part=B", "-o", "out", "--no-plots").code == 3
+        assert cli(*verb, "--cycles", "1", "--group", "Part=B", "-o", "out", "--no-plots").code in (0, 5)
+    kept = [line for line in lines if not 80 < float(line.split(";")[0]) < 140]
+    (cli.folder / "hole.csv").write_text("\n".join([head, *kept]) + "\n")
+    done = cli("analyze", cam, "--data", "hole.csv", "-o", "hole")
+    assert done.code == 6
+    document = metrics(cli, "hole")
+    assert document["metrics"]["data_rmse[load]"]["value"] is None
+    assert "not recorded: 80" in document["message"]
+    assert "holes" in [item["name"] for item in document["warnings"]]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
+import os
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -132,6 +135,72 @@ def test_a_verb_that_needs_no_other_family_does_not_import_a_broken_one(site, ar
     assert module not in sys.modules
 
 
+OF_ITS_OWN = "class Odd(BaseException):\n    def __str__(self):\n        raise OSError\nraise Odd\n"
+SOURCES = {
+    "KeyboardInterrupt": "raise KeyboardInterrupt\n",
+    "SystemExit": "import sys\nsys.exit(0)\n",
+    "GeneratorExit": "raise GeneratorExit\n",
+    "Odd": OF_ITS_OWN,
+    "RecursionError": "def f():\n    f()\nf()\n",
+    "AttributeError": "def __getattr__(name):\n    raise AttributeError('no ' + name)\n",
+    "KeyError": "def __getattr__(name):\n    raise KeyError(name)\n",
+    "ZeroDivisionError": packages.RECORD
+    + "from cfmkit.families.base import Family\n"
+    + "class Late(Family):\n    @property\n    def phrase(self):\n        return ''\n"
+    + "    def __getattribute__(self, name):\n        if name == 'summary':\n            1 / 0\n"
+    + "        return object.__getattribute__(self, name)\n"
+    + "FAMILY = Late(**(vars(SPARE) | {'name': 'broken', 'interface': 1}))\n",
+    "TypeError": "from cfmkit.families.base import Family\nFAMILY = Family(name='broken')\n",
+}
+
+
+@pytest.mark.parametrize("arguments", [("show",), ("show", "force_ripple"), ("schema",), ("doctor",)])
+@pytest.mark.parametrize("kind", SOURCES)
+def test_whatever_a_package_raises_ends_no_verb(site, kind, arguments, capsys):
+    packages.install(site, "broken-one", SOURCES[kind], "broken")
+    assert main(list(arguments)) == 0
+    found = capsys.readouterr()
+    said = " ".join((found.out + found.err).split())
+    assert "the family 'broken' of the package broken-one 1.0" in said
+    assert f"it cannot be imported: {kind}" in said
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "summary=None", "spec_type=None", "spec_type=int", "models={}", "models=None", "models={'a': 3}", "values=None",
+        "values={'a': 'force'}", "values={'a': ('force',)}", "words={'a': 'b'}", "references='one paper'",
+        "references=None", "findings={'a': 3}", "headline=('a', 3)", "design=3", "draw=3", "template=3",
+        "template='nowhere/x.yaml'", "bibliography='cfmkit/nowhere.bib'", "block_shares='yes'", "search={}",
+    ],
+)  # fmt: skip
+def test_a_record_that_is_not_what_the_verbs_rely_on_is_skipped(site, change, capsys):
+    packages.install(
+        site, "broken-one", f"{packages.RECORD}FAMILY = replace(SPARE, name='broken', interface=1, {change})", "broken"
+    )
+    assert main(["doctor", "--json"]) == 0
+    (found,) = (one for one in json.loads(capsys.readouterr().out)["families"] if one["name"] == "broken")
+    assert found["state"] == "skipped"
+    assert change.partition("=")[0] in found["reason"] or "cannot be imported" in found["reason"]
+    for verb in (("show",), ("show", "references"), ("schema",)):
+        assert main(list(verb)) == 0
+
+
+def test_control_c_while_a_package_is_imported_is_no_fault_of_the_package(site):
+    """In a program that leaves signals to Python, and in the command line."""
+    source = "import signal\nsignal.raise_signal(signal.SIGINT)\n"
+    packages.install(site, "broken-one", source, "broken")
+    code = "from cfmkit import families\ntry:\n    families.skipped()\nexcept KeyboardInterrupt:\n    print('ended')\n"
+    environment = os.environ | {"PYTHONPATH": str(site)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60, env=environment
+    )
+    assert (done.stdout, done.stderr) == ("ended\n", "")
+    program = [sys.executable, "-c", "import sys; from cfmkit.cli.main import entry; sys.exit(entry())", "show"]
+    done = subprocess.run(program, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    assert (done.returncode, done.stderr) == (130, "error    interrupted\n")
+
+
 @pytest.mark.parametrize("arguments", [("new", "broken"), ("show", "broken"), ("schema", "broken")])
 def test_a_broken_family_by_its_name_is_a_usage_error_with_the_reason(site, arguments, capsys):
     packages.install(site, "broken-one", packages.record("broken", 7), "broken")
@@ -191,3 +260,25 @@ def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, 
     monkeypatch.setattr("cfmkit.cli.verbs.doctor.os.access", lambda _path, _mode: False)
     assert main(["doctor"]) == 0
     assert "cannot be written to" in capsys.readouterr().out
+
+
+def test_the_doctor_compares_what_is_installed_with_what_is_needed(monkeypatch, capsys):
+    """A minimum that pip was told to ignore: typer 0.18 said 'cfmkit: 1 is not allowed here, only 1 is'."""
+    versions = {"numpy": "1.26.4", "typer": "0.18.0"}
+    real = importlib.metadata.version
+    needed = ["numpy>=2.0", "typer>=0.26.8", "scipy>=1.14", "distributed>=2999.1; extra == 'cluster'"]
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: versions.get(name) or real(name))
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: needed)
+    assert main(["doctor", "--json"]) == 0
+    told = [one["message"] for one in json.loads(capsys.readouterr().out)["warnings"]]
+    assert "numpy 1.26.4 does not work with this cfmkit: pip install 'numpy>=2.0'" in told
+    assert "typer 0.18.0 does not work with this cfmkit: pip install 'typer>=0.26.8'" in told
+    assert not any("scipy" in one for one in told)
+
+
+def test_the_doctor_knows_of_a_folder_without_file_locks(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("cfmkit.store.lock._try", lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    assert main(["doctor"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"no file locks in {tmp_path}: .cfmkit.softlock marks a live run" in printed

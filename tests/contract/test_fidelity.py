@@ -38,7 +38,7 @@ def quick(path):
     spec = cfmkit.load(path)
     if "solid" not in families.family(spec.family).models:
         return spec
-    return spec.replace({"analysis.solid.poses": 3, "analysis.solid.mesh": "1 mm"})
+    return spec.replace({"analysis.solid.poses": 3, "analysis.solid.error": 0.1})
 
 
 @cache

@@ -196,7 +196,10 @@ def test_file_and_noise_belong_together(tmp_path):
         ("x [mm];y [mm]\n" + "60;2\n" * 30, "both flanks are needed with at least 20 points each"),
         ("x [mm];y [N]\n" + "60;2\n" * 30, "the column 'y' needs a unit of length"),
         ("side;x [mm];y [mm]\n" + "middle;60;2\n" * 30, "the side is 'middle'; it must be 'left' or 'right'"),
-        ("x [mm];y [mm]\n" + "60;2\n" * 9 + "60;NaN\n" + "60;3\n" * 30, "line 11: 'NaN' is not a number"),
+        (
+            "x [mm];y [mm]\n" + "60;2\n" * 9 + "60;NaN\n" + "60;3\n" * 30,
+            "line 11: column 'y' [mm] holds 'NaN', which is not a number",
+        ),
         ("", "the file is empty"),
     ],
 )
@@ -347,3 +350,51 @@ def test_a_study_knows_a_data_file_by_its_content(tmp_path):
     first, again = key(), key()
     write(tmp_path, measured(Errors(noise=0.001e-3)))
     assert first == again != key()
+
+
+HOLES = {
+    "both flanks": ([(0.08, 0.14), (0.08, 0.14)], (0.060, 0.115)),
+    "one flank": ([(0.08, 0.14), (0.0, 0.0)], (0.060, 0.115)),
+    "apart": ([(0.06, 0.07), (0.11, 0.12)], None),
+}
+
+
+@pytest.mark.parametrize(("cut", "hole"), HOLES.values(), ids=HOLES)
+def test_a_part_of_a_flank_without_points_leaves_no_force_there(tmp_path, cut, hole):
+    """It had been bridged by a smooth spline, and the share of the force error over it was given as measured."""
+    points = measured(Errors(waviness=0.01e-3, noise=0.002e-3))
+    write(
+        tmp_path,
+        [side[(side[:, 1] < low) | (side[:, 1] > high)] for side, (low, high) in zip(points, cut, strict=True)],
+    )
+    spec = spec_of(tmp_path).replace({"analysis.window": (0.04, 0.12)})
+    found = cfmkit.analyze(spec)
+    force = found.curve.on("load")
+    unknown = force.motion[~np.isfinite(force.effort)]
+    if hole:
+        assert (unknown.min(), unknown.max()) == (pytest.approx(hole[0], abs=2e-3), pytest.approx(hole[1], abs=2e-3))
+        assert found.values["profile_coverage"].value == pytest.approx(
+            1 - (unknown.max() - unknown.min()) / 0.08, abs=0.02
+        )
+    assert found.status.key == "partial"
+    metrics = cfmkit.evaluate(found, ["force_ripple", "force_mean", "hysteresis_area"])
+    assert all(item.value is None for item in metrics.values())
+    for name in ("profile_force_share", "profile_force_sd", "loop_area_per_friction"):
+        assert found.values[name].value is None
+        assert "was not measured" in found.values[name].reason
+    messages = {item.name: item.message for item in found.warnings}
+    assert "up_jam" not in messages
+    assert "is not known" in messages["profile_hole"]
+    assert messages["part_measured"].count(" to ") == 1 + len(found.state.unmeasured)
+
+
+def test_a_hole_outside_the_window_and_a_small_one_do_not_matter(tmp_path):
+    points = measured(Errors(waviness=0.01e-3, noise=0.002e-3))
+    write(tmp_path, [side[(side[:, 1] < 0.03) | (side[:, 1] > 0.04)] for side in points])
+    spec = spec_of(tmp_path).replace({"analysis.window": (0.04, 0.12), "requirements": ()})
+    outside = cfmkit.analyze(spec)
+    assert outside.status.key == "complete"
+    assert outside.values["profile_force_share"].value is not None
+    assert outside.values["profile_coverage"].value == 1.0
+    write(tmp_path, [side[(side[:, 1] < 0.09) | (side[:, 1] > 0.0906)] for side in points])
+    assert cfmkit.analyze(spec).status.key == "complete"

@@ -258,3 +258,82 @@ def test_python_calibrates_from_a_recording_with_bounds_as_text_or_numbers():
     assert one.spec.at(FRICTION) == one.fit.values[0]
     with pytest.raises(UsageError, match="there is no 'least'; there are linear, soft_l1, huber, cauchy"):
         cfmkit.calibrate(built(), case, FRICTION, loss="least")
+
+
+def lossy(spec, gap=1.0, thin=1):
+    """The loop of a cam without friction, with a constant loss added; of the way back only every `thin`-th point."""
+    curve = analyze(spec).curve
+    load = curve.on("load")
+    motion = np.concatenate([load.motion, load.motion[::-1][::thin]])
+    way = np.repeat([1.0, -1.0], [len(load.motion), len(load.motion[::thin])])
+    effort = np.interp(motion, load.motion, load.effort) + 0.5 * gap * way
+    good = np.isfinite(effort)
+    return measured(Recording("lossy.csv", motion[good], effort[good]), None)
+
+
+@pytest.mark.parametrize("thin", [1, 7])
+@pytest.mark.parametrize("loss", ["soft_l1", "linear", "cauchy"])
+def test_a_model_without_losses_is_fitted_to_the_mean_of_the_branches(thin, loss):
+    """A way back with few points had hardly counted, and a robust loss took one branch for outliers."""
+    truth, start = built(0.0), built(0.0)
+    source = lossy(truth, 3.0, thin)
+    found = calibrate(start.replace({STIFFNESS: 700.0}), source, parameters(start, [STIFFNESS]), loss)
+    assert found.fit.values[0] == pytest.approx(truth.at(STIFFNESS), rel=1e-4)
+    width = found.after.window.hi - found.after.window.lo
+    values = found.after.loss()
+    assert values["data_loss"].value == pytest.approx(3.0 * width, rel=1e-3)
+    assert values["data_half_gap"].value == pytest.approx(1.5, rel=1e-3)
+    assert [item.branch for item in found.after.samples] == ["mean"]
+    assert {item.branch for item in found.after.branches} == {"load", "unload"}
+    assert found.after.metrics()["data_rmse"].value < 5e-3
+
+
+def test_a_model_whose_friction_is_fitted_is_fitted_to_both_branches_though_it_starts_from_none():
+    found = calibrate(built(0.0), recording(built(0.003)), parameters(built(0.0), [FRICTION]))
+    assert found.after.branches == ()
+    assert found.fit.values == pytest.approx([0.003], rel=1e-6)
+
+
+def test_a_fit_counts_the_way_and_not_the_samples():
+    """A rig that dwells over one part of the travel: a model that is wrong there by 1 N over a third of the way."""
+    spec = built(0.0)
+    load = analyze(spec).curve.on("load")
+    places = np.concatenate([np.linspace(0.006, 0.08, 4000)[:-1], np.linspace(0.08, 0.229, 200)])
+    effort = np.interp(places, load.motion, load.effort) + np.where(places < 0.08, 1.0, 0.0)
+    dense = measured(Recording("dense.csv", places, effort), None)
+    even = np.linspace(0.006, 0.229, 2000)
+    plain = np.interp(even, load.motion, load.effort) + np.where(even < 0.08, 1.0, 0.0)
+    uniform = measured(Recording("even.csv", even, plain), None)
+    one, other = (calibrate(spec, item, parameters(spec, [STIFFNESS]), "linear").fit for item in (dense, uniform))
+    assert one.values[0] == pytest.approx(other.values[0], rel=2e-4)
+    errors = [compare(analyze(spec), item).metrics() for item in (dense, uniform)]
+    for name in ("data_rmse", "data_offset"):
+        assert errors[0][name].value == pytest.approx(errors[1][name].value, rel=2e-2)
+
+
+def test_an_interval_stays_within_the_bounds_and_what_is_unknown_is_said_so():
+    from cfmkit.experiment.calibration import table
+    from cfmkit.experiment.measurement_and_calibration_outputs import calibration_lines
+
+    start, source = built(0.0002), recording(built(0.0002), 2.0)
+    few = measured(Recording("few.csv", source.recording.motion[::40], source.recording.effort[::40]), None)
+    found = calibrate(start, few, parameters(start, [FRICTION]))
+    (record,) = table(found)
+    assert record["low_95"] >= 0.0
+    assert found.fit.half_widths()[0] > 0.0002
+    said = dict(calibration_lines(found, few.recording))["fitted"]
+    assert said == f"{FRICTION} cannot be determined from this recording"
+    assert any("cannot be determined from this recording" in item.message for item in found.warnings)
+    assert not any("%" in item.message for item in found.warnings if item.name == "weakly_identified")
+
+
+def test_errors_over_a_hole_have_no_value_and_the_fit_uses_what_there_is():
+    spec = built(0.00225)
+    whole = recording(spec).recording
+    keep = (whole.motion < 0.08) | (whole.motion > 0.14)
+    source = measured(Recording("hole.csv", whole.motion[keep], whole.effort[keep]), None)
+    found = calibrate(built(0.002), source, parameters(built(), [FRICTION]))
+    assert found.fit.values[0] == pytest.approx(0.00225, rel=1e-4)
+    assert all(item.value is None for item in found.after.metrics().values())
+    assert all("not recorded: 80" in item.reason for item in found.after.metrics().values())
+    assert all(item.value is None for item in found.after.loss().values())

@@ -110,8 +110,8 @@ def test_the_origin_at_the_cams_first_point_is_15_mm_above_the_paths():
 
 # --- weight ----------------------------------------------------------------------------------------------
 
-ROLLER_WEIGHT = (2 * 0.38 + 0.077) * 9.81
-SLIDER_WEIGHT = (0.068 + 0.077) * 9.81
+ROLLER_WEIGHT = (2 * 0.38 + 0.077) * 9.80665
+SLIDER_WEIGHT = (0.068 + 0.077) * 9.80665
 
 
 def carrying_weight(force=50.0):

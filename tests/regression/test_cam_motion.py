@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cam_motion import change_at_rest, moving, peak_over_one_second, response, with_springs
-from cam_support import analyze
+from cam_support import analyze, take_gravity_of_the_note
 
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.machine_from_spec import build
@@ -17,6 +17,12 @@ from cfmkit.families.cam.dynamics.roller_curves_and_motion import Moment
 WIDE_ROLLER = {"masses__roller_inertia": 4.61e-5}
 FROM_CAM = {"analysis__dynamics__origin": "cam-start"}
 NO_WEIGHT = {"analysis__gravity": False}
+
+
+@pytest.fixture(autouse=True)
+def _gravity_of_the_note(monkeypatch):
+    """The note's numbers hold for 9.81 m/s^2; the product takes the standard value."""
+    take_gravity_of_the_note(monkeypatch)
 
 
 def at_rest(position):

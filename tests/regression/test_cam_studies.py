@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cam_support import take_gravity_of_the_note
 
 import cfmkit
 from cfmkit.studies.engine import run
@@ -15,6 +16,11 @@ from cfmkit.tables import read_csv
 
 FOLDER = Path(__file__).parents[2] / "configs/studies"
 EFFECT = "angle_error_effect"
+
+
+@pytest.fixture(autouse=True)
+def _gravity_of_the_note(monkeypatch):
+    take_gravity_of_the_note(monkeypatch)
 
 
 def swept(name, **changes):

@@ -23,6 +23,6 @@ analysis:
   travel: 0.2 mm
   points: 9
   fidelity: solid
-  solid: {poses: 3, mesh: 0.4 mm}
+  solid: {poses: 3, error: 0.1}
   outputs: {nodes: [middle, shuttle], reactions: [root, shuttle]}
 """

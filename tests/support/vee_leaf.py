@@ -15,5 +15,5 @@ mechanism:
     leaf: {start: root, end: shuttle}
   drive: {kind: displacement, node: shuttle, direction: -90 deg}
   part: {fillet: 0.05 mm}
-analysis: {travel: 5 mm, points: 51, fidelity: solid, solid: {poses: 11, mesh: 0.25 mm}}
+analysis: {travel: 5 mm, points: 51, fidelity: solid, solid: {poses: 11, error: 0.1}}
 """

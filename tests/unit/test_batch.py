@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -10,10 +12,13 @@ from xml.etree import ElementTree
 import pytest
 
 import cfmkit
+from cfmkit.cli.github_annotations import workflow_commands
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.runs.batch_output_files import page, plain, summary
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch_sources_and_outcomes import (
     Entry,
+    files_below,
     folders,
     message,
     requirements_table,
@@ -23,6 +28,8 @@ from cfmkit.studies.batch_sources_and_outcomes import (
 from cfmkit.studies.finished_batch_specs_in_journal import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
+from cfmkit.studies.metric_changes_since_earlier_batch import BatchComparison, MetricChange, changes_table
+from cfmkit.tables import to_csv
 
 
 @pytest.fixture
@@ -56,6 +63,29 @@ def test_results_of_an_earlier_batch_are_no_specifications(tree):
     (tree / "mine" / "a" / "design.yaml").write_text("family: cam")
     assert "mine/a/design.yaml" in sources(["**/*.yaml"], "cfm-out/batch")
     assert "mine/a/design.yaml" not in sources(["**/*.yaml"], "mine")
+
+
+@pytest.mark.parametrize("named", [".", "**/*.yaml", "./**", "sub/../**/*.yaml"])
+def test_links_that_lead_in_circles_are_followed_once(tree, named):
+    """Three links upwards: each file would be found along 3^40 paths."""
+    for name, target in (("sub/up", ".."), ("sub/deep/up", "../.."), ("sub/here", "."), ("self", "self")):
+        (tree / name).symlink_to(target)
+    (tree / "other").mkdir()
+    (tree / "other" / "d.yaml").write_text("family: cam")
+    (tree / "sub" / "other").symlink_to(tree / "other")
+    found = [os.path.normpath(name) for name in sources([named], "cfm-out/batch")]
+    assert {"a.yaml", "sub/a.yaml", "other/d.yaml"} <= set(found) <= {
+        "a.yaml", "b.yml", "sub/a.yaml", "sub/deep/c.YAML", "other/d.yaml", "note.txt"
+    }  # fmt: skip
+    assert len(set(found)) == len(found)
+
+
+def test_a_folder_that_is_only_linked_is_searched(tree, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "d.yaml").write_text("family: cam")
+    (tree / "linked").symlink_to(elsewhere)
+    assert "linked/d.yaml" in sources(["**/*.yaml"], "out")
+    assert files_below("linked") == ["linked/d.yaml"]
 
 
 def test_a_file_whose_name_looks_like_a_pattern_is_that_file(tree):
@@ -172,6 +202,51 @@ def test_the_tables_have_a_row_for_each_specification_and_each_requirement():
     assert table["exit_code"][-1] is None
     assert list(requirements_table(ENTRIES)["ok"]) == ["true", "true", "false", "false", "true"]
     assert len(requirements_table(())) == 0
+
+
+HOSTILE = "=cmd\x1b[31m\x07\r\n\t\x9b\u202e@.yaml"
+
+
+def test_no_table_and_no_report_holds_a_raw_control_character():
+    warned = {"name": HOSTILE, "message": HOSTILE}
+    known = {"metric": HOSTILE, "min": None, "max": 1.0, "unit": "1", "over": None, "over_unit": None}
+    missed = known | {"value": 2.0, "ok": False, "sentence": HOSTILE}
+    fields = dict.fromkeys(("spec", "folder", "verb", "family", "name", "status", "message"), HOSTILE)
+    ends = {"code": ExitCode.REQUIREMENT_MISSED, "requirements": (missed,), "warnings": (warned,)}
+    entries = [Entry(**fields, **ends), Entry(**fields, code=ExitCode.INVALID, errors=(HOSTILE,))]
+    changed = (MetricChange(HOSTILE, HOSTILE, HOSTILE, 1.0, HOSTILE, None, True),)
+    written = {
+        "results": to_csv(results_table(entries)),
+        "requirements": to_csv(requirements_table(entries)),
+        "changes": to_csv(changes_table(changed)),
+        "summary": summary(entries, BatchComparison(HOSTILE, 0.1, changed, (HOSTILE,))),
+        "junit": junit(entries),
+        "annotations": "\n".join(workflow_commands(entries, changed)).encode(),
+        "page": page(entries, HOSTILE, HOSTILE),
+    }
+    for name, data in written.items():
+        raw = {char for char in data.decode() if not char.isprintable()}
+        assert raw <= {"\n"}, name
+    for name in ("results", "requirements", "changes"):
+        assert "'=cmd" in written[name].decode()
+        assert not re.search(r"(^|,|\")[=@]", written[name].decode(), re.MULTILINE)
+
+
+def test_a_summary_mentions_nobody_and_links_nowhere():
+    assert plain("@somebody") != "@somebody"
+    for hostile in (
+        "@somebody",
+        "a @b/c",
+        "https://evil.example",
+        "www.evil.example",
+        "#1",
+        "$x$",
+        "= x",
+        "- x",
+        "+ x",
+    ):
+        text = plain(hostile)
+        assert not re.search(r"@\w|://|www\.|(?<!\\)[#$](?!8203)|^[-=+]", text)
 
 
 def test_the_message_counts_every_end():

@@ -97,6 +97,24 @@ def test_only_what_differs_by_more_than_rounding_is_a_change(tmp_path):
     assert compared(tmp_path, {"f": value(10.0)}, {"f": value(10.2)}, tolerance=0.01) == [("f", True)]
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "relative", "said"),
+    [
+        (10.0, 20.0, 1.0, "f: 10 -> 20 N (+100 %)"),
+        (10.0, 5.0, -0.5, "f: 10 -> 5 N (-50 %)"),
+        (-10.0, -5.0, 0.5, "f: -10 -> -5 N (+50 %)"),
+        (-10.0, -20.0, -1.0, "f: -10 -> -20 N (-100 %)"),
+        (0.0, 2.0, None, "f: 0 -> 2 N"),
+    ],
+)
+def test_a_change_is_a_share_of_what_it_was(tmp_path, before, after, relative, said):
+    """A force that doubled was reported as +50 %: relative to the larger of both."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "metrics.json").write_text(json.dumps({"metrics": {"f": value(after)}}))
+    (found,) = changes({"a": Earlier("complete", 0, {"f": value(before)})}, [one()], str(tmp_path))
+    assert (found.relative, found.sentence, found.beyond) == (relative, said, True)
+
+
 def test_a_run_that_ends_otherwise_is_a_change_whatever_its_metrics(tmp_path):
     failed = one(status="no_equilibrium", code=ExitCode.NO_SOLUTION)
     assert compared(tmp_path, {}, {}, failed) == [("status", True)]

@@ -13,6 +13,7 @@ import pytest
 from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
+from cfmkit.cli.main import main
 from cfmkit.elastica import Section, Taper
 from cfmkit.errors import DataError, InputError, SpecError
 from cfmkit.families.beam.network_from_spec import thickest_of, thinnest_of
@@ -962,3 +963,76 @@ def test_a_straight_strip_pressed_along_itself_names_the_strip_and_a_cure_that_b
     assert early.cures == ("analysis.fidelity=extensible",)
     buckled = cfmkit.analyze(result.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
     assert "bifurcation" in {item.name for item in buckled.warnings}
+
+
+TIED = """\
+cfmkit: 1
+family: beam
+name: tied
+mechanism:
+  material: {youngs_modulus: 2300 MPa}
+  thickness: 1 mm
+  width: 5 mm
+  nodes:
+    a: {at: [0 mm, 0 mm], support: clamped}
+    m: {at: [30 mm, 20 mm]}
+    b: {at: [60 mm, 0 mm], support: pinned}
+    t: {at: [90 mm, 10 mm], support: clamped}
+  beams:
+    left: {start: a, end: m, shape: {kind: cosine, rise: 1 mm}}
+    right: {start: m, end: b}
+    EXTRA: {start: t, end: b, end_joint: pin}
+  drive: {kind: rotation, node: m}
+analysis: {travel: 10 deg, points: 5}
+"""
+
+
+def test_a_straight_beam_between_held_places_changes_nothing(tmp_path):
+    """Its force was undetermined, and the whole network was called rigid."""
+    text = TIED.replace("EXTRA", "spare")
+    (tmp_path / "with.yaml").write_text(text, encoding="utf-8")
+    alone = re.sub(r"    (spare|t): .*\n", "", text)
+    (tmp_path / "without.yaml").write_text(alone, encoding="utf-8")
+    one, other = (cfmkit.analyze(cfmkit.load(tmp_path / f"{name}.yaml")).curve for name in ("with", "without"))
+    np.testing.assert_allclose(one.torque, other.torque, rtol=1e-9, atol=1e-12)
+    assert np.abs(one.extra["spare_force_x"].values).max() < 1e-6
+
+
+def test_beams_that_over_determine_a_network_are_named(tmp_path, monkeypatch, capsys):
+    text = TIED.replace(", shape: {kind: cosine, rise: 1 mm}", "").replace("EXTRA", "spare")
+    text = text.replace("kind: rotation, node: m", "kind: displacement, node: m").replace("10 deg", "1 mm")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tied.yaml").write_text(text, encoding="utf-8")
+    assert main(["analyze", "tied.yaml", "--no-plots", "--set", "mechanism.drive.direction=90 deg"]) == 4
+    page = " ".join(capsys.readouterr().out.split())
+    assert "inextensible beams between places that do not move (left, right) hold the network rigid" in page
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("mechanism.nodes={m: {at: [0 mm, 74 mm]}}", "a beam joins two nodes, and there is one: add another"),
+        ("mechanism.nodes.m.support=clamped", "'m' cannot turn: its support is 'clamped'; 'pinned' lets it turn"),
+        (
+            "mechanism.drive={kind: displacement, node: b, direction: 0 deg}",
+            "'b' cannot move: its support is 'pinned'; 'guided' with 'direction: 0 deg' or 'free' lets it",
+        ),
+    ],
+)
+def test_what_stands_in_the_way_of_a_network_is_said_with_its_cure(tmp_path, capsys, change, said):
+    (tmp_path / "tied.yaml").write_text(TIED.replace("EXTRA", "spare"), encoding="utf-8")
+    assert main(["check", str(tmp_path / "tied.yaml"), "--set", change]) == 3
+    captured = capsys.readouterr()
+    assert said in captured.out + captured.err
+
+
+def test_a_straight_strip_pressed_straight_has_no_solution(tmp_path, monkeypatch, capsys):
+    text = re.sub(r"    (spare|t|m|left|right): .*\n", "", TIED.replace("EXTRA", "spare"))
+    text = text.replace("  beams:\n", "  beams:\n    s: {start: a, end: b}\n").replace(
+        "support: pinned", "support: guided, direction: 0 deg"
+    )
+    text = text.replace("kind: rotation, node: m", "kind: displacement, node: b, direction: 180 deg")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "strip.yaml").write_text(text.replace("10 deg", "1 mm"), encoding="utf-8")
+    assert main(["analyze", "strip.yaml", "--no-plots"]) == 4
+    assert "(s) do not move until they buckle" in " ".join(capsys.readouterr().out.split())

@@ -31,7 +31,7 @@ mechanism:
   beams:
     beam: {start: root, end: tip}
   drive: {kind: displacement, node: tip, direction: -90 deg}
-analysis: {travel: 7 mm, points: 21, fidelity: solid, solid: {poses: 11, mesh: 0.6 mm}}
+analysis: {travel: 7 mm, points: 21, fidelity: solid, solid: {poses: 11, error: 0.1}}
 """
 
 
@@ -76,7 +76,7 @@ def test_a_solid_under_a_moment_turns_as_the_beam_does(tmp_path):
 
 @pytest.mark.slow
 def test_a_load_that_a_leaf_cannot_carry_ends_at_its_largest_force(tmp_path):
-    spec = spec_of(tmp_path, VEE, analysis__solid__mesh="0.5 mm", analysis__solid__poses=21)
+    spec = spec_of(tmp_path, VEE, analysis__solid__error=0.1, analysis__solid__poses=21)
     moved = cfmkit.analyze(spec).state.densely
     peak = float(moved.effort.max())
 
@@ -113,7 +113,7 @@ def test_a_node_in_the_middle_of_a_straight_beam_is_moved_over_its_whole_section
     beams = {"left": {"start": "root", "end": "tip"}, "right": {"start": "tip", "end": "end"}}
     spec = spec_of(tmp_path, mechanism__nodes=nodes, mechanism__beams=beams)
     part = driven_part(spec, assemble(spec))
-    problem = part.part.meshed(part.size).problem
+    problem = part.part.meshed().problem
     (group,) = (one for one in problem.supports.groups if one.name == "tip")
     heights = problem.elements.mesh.nodes[group.nodes, 1]
     assert [heights.min(), heights.max()] == pytest.approx([-0.5e-3, 0.5e-3], abs=2e-6)
@@ -124,7 +124,7 @@ def test_a_strip_of_400_thicknesses_has_poses(tmp_path):
     nodes = {"root": {"at": ["0 mm", "0 mm"], "support": "clamped"}, "tip": {"at": ["400 mm", "0 mm"]}}
     spec = spec_of(tmp_path, mechanism__nodes=nodes, analysis__travel="12 mm")
     part = driven_part(spec, assemble(spec))
-    problem = part.part.meshed(1.5 * part.size).problem
+    problem = part.part.meshed().problem
     rest = problem.solve(np.zeros(problem.supports.size), 0.0)
     assert rest is not None
     bent = problem.solve(rest.slope * 3e-3, 3e-3)

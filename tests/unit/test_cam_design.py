@@ -181,7 +181,7 @@ def test_the_two_way_gap_is_that_of_the_analysed_curve(constant, friction, cut_f
     law = SlopeLaw(constant, 0.068, 0.2, cut_for, found.spec.at("mechanism.profile.slope_factor"))
     gap = two_way_gap(law, spec.design, assemble(found.spec).loads, friction)
     curve = analyze(found.spec).curve
-    weight = 0.145 * 9.81 if force else 0.0  # the slider's own does not count in the gap
+    weight = 0.145 * 9.80665 if force else 0.0  # the slider's own does not count in the gap
     inside = curve.motion >= 0.02 * 0.24
     if np.isnan(curve.force[inside]).any():
         assert gap == np.inf
@@ -192,8 +192,8 @@ def test_the_two_way_gap_is_that_of_the_analysed_curve(constant, friction, cut_f
 
 def test_a_profile_that_carries_the_weight_is_exact_with_gravity_and_names_its_factor():
     spec = designed(targets(force="60 N", gravity=True))
-    pull = 60 - 0.145 * 9.81
-    assert spec.at("mechanism.profile.slope_factor") == pytest.approx(pull / (pull - 0.837 * 9.81), rel=1e-12)
+    pull = 60 - 0.145 * 9.80665
+    assert spec.at("mechanism.profile.slope_factor") == pytest.approx(pull / (pull - 0.837 * 9.80665), rel=1e-12)
     assert spec.gravity
     np.testing.assert_allclose(on_flank(analyze(spec)), 60, rtol=1e-9)
 

@@ -91,7 +91,7 @@ def test_the_masses_hang_half_a_brace_at_each_end():
     tangent = math.tan(math.asin(plain.x[0] / 0.2))
     rise = plain.slope[0] / (plain.slope[0] - tangent)  # of the rollers per rise of the slider
     weight = masses.slider + 2 * masses.roller * rise + masses.brace * (1 + rise)
-    assert heavy.force[0] - plain.force[0] == pytest.approx(9.81 * weight, rel=1e-9)
+    assert heavy.force[0] - plain.force[0] == pytest.approx(9.80665 * weight, rel=1e-9)
 
 
 # --- scalar results -----------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from cfmkit.elastica.kernels.compiler import OPTIONS
 from cfmkit.elastica.kernels.passing_arrays_by_address import HEAD, objects
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
-from cfmkit.store.private_cache_folder import trusted
+from cfmkit.store.private_cache_folder import resolve_trusted
 
 _count, _solve, _swap, _predict = dense.positive_count, dense.lu_solve, dense._swap, march._predict
 
@@ -186,11 +186,64 @@ def test_code_is_never_used_where_others_could_have_put_it(
 
 def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
-    assert trusted(tmp_path / "file")
+    assert resolve_trusted(tmp_path / "file") == tmp_path / "file"
     owner = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: owner + 1)
-    assert trusted(tmp_path / "file") == (owner == 0)  # the system's owner may write everywhere anyhow
-    assert not trusted(tmp_path / "no such file")
+    assert bool(resolve_trusted(tmp_path / "file")) == (owner == 0)  # the system's owner may write everywhere anyhow
+    assert resolve_trusted(tmp_path / "no such file") is None
+
+
+class _Swapped:
+    """A link that leads to one folder when it is judged and, from then on, to another."""
+
+    def __init__(self, link: Path, judged: Path, then: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        link.symlink_to(judged)
+        usual = disk_cache.resolve_trusted
+
+        def judge(path: Path) -> Path | None:
+            found = usual(path)
+            link.unlink()
+            link.symlink_to(then)
+            return found
+
+        monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([link]))
+        monkeypatch.setattr(disk_cache, "private_folder", lambda _name, make=True: None)
+        monkeypatch.setattr(disk_cache, "resolve_trusted", judge)
+
+
+def test_code_is_read_where_it_was_judged_although_the_link_there_leads_elsewhere_by_then(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged, foreign = folder / "judged", folder / "foreign"
+    for place, content in ((judged, b"own"), (foreign, b"foreign")):
+        monkeypatch.setattr(disk_cache, "_lasting", lambda place=place: iter([place]))
+        disk_cache.write("door", machine_code.Code((), content))
+    _Swapped(folder / "link", judged, foreign, monkeypatch)
+    code = disk_cache.read("door")
+    assert code is not None
+    assert code.content == b"own"
+
+
+def test_code_is_written_where_the_folder_was_judged(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also what the linker makes on its way: who could exchange that would have its code signed."""
+    judged, foreign = folder / "judged", folder / "foreign"
+    judged.mkdir()
+    foreign.mkdir()
+    _Swapped(folder / "link", judged, foreign, monkeypatch)
+    assert disk_cache.write("door", CODE) == judged
+    assert not list(foreign.iterdir())
+
+
+def test_a_folder_that_becomes_a_link_after_it_was_resolved_is_not_trusted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first name on the way is judged as it stands, not what it leads to by then."""
+    own, swapped = tmp_path / "own", tmp_path / "swapped"
+    own.mkdir()
+    swapped.symlink_to(own)
+    monkeypatch.setattr(Path, "resolve", lambda self, strict=False: self)
+    assert resolve_trusted(own) == own
+    assert resolve_trusted(swapped) is None
 
 
 def test_what_the_linker_would_not_find_is_told_before_it_ends_the_process() -> None:
@@ -412,6 +465,15 @@ def test_what_is_no_library_is_said_to_be_strange(tmp_path: Path) -> None:
     (tmp_path / "door.so").write_bytes(b"no library")
     with pytest.raises(machine_code.Strange):
         machine_code.in_library(tmp_path / "door.so")
+
+
+def test_a_library_is_not_opened_by_a_name_that_the_loader_would_replace(small: Path, tmp_path: Path) -> None:
+    """`$ORIGIN` is the folder of the program that runs: another one than that which was judged."""
+    judged = tmp_path / "$ORIGIN" / small.name
+    judged.parent.mkdir()
+    small.rename(judged)
+    with pytest.raises(machine_code.Strange, match=r"\$"):
+        machine_code.in_library(judged)
 
 
 def test_curves_and_gradients_are_the_same_to_the_last_bit_however_the_code_is_loaded(

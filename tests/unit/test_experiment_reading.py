@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from experiment_support import csv_text, loop_columns, rows
@@ -173,7 +175,7 @@ def test_malformed_units_options_are_usage_errors(tmp_path, units):
 def test_an_option_that_contradicts_the_header_or_names_no_column_is_refused(tmp_path):
     with pytest.raises(DataError, match="the header gives 's' in mm, --units in m"):
         read(tmp_path, csv_text(), "s=m")
-    with pytest.raises(DataError, match="a column 'F1' that is not there; did you mean 'F'"):
+    with pytest.raises(DataError, match="there is no column 'F1'; did you mean 'F'"):
         read(tmp_path, csv_text("t;s;F"), "F1=N")
 
 
@@ -221,3 +223,14 @@ def test_a_file_that_does_not_end_is_refused_before_it_fills_the_memory(monkeypa
     monkeypatch.setattr(reading, "LARGEST", 1_000_000)
     with pytest.raises(DataError, match="zero: is larger than 1 MB"):
         read_recording("/dev/zero")
+
+
+@pytest.mark.parametrize("reason", [OSError(5, "Input/Output Error"), OSError("no Device of this Kind")])
+def test_the_name_of_a_file_that_cannot_be_read_keeps_its_capitals(tmp_path, monkeypatch, reason):
+    def broken(*_, **__):
+        raise reason
+
+    (tmp_path / "MyData.CSV").touch()
+    monkeypatch.setattr(Path, "open", broken)
+    with pytest.raises(UsageError, match=r"MyData\.CSV cannot be read: (input/output error|no Device of this Kind)"):
+        reading._content(tmp_path / "MyData.CSV")

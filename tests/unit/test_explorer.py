@@ -2,9 +2,13 @@
 
 import http.client
 import json
+import re
+import socket
 import threading
+import time
 import urllib.error
 import urllib.request
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -12,8 +16,11 @@ import pytest
 import cfmkit
 from cfmkit.cli.failures import told
 from cfmkit.cli.output import Terminal
+from cfmkit.cli.verbs.explore import ExploreOptions, run
 from cfmkit.errors import OutputError, UsageError
-from cfmkit.runs.explorer_server import Explorer, ExplorerServer, suggested_name
+from cfmkit.runs import explorer_server
+from cfmkit.runs.explorer import Explorer, suggested_name
+from cfmkit.runs.explorer_server import ExplorerServer
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -123,7 +130,21 @@ def test_only_this_computer_with_the_token_is_answered(served):
 
 
 @pytest.mark.parametrize(
-    "data", [b"no json", {"changes": 3}, {"changes": [3]}, {}, [1], b"[" * 100_000, b" " * 300_000]
+    "data",
+    [
+        b"no json",
+        {"changes": 3},
+        {"changes": [3]},
+        {},
+        [1],
+        b"[" * 100_000,
+        b" " * 300_000,
+        b'{"changes": ["\xff"]}',
+        json.dumps({"changes": []}).encode("utf-16"),
+        b'{"changes": ["\\ud800"]}',
+        {"changes": [], "name": 3},
+        b'{"changes": [' + b"9" * 5000 + b"]}",
+    ],
 )
 def test_a_malformed_request_is_refused_and_the_next_one_answered(served, data):
     token = {"X-Token": served.token}
@@ -164,3 +185,212 @@ def test_no_name_of_a_spec_becomes_markup(tmp_path):
     page = Explorer.of(str(tmp_path / "cam.yaml")).page("token").decode()
     assert "<img" not in page
     assert page.count("</script>") == 2
+
+
+def sent(server, *pieces, close=False):
+    """Return all that the server sends back for bytes as they are; None if it closes the connection without a word."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=20) as connection:
+        for piece in pieces:
+            connection.sendall(piece)
+        if close:
+            connection.shutdown(socket.SHUT_WR)
+        found = b""
+        while more := connection.recv(65536):
+            found += more
+        return found or None
+
+
+def head(server, *lines, request="POST /answer HTTP/1.1"):
+    """Return the head of a request that is in order but for some lines."""
+    usual = [f"Host: 127.0.0.1:{server.server_port}", f"X-Token: {server.token}"]
+    return "\r\n".join([request, *usual, *lines, "", ""]).encode()
+
+
+BODY = b'{"changes": []}'
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "http://[",
+        "//[",
+        "[",
+        "*",
+        "/%",
+        "/%ff%",
+        "/?token=%ff%zz",
+        "/?token=\xff",
+        "/?" + "a&" * 20_000,
+        "http://x/",
+        "?",
+    ],
+)
+def test_a_strange_address_is_refused_in_silence(served, capsys, target):
+    for method in ("GET", "POST"):
+        found = sent(served, f"{method} {target} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode("latin-1"))
+        assert re.match(rb"HTTP/1.0 4\d\d ", found)
+        found = sent(served, head(served, f"Content-Length: {len(BODY)}", request=f"{method} {target} HTTP/1.1"), BODY)
+        assert re.match(rb"HTTP/1.0 4\d\d ", found)
+    assert capsys.readouterr().err == ""
+    assert asked(served, data={"changes": []}, **{"X-Token": served.token})[0] == 200
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        [f"Content-Length: {len(BODY) + 1}"],
+        ["Content-Length: -1"],
+        [f"Content-Length: +{len(BODY)}"],
+        ["Content-Length: 1_5"],
+        ["Content-Length: "],
+        ["Content-Length: 99999999999999999999"],
+        [],
+        [f"Content-Length: {len(BODY)}", "Content-Length: 3"],
+        [f"Content-Length: {len(BODY)}", "Transfer-Encoding: chunked"],
+        ["Transfer-Encoding: chunked"],
+    ],
+)
+def test_a_body_of_another_length_than_it_says_is_refused(served, lines):
+    assert sent(served, head(served, *lines), BODY, close=True).startswith(b"HTTP/1.0 400 ")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Origin: http://evil.example",
+        "Origin: null",
+        "Origin: http://127.0.0.1:1",
+        "Host: evil.example",
+        "Host: localhost",
+    ],
+)
+def test_another_page_or_a_second_host_is_refused(served, line):
+    found = sent(served, head(served, line, f"Content-Length: {len(BODY)}"), BODY)
+    assert found.startswith(b"HTTP/1.0 403 ")
+
+
+def test_the_page_itself_is_known_by_its_origin(served):
+    for name in ("127.0.0.1", "localhost"):
+        headers = {"X-Token": served.token, "Origin": f"http://{name}:{served.server_port}"}
+        assert asked(served, data={"changes": []}, **headers)[0] == 200
+
+
+@pytest.mark.parametrize("method", ["HEAD", "OPTIONS", "TRACE", "PUT", "DELETE", "CONNECT", "<script>"])
+def test_other_methods_are_refused_and_nothing_is_echoed(served, method):
+    found = sent(served, head(served, request=f"{method} /?token={served.token} HTTP/1.1"))
+    assert found.startswith(b"HTTP/1.0 405 ")
+    assert b"Allow: GET, POST\r\n" in found
+    assert b"Access-Control" not in found
+    assert served.token.encode() not in found
+    assert b"<script>" not in found.partition(b"\r\n\r\n")[2]
+    assert (found.partition(b"\r\n\r\n")[2] == b"") == (method == "HEAD")
+
+
+@pytest.mark.parametrize(
+    "request_bytes",
+    [
+        b"\x16\x03\x01\x02\x00\x01\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 200 + b"\r\n",
+        b"GET /" + b"a" * 70_000 + b" HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nX: " + b"a" * 70_000 + b"\r\n\r\n",
+        b"\r\n",
+        b"",
+    ],
+)
+def test_what_is_no_request_is_refused_in_silence(served, capsys, request_bytes):
+    found = sent(served, request_bytes, close=True)
+    assert found is None or re.search(rb"HTTP/1.0 [45]\d\d |not a request", found)
+    assert capsys.readouterr().err == ""
+    assert asked(served, data={"changes": []}, **{"X-Token": served.token})[0] == 200
+
+
+def test_a_second_request_in_the_body_of_the_first_is_not_answered(served):
+    second = head(served, request=f"GET /?token={served.token} HTTP/1.1")
+    found = sent(served, head(served, "Connection: keep-alive", f"Content-Length: {len(BODY)}"), BODY + second)
+    assert found is None or found.count(b"HTTP/1.0 ") == 1
+
+
+def test_connections_that_say_nothing_do_not_keep_others_waiting(served):
+    silent = [socket.create_connection(("127.0.0.1", served.server_port), timeout=20) for _ in range(100)]
+    try:
+        assert asked(served, data={"changes": []}, **{"X-Token": served.token})[0] == 200
+        end = time.monotonic() + 10
+        while threading.active_count() > explorer_server.MAX_CONNECTIONS + 5 and time.monotonic() < end:
+            time.sleep(0.01)
+        assert threading.active_count() <= explorer_server.MAX_CONNECTIONS + 5
+    finally:
+        for one in silent:
+            one.close()
+
+
+@pytest.mark.parametrize("start", [b"", b"POST /answer HTTP/1.1\r\n", None])
+def test_a_request_that_comes_in_drops_is_ended_in_time(served, monkeypatch, start):
+    """However often a further byte arrives, in the head and in the body."""
+    monkeypatch.setattr(explorer_server, "MAX_READ_SECONDS", 0.4)
+    began = time.monotonic()
+    with socket.create_connection(("127.0.0.1", served.server_port), timeout=20) as connection:
+        connection.sendall(head(served, "Content-Length: 9999") if start is None else start)
+        with suppress(OSError):  # the connection was closed
+            while time.monotonic() < began + 10:
+                connection.sendall(b"a")
+                time.sleep(0.05)
+    assert time.monotonic() < began + 5
+
+
+def test_the_page_runs_no_script_and_no_style_but_its_own(served):
+    policies = []
+    for _ in range(2):
+        found = sent(served, head(served, request=f"GET /?token={served.token} HTTP/1.1"))
+        policy = re.search(rb"Content-Security-Policy: (.*)\r\n", found)[1].decode()
+        nonce = re.search(r"script-src 'nonce-([\w-]{20,})'", policy)[1]
+        assert "unsafe" not in policy
+        assert f"style-src 'nonce-{nonce}'" in policy
+        markup = found.partition(b"\r\n\r\n")[2].decode()
+        assert markup.count(f'nonce="{nonce}"') == 2
+        assert not re.search(r"<[^>]* (style|on\w+)=", markup.partition("<script")[0])
+        policies.append(policy)
+    assert policies[0] != policies[1]
+
+
+def test_the_token_is_not_on_the_command_line_of_the_browser(explorer, monkeypatch):
+    """Every user of the computer can read that; what leads to the page is a file of this user alone."""
+    opened = []
+
+    def browse(url):
+        path = Path(url.removeprefix("file://"))
+        opened.append((url, path, path.stat().st_mode & 0o777, path.read_text()))
+
+    monkeypatch.setattr("webbrowser.open", browse)
+    monkeypatch.setattr(ExplorerServer, "serve_forever", lambda self: opened.append(self.token))
+    run(ExploreOptions(spec=explorer.source), Terminal(quiet=True))
+    (url, path, mode, text), token = opened
+    assert mode == 0o600
+    assert token not in url
+    assert f"/?token={token}" in text
+    assert not path.exists()
+
+
+def test_the_file_that_leads_to_the_page_is_removed_when_the_page_is_open(served):
+    path = served.write_redirect()
+    assert asked(served, "/?token=wrong")[0] == 403
+    assert path.exists()
+    assert asked(served, f"/?token={served.token}")[0] == 200
+    end = time.monotonic() + 5
+    while path.exists() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not path.exists()
+
+
+def test_an_explorer_without_room_for_that_file_still_says_its_address(explorer, monkeypatch, capsys):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tempfile.mkstemp", full)
+    monkeypatch.setattr("webbrowser.open", lambda _url: pytest.fail("opened"))
+    monkeypatch.setattr(ExplorerServer, "serve_forever", lambda self: None)
+    run(ExploreOptions(spec=explorer.source), Terminal())
+    found = capsys.readouterr()
+    assert "?token=" in found.out
+    assert found.err == "warning  no browser is opened (the disk is full): open the address above\n"

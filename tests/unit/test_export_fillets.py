@@ -115,15 +115,15 @@ def test_holes_of_the_fixing_pattern_are_cut_and_must_lie_in_the_part():
         (["process=mill"], 1e-3),
         (["process={least_radius: 0.3 mm}"], 0.3e-3),
         (["process={name: laser, least_radius: 0.3 mm}"], 0.3e-3),
-        (["process={position: 0.1 mm}"], 0.5e-3),
+        (["process={position: 0.1 mm}"], None),
         (["process=laser", "fillet=0 mm"], 0.0),
-        (["sheet=null"], 0.5e-3),
+        (["sheet=null"], None),
     ],
 )
 def test_inside_corners_have_the_smallest_radius_of_the_process_unless_it_is_given(name, given, radius):
     spec = cfmkit.load(f"configs/{name}.yaml", ["mechanism.part={}", *(f"mechanism.part.{one}" for one in given)])
-    assert spec.mechanism.part.fillet == pytest.approx(radius)
-    assert cfmkit.load(f"configs/{name}.yaml", ["mechanism.part={}"]).mechanism.part.fillet == 0.5e-3
+    usual = 0.5 * spec.mechanism.thinnest
+    assert spec.mechanism.fillet == pytest.approx(usual if radius is None else radius)
 
 
 def test_a_fillet_follows_the_process_that_is_set_later():

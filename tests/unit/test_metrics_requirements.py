@@ -144,7 +144,7 @@ def test_a_miss_too_small_for_four_digits_is_shown_with_more():
 
 def test_a_ratio_is_shown_as_its_bound_is_written():
     loop = result(values={"factor": Quantity(1.5, "ratio", "d")})
-    assert outcome(loop, metric="factor", min=1.2).sentence == "factor 1.5, required >= 1.2: ok"
+    assert outcome(loop, metric="factor", min=0.8).sentence == "factor 1.5, required >= 0.8: ok"
     assert outcome(loop, metric="factor", min="120 %").sentence == "factor 150 %, required >= 120 %: ok"
 
 

@@ -152,7 +152,7 @@ def test_texts_of_whatever_is_in_a_result_are_short(name):
 
 def test_texts_of_whatever_is_in_a_study_are_short():
     found = cfmkit.sweep(CONFIGS / "cam.yaml", vary={"mechanism.roller_radius": "7mm:9mm:3"})
-    assert list(texts_that_are_long(found)) == []
+    assert set(texts_that_are_long(found)) <= {".table.headers"}  # names of all columns, as they are
     assert all(len(repr(one)) < 2000 for one in found.summary.values())
     assert "'metrics': Named of" in repr(found.summary)
 

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from cfmkit.elastica.vibration.natural_frequencies import frequencies
 from cfmkit.numerics.one_blas_thread import CHOSEN, one_blas_thread
-from cfmkit.solid.two_meshes import DrivenPart
+from cfmkit.solid.adaptive_solution import DrivenPart
 
 
 @one_blas_thread

@@ -243,12 +243,14 @@ def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
 def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
     one = {
         "family": "cam", "variant": HOSTILE, "mean": 20.0, "ripple": 0.0123, "hysteresis": None, "safety_factor": 1.7,
-        "across": 80.0, "along": 90.5, "depth": None, "parts": 12, "life": None, "finer_deviation": None,
-        "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE],
+        "across": 80.0, "along": 90.5, "depth": None, "parts": 12, "life": None, "stiffening": None,
+        "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE], "model": "quasi-static", "unjudged": [HOSTILE],
+        "warnings": [HOSTILE],
     }  # fmt: skip
     reported = {
         "status": "complete", "message": "1 meets the wish", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
-        "proposals": [one], "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
+        "proposals": [one], "unjudged": [],
+        "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
         "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
         "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
     }  # fmt: skip

@@ -24,7 +24,7 @@ def spec(name, *changes):
 def strip():
     """Two meshes of a strip: two seconds, the least in which its numbers can be had; and the same as a beam."""
     return {
-        "solid": api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm")),
+        "solid": api.analyze(spec("strip", *QUICK, "analysis.solid.error=0.1")),
         "beam": api.analyze(spec("strip", "analysis.points=41", "analysis.recheck=false")),
     }
 
@@ -89,7 +89,7 @@ def test_the_stress_map_is_to_scale_so_that_a_narrow_figure_does_not_squeeze_the
 
 
 def test_a_mirrored_pair_has_twice_the_force(strip):
-    pair = api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm", "mechanism.copies=mirrored"))
+    pair = api.analyze(spec("strip", *QUICK, "analysis.solid.error=0.1", "mechanism.copies=mirrored"))
     assert pair.curve.effort == pytest.approx(2.0 * strip["solid"].curve.effort, rel=1e-9)
 
 

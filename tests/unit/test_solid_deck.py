@@ -18,7 +18,7 @@ from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
 from cfmkit.families.vcfm.plane_fem_analysis import part_of
 
-QUICK = ("analysis.solid.mesh=1 mm", "analysis.solid.poses=8", "analysis.travel=0.8 mm", "analysis.fidelity=solid")
+QUICK = ("analysis.solid.error=0.1", "analysis.solid.poses=8", "analysis.travel=0.8 mm", "analysis.fidelity=solid")
 
 
 def blocks(data):
@@ -52,7 +52,7 @@ def test_a_deck_read_back_is_the_mesh_that_is_solved(made):
         "vcfm-spring-as-beams.inp",
         "vcfm-spring.inp",
     ]
-    problem = part_of(spec, solved_leaf(spec)).meshed(1e-3).problem
+    problem = part_of(spec, solved_leaf(spec)).meshed().refined()[0].problem
     read = blocks(files["vcfm-leaf.inp"])
     nodes = np.array(numbers(next(lines for head, lines in read if head.startswith("*NODE, NSET=ALL"))))
     rows = np.array(numbers(next(lines for head, lines in read if head.startswith("*ELEMENT")))).astype(int)
@@ -206,7 +206,7 @@ mechanism:
   beams: {leaf: {start: root, end: tip}}
   drive: {kind: rotation, node: tip}
   part: {fillet: 0.5 mm}
-analysis: {travel: 10 deg, points: 11, fidelity: solid, solid: {poses: 5, mesh: 1 mm}}
+analysis: {travel: 10 deg, points: 11, fidelity: solid, solid: {poses: 5, error: 0.1}}
 """,
         encoding="utf-8",
     )
@@ -247,7 +247,7 @@ mechanism:
 analysis:
   travel: {travel}
   fidelity: solid
-  solid: {{poses: 5, mesh: 1.6 mm}}
+  solid: {{poses: 5, error: 0.1}}
 """
 PUSHED = {"drive": "{kind: displacement, node: tip, direction: -60 deg}", "travel": "5 mm"}
 TWISTED = {"drive": "{kind: rotation, node: tip}", "travel": "-30 deg"}
@@ -299,7 +299,7 @@ def test_calculix_runs_the_deck_of_a_strip_whose_driven_end_is_free(tmp_path, la
     reported, share = run_by_ccx(tmp_path, data)
     x, y = map(float, re.findall(r"for set ROOT-1 and time  0.1000000E\+01\s+(\S+)\s+(\S+)", reported)[0])
     (one,) = family("beam").driven_parts(spec)
-    pose = one.part.meshed(one.size).followed([0.0, 2.5e-3, 5e-3]).course.poses[-1]
+    pose = one.part.meshed().refined()[0].followed([0.0, 2.5e-3, 5e-3]).course.poses[-1]
     assert -(0.5 * x - np.sqrt(0.75) * y) / share == pytest.approx(pose.effort, rel=1e-3)
 
 
@@ -311,6 +311,6 @@ def test_calculix_finds_the_torque_on_an_end_that_is_turned_and_moves_freely(tmp
     fx, fy = map(float, re.findall(r"-ARM and time  0.1000000E\+01\s+\d+\s+(\S+)\s+(\S+)", reported)[0])
     c, s = np.cos(angle), np.sin(angle)
     (one,) = family("beam").driven_parts(spec)
-    pose = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
+    pose = one.part.meshed().refined()[0].followed(np.linspace(0.0, one.stops[-1], 3).tolist()).course.poses[-1]
     torque = (x * c - y * s) * fy - (x * s + y * c) * fx
     assert 1e-3 * torque / share == pytest.approx(pose.effort, rel=1e-3)

@@ -15,7 +15,7 @@ from cfmkit.solid.stress_along_fillets import FilletStress, arcs
 SHORT = {
     "mechanism.part.fillet": "0.3 mm",
     "analysis.travel": "0.3 mm", "analysis.window": ["0.1 mm", "0.3 mm"], "analysis.points": 11,
-    "analysis.solid.poses": 3, "analysis.solid.mesh": "0.4 mm",
+    "analysis.solid.poses": 3, "analysis.solid.error": 0.1,
 }  # fmt: skip
 
 

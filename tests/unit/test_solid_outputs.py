@@ -71,7 +71,7 @@ def test_reactions_of_a_mirrored_part_are_those_of_the_half_that_is_described(ve
     assert -2.0 * shuttle[1] == pytest.approx(one.curve.effort, abs=5e-4 * np.abs(one.curve.effort).max())
     alone = columns(vee["solid"], "shuttle", FORCES)
     for half, whole in zip(shuttle, alone, strict=True):
-        assert half == pytest.approx(whole, abs=0.01 * np.abs(whole).max())
+        assert half == pytest.approx(whole, abs=0.02 * np.abs(whole).max())
 
 
 def test_the_material_around_a_point_tells_its_motion_and_its_turn():

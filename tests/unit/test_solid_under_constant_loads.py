@@ -19,7 +19,7 @@ SLENDER = {
     "mechanism.thickness": "0.25 mm",
     "mechanism.part.fillet": "0 mm",
     "analysis.travel": "0.4 mm",
-    "analysis.solid.mesh": "0.125 mm",
+    "analysis.solid.error": 0.1,
     "analysis.outputs.nodes": ["middle"],
 }
 MIDDLE = {"kind": "point", "node": "middle", "fx": "0.03 N", "fy": "0.1 N", "moment": "0.2 N*mm"}

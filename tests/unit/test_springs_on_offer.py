@@ -75,7 +75,8 @@ def test_a_spring_shorter_than_its_place_is_tight_at_the_start_and_the_cam_is_cu
         "counts": (2,),
     }
     found = chosen((bought,), rolling_friction=0)
-    assert found.spec.mechanism.springs.preload == pytest.approx(0.008)
+    assert found.spec.mechanism.springs.preload == pytest.approx(0.006)
+    assert found.spec.mechanism.profile.preload == pytest.approx(0.006 + 1.38 / 690.0)
     np.testing.assert_allclose(analyze(found.spec).curve.force, 50.0, rtol=1e-9)
 
 
@@ -119,8 +120,8 @@ def test_a_list_may_be_a_file(tmp_path):
     pulled = offers(source, "extension")
     assert [(one.name, one.counts) for one in pulled] == [("E-1", (1, 2)), ("E-2", (2,))]
     assert pulled[0].rate == pytest.approx(550.0)
-    assert pulled[1].rate == pytest.approx(72e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
-    assert offers(source, "torsion")[0].rate == pytest.approx(190e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
+    assert pulled[1].rate == pytest.approx(81.5e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
+    assert offers(source, "torsion")[0].rate == pytest.approx(206e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
 
 
 @pytest.mark.parametrize(
@@ -146,9 +147,11 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, reported):
         (b"name,stiffness [N/mm]\nA,1\nA,2\n", "csv:3: there are two springs 'A' with different values"),
         (b"name,stiffness [N/mm]\n", "lists no spring"),
         (b"", "lists no spring"),
-        (b"\xff\xfen\x00", "byte 1 is not UTF-8"),
-        (b"name;stiffness [N/mm]\nA;0,4\n", "cells are separated by commas"),
+        (b"\x00\x01\x02name", "is not a text file"),
+        (b"name;stiffness [N/mm]\nA;1.000,4\n", "csv:2: stiffness: '1.000,4' has a comma"),
         (b"name,stiffness [N/mm],fatigue\nA,1,x\n", "'fatigue' is not a column"),
+        (b"name,stifness,price\nA,1,x\n", "'stifness' is not a column of a list of springs; did you mean 'stiffness'?"),
+        (b"name,stiffness [N/mm],limit [mm]\nA,1,3\n", "'limit' is not a column of a list of springs; columns are"),
         (b"stiffness [N/mm]\n1\n", "csv:2: name: missing"),
     ],
 )
@@ -158,6 +161,23 @@ def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data
         offers(DataSource("springs.csv", tmp_path), "extension")
     assert reported in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("name;stiffness [N/mm];max_elongation [mm];Preis [€]\nFeder-1;0,55;165;2,80\n", "utf-8"),
+        ("name;stiffness [N/mm];max_elongation [mm];Händler\nFeder-1;0,55;165;Müller\n", "latin-1"),
+        ("\n;;\nName;Stiffness (N/mm);Max elongation (mm)\nFeder-1;0,55;165\n", "utf-8-sig"),
+        ("name\tstiffness [N/mm]\tmax_elongation [mm]\nFeder-1\t0.55\t165\n", "utf-16"),
+        ("name|stiffness [N/mm]|max_elongation [mm]|price\nFeder-1|0.55|165|3\n", "utf-8"),
+        ("name,stiffness [N/mm],max_load [N],initial_tension [N]\nFeder-1,0.55,92.75,2\n", "utf-8"),
+    ],
+)
+def test_lists_of_springs_as_makers_and_spreadsheets_write_them(tmp_path, text, encoding):
+    (tmp_path / "springs.csv").write_bytes(text.encode(encoding))
+    (one,) = offers(DataSource("springs.csv", tmp_path), "extension")
+    assert (one.name, one.rate, one.largest) == ("Feder-1", pytest.approx(550.0), pytest.approx(0.165))
 
 
 def test_cells_of_a_file_have_the_units_of_its_header(tmp_path):
@@ -363,4 +383,4 @@ def test_a_pair_needs_every_spring_twice():
     spec, _ = cranked()
     pair = spec.replace({"mechanism.copies": "mirrored"})
     counts = [family("slider-crank").analyze(one, Run()).tables["parts"]().columns[2].cells() for one in (spec, pair)]
-    assert counts == [[2, 1, 1], [4, 2, 2]]
+    assert counts == [[2, 2, 2], [4, 4, 4]]

@@ -1,7 +1,10 @@
 """One live run per folder; the lock dies with it and with nothing else."""
 
+import errno
 import multiprocessing
 import os
+import platform
+import signal
 import subprocess
 import sys
 import threading
@@ -11,7 +14,8 @@ import pytest
 from store_support import INFO, enter_and_leave, listing, one_line, run
 
 from cfmkit.errors import FolderInUse, OutputError
-from cfmkit.store import RunFolder, lock, safe_disk_changes
+from cfmkit.store import RunFolder, lock, run_folder, safe_disk_changes
+from cfmkit.studies.journal import Journal
 
 # ---- the lock
 
@@ -119,7 +123,8 @@ def test_a_forked_worker_neither_drops_nor_keeps_the_lock(tmp_path):
 
 
 def test_a_lock_file_without_a_signature_is_still_a_lock(tmp_path, waits):
-    code = "import fcntl, sys; f = open(sys.argv[1], 'w'); fcntl.lockf(f, fcntl.LOCK_EX); print(1, flush=True); input()"
+    code = "import filelock, sys; f = open(sys.argv[1], 'w'); filelock.lock_descriptor(f.fileno())"
+    code += "; print(1, flush=True); input()"
     command = [sys.executable, "-c", code, str(tmp_path / ".cfmkit.lock")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
@@ -182,3 +187,139 @@ def test_runs_that_come_and_go_never_trip_over_each_other(tmp_path):
     assert entered.value > 0
     # A run that did not create the folder leaves it, so it may be there; but it is empty.
     assert listing(tmp_path) in ([], ["a"], ["a", "a/out"])
+
+
+# ---- file systems without locks
+
+
+ENTER = "import sys; from cfmkit.store import RunFolder\nwith RunFolder(sys.argv[1]) as folder: folder.commit({})"
+WITHOUT = {
+    "no flock": "import errno, fcntl\ndef no(*_): raise OSError(errno.{code}, 'no')\nfcntl.flock = fcntl.lockf = no",
+    "no fcntl": "import sys\nsys.modules['fcntl'] = None",
+}
+
+
+@pytest.fixture(params=["ENOSYS", "ENOLCK", "EOPNOTSUPP", "no fcntl"])
+def program(request, tmp_path):
+    """A program that has no locks: Lustre without `flock`, NFS without its lock service, a system without `fcntl`."""
+    kind = "no fcntl" if request.param == "no fcntl" else "no flock"
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT[kind].format(code=request.param))
+
+    def start(code, *arguments):
+        return subprocess.Popen(
+            [sys.executable, "-c", code, str(tmp_path / "out"), *arguments],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        )  # fmt: skip
+
+    return start
+
+
+def test_without_file_locks_a_file_marks_the_live_run_and_a_message_says_so(tmp_path, program):
+    with program(HOLDER) as first:
+        assert first.stdout.readline() == "locked\n"
+        second = program(ENTER).communicate()[1]
+        assert "FolderInUse" in second
+        assert f"in use by a live run (process {first.pid}); if no run is there any more, remove" in second
+        told = first.communicate("\n")[1]
+    assert first.returncode == 0
+    assert told.splitlines() == [
+        f"warning  no file locks in {tmp_path}: the file .cfmkit.softlock marks a live run (--no-lock: none)"
+    ]
+    assert listing(tmp_path / "out") == ["a.csv", "manifest.json"]
+
+
+def test_without_file_locks_the_mark_of_a_run_that_was_killed_is_taken_over(tmp_path, program):
+    with program(HOLDER) as first:
+        assert first.stdout.readline() == "locked\n"
+        first.kill()
+    assert lock.lock_files(tmp_path / "out") == (lock.SOFT_LOCK,)
+    with program(ENTER) as second:
+        second.communicate()
+    assert second.returncode == 0
+    assert listing(tmp_path / "out") == ["manifest.json"]
+
+
+def test_without_file_locks_a_forked_worker_neither_drops_nor_keeps_the_mark(tmp_path, program):
+    (tmp_path / "out").mkdir()
+    with program(FORKER) as forker:
+        shown = forker.communicate()[0]
+    assert shown.splitlines() == ["FolderInUse", "CfmError", "['.cfmkit.softlock']"]
+    with program(ENTER) as second:
+        second.communicate()
+    assert second.returncode == 0
+
+
+@pytest.fixture
+def no_locks(monkeypatch):
+    monkeypatch.setattr(lock, "_try", lambda _: None)
+
+
+def test_without_file_locks_the_run_of_another_computer_is_believed_and_named(tmp_path, no_locks):
+    (tmp_path / lock.SOFT_LOCK).write_text("4711\nelsewhere\n")
+    with pytest.raises(FolderInUse, match=r"process 4711 on elsewhere\); if .* remove .*softlock or add --no-lock"):
+        run(tmp_path, a_csv=b"1")
+    (tmp_path / lock.SOFT_LOCK).unlink()
+    run(tmp_path, a_csv=b"1")
+
+
+def test_without_file_locks_two_runs_in_one_process_conflict(tmp_path, no_locks):
+    with RunFolder(tmp_path) as folder:
+        with pytest.raises(FolderInUse, match=f"process {os.getpid()}"), RunFolder(tmp_path):
+            pass
+        assert folder.lock_file == lock.SOFT_LOCK
+        (tmp_path / lock.SOFT_LOCK).unlink()
+        with pytest.raises(OutputError, match="was removed during the run"):
+            folder.commit(INFO)
+
+
+def test_no_lock_locks_nothing(tmp_path, monkeypatch):
+    with RunFolder(tmp_path / "out") as first, lock.without_locks():
+        run(tmp_path / "out", a_csv=b"1")
+        assert first.lock_file == lock.LOCK
+    assert lock.NO_LOCK not in os.environ
+    monkeypatch.setenv(lock.NO_LOCK, "1")
+    with RunFolder(tmp_path / "out") as folder:
+        assert folder.lock_file == ""
+        assert listing(tmp_path / "out") == ["a.csv", "manifest.json"]
+        folder.commit(INFO)
+    assert listing(tmp_path / "out") == ["manifest.json"]
+
+
+# ---- Windows, as far as Linux can stand in for it
+
+
+def test_a_lock_file_can_be_read_without_its_first_byte(tmp_path):
+    """Windows lets no other process read the byte that is locked."""
+    with RunFolder(tmp_path):
+        text = (tmp_path / lock.LOCK).read_bytes()
+    assert text[1:] == f"{os.getpid()} {platform.node()}\n".encode()
+
+
+def test_a_system_that_opens_no_folders_and_has_no_pread_writes_a_run(tmp_path, monkeypatch):
+    real_open = os.open
+
+    def opened(path, *rest, **more):
+        if os.path.isdir(path):
+            raise PermissionError(errno.EACCES, "folders cannot be opened", path)
+        return real_open(path, *rest, **more)
+
+    for name in ("O_DIRECTORY", "O_NOFOLLOW", "pread", "pwrite"):
+        monkeypatch.delattr(os, name)
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    monkeypatch.setattr(os, "open", opened)
+    run(tmp_path, a_csv=b"1", figures__x_png=b"2")
+    run(tmp_path, a_csv=b"3")
+    assert listing(tmp_path) == ["a.csv", "manifest.json"]
+    with Journal(tmp_path / "journal") as journal:
+        place = journal.add("0" * 32, [1, 2])
+        assert journal.read(place, "0" * 32) == [1, 2]
+    with Journal(tmp_path / "journal") as journal:
+        assert journal.find("0" * 32) == 0
+
+
+def test_no_process_is_asked_by_a_signal_whether_it_lives_where_that_would_reach_it(monkeypatch):
+    """On Windows 0 is the number of Ctrl-C."""
+    monkeypatch.setattr(os, "kill", lambda *_: pytest.fail("a signal was sent"))
+    monkeypatch.setattr(run_folder.os, "name", "nt")
+    assert not run_folder._alive(os.getpid())

@@ -2,22 +2,25 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cfmkit
 from cfmkit.errors import UsageError
+from cfmkit.studies import serial_and_cluster_executors as executors
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import grid
 from cfmkit.studies.point_evaluation import Study
 from cfmkit.studies.pool import Pool
-from cfmkit.studies.serial_and_cluster_executors import Cluster
+from cfmkit.studies.serial_and_cluster_executors import Cluster, stamp_of
 from cfmkit.studies.sweep_request_and_files import outputs, summary_of
 from cfmkit.studies.varied_axes import axes, wish
 
@@ -36,27 +39,49 @@ def values(records):
     return np.concatenate([rows.values for _, rows in records.batches()])
 
 
+class Place:
+    """A scheduler in a process of its own, and workers in others."""
+
+    def __init__(self, folder):
+        self.folder, self.file, self.workers = folder, folder / "scheduler.json", []
+        options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(self.file)]
+        self.boss = self._start("dask_scheduler", *options)
+        until(self.file.exists)
+        self.address = json.loads(self.file.read_text())["address"]
+
+    def _start(self, program, *options, **environment):
+        command = [sys.executable, "-P", "-W", "ignore", "-m", f"distributed.cli.{program}", *options]
+        nowhere = subprocess.DEVNULL
+        return subprocess.Popen(
+            command, stdout=nowhere, stderr=nowhere, env=os.environ | environment, cwd=self.folder
+        )  # fmt: skip
+
+    def add_worker(self, **environment):
+        options = ["--scheduler-file", str(self.file), "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"]
+        options += ["--no-nanny", "--local-directory", str(self.folder)]
+        self.workers.append(self._start("dask_worker", *options, **environment))
+
+    def wait_for(self, count):
+        with distributed.Client(self.address, timeout=30, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=60)
+
+
 @pytest.fixture
-def scheduler(tmp_path):
+def place(tmp_path):
+    place = Place(tmp_path)
+    yield place
+    for process in (*place.workers, place.boss):
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(place):
     """Start a scheduler and two workers in processes of their own; yield its address and the workers."""
-    place = tmp_path / "scheduler.json"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    module = [sys.executable, "-W", "ignore", "-m"]
-    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(place)]
-    boss = subprocess.Popen([*module, "distributed.cli.dask_scheduler", *options], **quiet)
-    serve = ["--scheduler-file", str(place), "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"]
-    serve += ["--no-nanny", "--local-directory", str(tmp_path)]
-    workers = [subprocess.Popen([*module, "distributed.cli.dask_worker", *serve], **quiet) for _ in range(2)]
-    try:
-        until(place.exists)
-        address = json.loads(place.read_text())["address"]
-        with distributed.Client(address, timeout=30, set_as_default=False) as client:
-            client.wait_for_workers(2, timeout=60)
-        yield address, workers
-    finally:
-        for process in (*workers, boss):
-            process.kill()
-            process.wait()
+    place.add_worker()
+    place.add_worker()
+    place.wait_for(2)
+    return place.address, place.workers
 
 
 def test_a_cluster_gives_the_rows_of_one_process_though_a_worker_is_killed(scheduler):
@@ -104,19 +129,91 @@ def workers_of_this_process():
 class Killer:
     """A monitor that kills the first worker once so many points are done."""
 
-    def __init__(self, workers, after):
-        self.workers, self.after, self.count, self.killed = workers, after, 0, 0
+    def __init__(self, workers, after, kill=True):
+        self.workers, self.after, self.kill, self.count, self.killed = workers, after, kill, 0, 0
 
     def total(self, points): ...
 
     def done(self, points, failed, reused):
         self.count += points
         if self.count >= self.after and not self.killed:
-            self.killed = self.workers()[0]
-            os.kill(self.killed, signal.SIGKILL)
+            self.killed = self.workers()[0] or True
+            if self.kill:
+                os.kill(self.killed, signal.SIGKILL)
 
     def stopping(self):
         return False
+
+
+# ---- whose numbers
+
+
+@pytest.fixture
+def other_code(tmp_path):
+    """A copy of the package in which one number is another one."""
+    shutil.copytree(
+        Path(cfmkit.__file__).parent, tmp_path / "copy/cfmkit", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    with (tmp_path / "copy/cfmkit/families/cam/statics.py").open("a") as file:
+        file.write("\nCHANGED = 1\n")
+    return str(tmp_path / "copy")
+
+
+def test_a_worker_with_other_code_is_refused_by_name_before_anything_is_computed(place, other_code):
+    place.add_worker()
+    place.add_worker(PYTHONPATH=other_code)
+    place.wait_for(2)
+    watch = Killer(lambda: pytest.fail("a point was computed"), 1)
+    with pytest.raises(
+        UsageError, match=r"the worker tcp://127\.0\.0\.1:\d+ has other code: content \w+ inst"
+    ) as caught:
+        run(work(20), Cluster(place.address), monitor=watch)
+    assert caught.value.exit_code == 2
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_worker_with_other_code_that_joins_later_computes_nothing(place, other_code):
+    place.add_worker()
+    place.wait_for(1)
+    rows = Killer(lambda: [place.add_worker(PYTHONPATH=other_code)], 3, kill=False)
+    with pytest.raises(UsageError, match=r"the worker tcp://127\.0\.0\.1:\d+ on \S+ has other code: content"):
+        run(work(100_000), Cluster(place.address), monitor=rows)
+    assert rows.count >= 3
+
+
+def test_other_libraries_are_other_code(monkeypatch):
+    monkeypatch.setattr(executors, "_worker_name", lambda: "w")
+    executors._stamp_of_worker.cache_clear()
+    theirs = dict(stamp_of("cam")) | {"numpy": "1.0"}
+    outcome = executors.do_parcel(theirs, "cam", b"not even read")
+    assert (outcome.worker, outcome.stamp) == ("w", stamp_of("cam"))
+    assert set(theirs) > {"cfmkit", "content", "python", "numba", "scipy"}
+
+
+# ---- who is not there
+
+
+def test_no_workers_for_a_stated_time_end_a_study(place, monkeypatch):
+    monkeypatch.setattr(executors, "WORKERS_WITHIN", 1)
+    with pytest.raises(UsageError, match=rf"{place.address}: no worker for 1 s; start some with 'dask worker tcp"):
+        run(work(2), Cluster(place.address))
+
+
+def test_workers_that_all_leave_end_a_study(place, monkeypatch):
+    place.add_worker()
+    place.wait_for(1)
+    monkeypatch.setattr(executors, "WORKERS_WITHIN", 2)
+    with pytest.raises(UsageError, match=r"no worker for 2 s; .*; what is finished is kept"):
+        run(work(100_000), Cluster(place.address), monitor=Killer(lambda: [place.workers[0].pid], 3))
+
+
+def test_a_scheduler_that_dies_ends_a_study_in_one_line(place, capfd):
+    place.add_worker()
+    place.wait_for(1)
+    with pytest.raises(UsageError, match=r"the Dask scheduler has gone; what is finished is kept") as caught:
+        run(work(100_000), Cluster(place.address), monitor=Killer(lambda: [place.boss.pid], 3))
+    assert len(str(caught.value).splitlines()) == 1
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):

@@ -1,5 +1,7 @@
 """A pool of processes: what a death costs, what a timeout costs, and that nothing hangs."""
 
+import gc
+import math
 import os
 import random
 import signal
@@ -7,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ import pytest
 from cfmkit.errors import CfmError
 from cfmkit.results import Status
 from cfmkit.studies import pool as pools
+from cfmkit.studies import serial_and_cluster_executors as executors
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.serial_and_cluster_executors import Lost, never, serial
 
@@ -38,8 +42,32 @@ def test_every_job_is_done_once_by_every_executor(doer):
         assert done == [(n, n * n) for n in range(200)]
 
 
+class Ring:
+    def __init__(self):
+        self.ring = self
+
+
+def test_memory_that_finished_jobs_have_left_is_freed_while_a_study_runs(monkeypatch):
+    """Objects that refer to each other, few and large: Python alone would not look for them before the end."""
+    monkeypatch.setattr(executors, "COLLECTION_SHARE", math.inf)
+    seen, alive_at_once, frozen = [], [], gc.get_freeze_count()
+
+    def leaving(job):
+        seen.append(weakref.ref(Ring()))
+        alive_at_once.append(sum(one() is not None for one in seen))
+        return job
+
+    gc.disable()
+    try:
+        assert [job for job, _ in serial(leaving, iter(range(200)))] == list(range(200))
+    finally:
+        gc.enable()
+    assert max(alive_at_once) < 50
+    assert gc.get_freeze_count() == frozen
+
+
 def test_no_jobs_start_no_process(doer, monkeypatch):
-    monkeypatch.setattr(pools, "_started", lambda _what: pytest.fail("a process was started"))
+    monkeypatch.setattr(pools, "_started", lambda: pytest.fail("a process was started"))
     assert list(Pool(2)(doer, iter(()))) == []
 
 
@@ -47,8 +75,8 @@ def test_what_runs_when_the_time_of_all_is_up_is_given_up(doer):
     begun = time.monotonic()
     done = list(Pool(2, deadline=time.time() + 0.6)(doer, iter([(1, "square"), (2, "hang"), (3, "hang"), (4, "hang")])))
     assert time.monotonic() - begun < 5.0
-    assert {job[0]: outcome for job, outcome in done if job[0] == 1} in ({1: 1}, {})
-    lost = [outcome for job, outcome in done if job[1] == "hang"]
+    assert {outcome for job, outcome in done if job[0] == 1 and not isinstance(outcome, Lost)} <= {1}
+    lost = [outcome for _, outcome in done if isinstance(outcome, Lost)]  # on a busy machine the first one, too
     assert 1 <= len(lost) <= 2
     assert all(one.status is Status.TIMEOUT for one in lost)
 

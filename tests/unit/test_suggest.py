@@ -12,7 +12,6 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.verbs.suggest import SuggestOptions, keys, room, seconds
-from cfmkit.curves import Curve
 from cfmkit.designing.run_many_starts import NEVER
 from cfmkit.errors import SolutionError, SpecError, UsageError
 from cfmkit.families import family
@@ -23,7 +22,7 @@ from cfmkit.families.slider_crank.flattest_springs_that_fit import flattest_spri
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import _turning, wound
 from cfmkit.families.wishes import FamilyOffer
-from cfmkit.results import Result, Status
+from cfmkit.results import Status
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import exit_code, message
 from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
@@ -31,7 +30,6 @@ from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.offer_type_and_generic_series import SHEAR_SHARE
 from cfmkit.studies.serial_and_cluster_executors import Lost
 from cfmkit.studies.suggest import pareto_and_scale_drawings, proposal_making_and_judging, search, yield_of_proposal
-from cfmkit.studies.suggest.comparison_with_better_model import NOT_COMPARED, _mean, with_better_models
 from cfmkit.studies.suggest.eased_wish import nearest
 from cfmkit.studies.suggest.proposal_making_and_judging import ENDED_EARLY, OUT_OF_TIME, Proposal, ProposalJob, made
 from cfmkit.studies.suggest.search import RESERVE, RESERVE_OF_FEW, _Times, ordered, suggest
@@ -77,9 +75,12 @@ def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_know
     asked, candidates = offered("vcfm", **keys, material=LASTING)
     coiled = next(one for one in candidates if one.variant == "2 Vs, catalogue springs")
     one = made(ProposalJob("vcfm", coiled, asked, 0))
-    assert one.good, one.missed or one.message
-    assert "fatigue_life" in {requirement.metric for requirement in one.spec.requirements}
+    assert one.passes, one.missed or one.message
+    (life,) = (requirement for requirement in one.spec.requirements if requirement.metric == "fatigue_life")
+    assert [str(end) for end in life.over] == ["0 %", "100 %"] or tuple(life.over) == (0.0, 1.0)
     assert one.numbers["life"] is None
+    assert one.unjudged == ("life not judged: no S-N data for the wire of its springs",)
+    assert not one.good
 
 
 def test_a_family_that_fails_to_answer_does_not_look_as_if_the_time_were_up():
@@ -115,33 +116,6 @@ def test_a_bug_costs_its_own_candidate_only_and_keeps_its_traceback(monkeypatch,
     assert 'raise KeyError("analysis.window")' in found.bugs[0]
     assert exit_code(found) == 70
     assert message(found) == "bugs in cfmkit ended every candidate"
-
-
-def test_a_mean_is_that_of_the_metrics_whatever_way_the_curve_takes():
-    """One that turns back is not put in the order of its motion; one that ends early has none."""
-    spec = cfmkit.load(WISHES.parents[1] / "configs" / "cam.yaml").replace({"requirements": ()})
-
-    def mean(window, motion, effort, status=Status.COMPLETE):
-        one = np.full(len(motion), ""), np.ones(len(motion), dtype=bool)
-        curve = Curve(motion, effort, *one, {}, "force", {})
-        changed = spec.replace({"analysis.window": window})
-        return _mean(Result(changed, status, "", (curve,), travel=(motion[0], motion[-1])))
-
-    part = np.linspace(0.0, 1.0, 301)
-    there_and_back = (np.interp(part, [0, 0.4, 0.6, 1], moved) for moved in ([0, 0.03, 0.02, 0.05], [0, 90, 10, 50]))
-    assert mean(("10 mm", "45 mm"), *there_and_back) == pytest.approx(43.58, abs=0.01)
-    back = np.linspace(0.0, -0.05, 101)
-    assert mean(("-40 mm", "-10 mm"), back, 50.0 + 100.0 * back) == pytest.approx(47.5)
-    short = np.linspace(0.0, 0.03, 101)
-    assert mean(("10 mm", "45 mm"), short, 50.0 + 0.0 * short, Status.PARTIAL) is None
-    assert mean(("10 mm", "100 %"), short, 50.0 + 0.0 * short) == pytest.approx(50.0)
-
-
-def test_a_comparison_that_the_time_ends_does_not_ask_for_the_option_that_was_given():
-    asked, candidates = offered("beam")
-    one = made(ProposalJob("beam", candidates[0], asked, 0))
-    compared = with_better_models(search.Suggestions(asked, (one,), (), ()), Run(time_budget=0.0), True)
-    assert compared.proposals[0].notes[0] == f"not compared with the model 'solid': {NOT_COMPARED}"
 
 
 def test_options_replace_keys_of_a_file(tmp_path):
@@ -205,19 +179,6 @@ def test_what_misses_a_wish_says_which():
     assert any("across the travel" in reported for reported in one.missed)
 
 
-def test_the_ripple_of_an_adjustable_force_is_that_of_each_direction():
-    """With friction the loop counted as ripple: 1 % in each direction and 3.5 % between them were refused at 3 %."""
-    motion = np.array([0.0, 1.5e-3, 3e-3, 3e-3, 1.5e-3, 0.0])
-    effort = np.array([1.01, 1.0, 1.01, 0.975, 0.965, 0.965])
-    branch = np.repeat(["load", "unload"], 3)
-    ends = tuple(Curve(motion, force * effort, branch) for force in (8.0, 12.2))
-    result = SimpleNamespace(spec=SimpleNamespace(at=lambda _path: (0.0, 3e-3)), curves=ends)
-    asked = wish(adjustable="[8 N, 12 N]")
-    assert not list(proposal_making_and_judging._badly_adjusted(asked, result))
-    reported = tuple(proposal_making_and_judging._badly_adjusted(replace(asked, ripple=0.005), result))
-    assert [one[:17] for one in reported] == ["changes by 1.03 %"] * 2
-
-
 PRINTED_CAM = {"force": "[9.7 N, 10.3 N]", "process": "fdm"}
 """Of which the first proposals have yields between nothing and two thirds."""
 
@@ -265,20 +226,21 @@ def offered(name, **keys):
 def test_other_springs_and_leaves_do_what_is_wished(variant):
     asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]")
     one = made(ProposalJob("vcfm", next(each for each in candidates if each.variant == variant), asked, 0))
-    assert one.good, one.missed or one.message
+    assert one.passes, one.missed or one.message
     kinds = one.spec.mechanism.kinds
     assert kinds == {"2 Vs, folded spring": ("folded", "v-beam"), "2 cosine arches": ("diamond", "cosine")}[variant]
 
 
 @pytest.mark.parametrize("adjustable", [None, "[11.14 N, 15.4 N]"])
 def test_where_no_diamond_fits_leaves_stand_on_bought_springs(adjustable):
-    """The shipped V-beam on compression springs, read off its analysis, with 15 % more room."""
+    """A V-beam on slender compression springs, read off its analysis, with 15 % more room."""
     block = "{youngs_modulus: 1477 MPa, poisson_ratio: 0.3, yield_strength: 30.5 MPa}"
     keys = {"force": "11.14 N", "travel": "3.23 mm", "ripple": "0.6 %", "room": "[92.2 mm, 71.4 mm, 4.1 mm]"}
     more = {} if adjustable is None else {"adjustable": adjustable}
     asked, candidates = offered("vcfm", **keys, material=block, **more)
-    one = made(ProposalJob("vcfm", candidates[0], asked, 0))
-    assert one.good, one.missed or one.message
+    assert candidates[0].variant == "2 Vs, catalogue springs"
+    one = next(one for each in candidates if (one := made(ProposalJob("vcfm", each, asked, 0))).passes)
+    assert "spring_buckles" not in {item.name for item in cfmkit.analyze(one.spec).warnings}
     springs = one.spec.mechanism.springs
     assert springs.name.startswith("generic-")
     assert one.numbers["parts"] == 2 + springs.count
@@ -290,7 +252,7 @@ def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
     asked, candidates = offered("vcfm", room="[90 mm, 60 mm, 15 mm]", ripple="9 %")
     hybrid = next(each for each in candidates if each.variant == "2 hybrid Vs")
     one = made(ProposalJob("vcfm", hybrid, asked, 0))
-    assert one.good, one.missed or one.message
+    assert one.passes, one.missed or one.message
     assert one.spec.mechanism.bistable.structure == "hybrid"
 
 
@@ -301,7 +263,7 @@ def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
     for variant in ("strip", "pair of strips"):
         first = next(each for each in candidates if each.variant == variant)
         found[variant] = made(ProposalJob("slider-crank", first, asked, 0))
-        assert found[variant].good, found[variant].missed
+        assert found[variant].passes, found[variant].missed
     pair, single = (found[name].numbers for name in ("pair of strips", "strip"))
     assert pair["parts"] == 2
     assert 0.4 < pair["depth"] / single["depth"] < 0.7
@@ -357,7 +319,7 @@ def test_what_was_found_before_the_time_was_up_is_kept(monkeypatch):
 
 @pytest.mark.parametrize(("count", "reported"), [(1, "1 mechanism meets the wish"), (2, "2 mechanisms meet the wish")])
 def test_one_proposal_is_told_of_in_the_singular(count, reported):
-    assert message(SimpleNamespace(proposals=("one", "other")[:count], late=False)) == reported
+    assert message(SimpleNamespace(proposals=("one", "other")[:count], unjudged=(), late=False)) == reported
 
 
 def test_a_candidate_whose_time_is_up_is_not_made():
@@ -411,7 +373,7 @@ def test_a_low_room_and_a_narrow_one_get_networks_that_were_shaped_for_them(room
     first = function_named(family("beam").propose)(asked, Run()).candidates[0]
     assert first.variant == shape
     found = made(ProposalJob("beam", first, asked, 0))
-    assert found.good, found.missed
+    assert found.passes, found.missed
     assert found.numbers["ripple"] < 0.025
 
 
@@ -451,7 +413,8 @@ def long_names(count):
     spec = cfmkit.load(WISHES.parents[1] / "configs" / "cam.yaml")
     numbers = {"across": 0.05, "along": 0.05, "ripple": 0.01, "safety_factor": 1.5}
     variant = "catalogue springs of the widest sort, 138 x 93.8 mm (2)"
-    return [SimpleNamespace(family="cam", variant=variant, spec=spec, numbers=numbers) for _ in range(count)]
+    text = cfmkit.dumps(spec)
+    return [Proposal("cam", variant, text, numbers=numbers) for _ in range(count)]
 
 
 @pytest.mark.parametrize("drawn", [pareto_and_scale_drawings.pareto, pareto_and_scale_drawings.to_one_scale])
@@ -492,7 +455,7 @@ def test_the_nearest_wish_gets_a_proposal_when_it_is_asked():
         text = f"[{value.replace(' x ', ', ')}]" if key == "room" else value
         again = wish(**{"room": "[26 mm, 20 mm, 12 mm]", key: text})
         jobs = [ProposalJob("beam", one, again, 0) for one in propose(again, Run()).candidates[:3]]
-        assert any(made(job).good for job in jobs), key
+        assert any(made(job).passes for job in jobs), key
 
 
 @pytest.mark.parametrize("materials", ["pla", "[pla, pom, abs]"])
@@ -536,15 +499,20 @@ def test_springs_at_pins_are_of_wire_that_bears_the_motion_and_fit_the_room(torq
 
 
 def test_springs_at_pins_stay_within_the_depth_wished():
-    """Ground, crank and coupler are 1 mm thick each; the pivot's spring is below them and all others are above."""
+    """Ground, crank and coupler are 1 mm thick each; the pivot's spring is below them and all others are above.
+
+    All of them are longest when they are wound up.
+    """
     keys = {"torque": "100 N*mm", "angle": "60 deg", "ripple": "5 %", "room": "[150 mm, 150 mm, 12 mm]"}
     asked = wish_of(None, keys).wish()
     offered = function_named(family("slider-crank").propose)(asked, Run()).candidates
     tried = (made(ProposalJob("slider-crank", one, asked, 0)) for one in offered[10:])
     one = next(one for one in tried if one.good)
-    springs = one.spec.mechanism.springs
+    springs, turned = one.spec.mechanism.springs, cfmkit.analyze(one.spec).values
     high = {
-        at: springs.coils_at(at)[0].body_length for at in ("pivot", "crank_pin", "slider_pin") if springs.coils_at(at)
+        at: springs.coils_at(at)[0].body_length_wound_up(turned[f"{at}_rotation_max"].value)
+        for at in ("pivot", "crank_pin", "slider_pin")
+        if springs.coils_at(at)
     }
     assert one.numbers["depth"] == pytest.approx(3e-3 + high.pop("pivot", 0.0) + max(high.values()))
     assert one.numbers["depth"] <= 12e-3
@@ -588,7 +556,8 @@ def test_more_torque_than_the_bound_is_held_by_no_springs():
 
 
 def pinned_for_force(force, room):
-    asked = wish_of(None, {"force": force, "travel": "20 mm", "ripple": "5 %", "room": room, "material": "pla"}).wish()
+    keys = {"force": force, "travel": "20 mm", "ripple": "5 %", "room": room, "material": "steel-s235"}
+    asked = wish_of(None, keys).wish()
     offer = function_named(family("slider-crank").propose)(asked, Run())
     return asked, offer, [one for one in offer.candidates if one.variant == "springs at pins"]
 
@@ -627,7 +596,7 @@ def test_what_is_not_known_of_a_proposal_does_not_make_it_the_best(name, key):
 
 @pytest.mark.parametrize(("kind", "make"), [("torsion", torsion_spring), ("extension", extension_spring)])
 def test_the_stiffest_spring_that_fits_is_just_the_last_that_can_be_made(kind, make):
-    for deflection, widest, long in [(0.3, 8e-3, 20e-3), (0.02, 5e-3, 60e-3), (1.5, 12e-3, 9e-3)]:
+    for deflection, widest, long in [(0.3, 8e-3, 20e-3), (0.02, 5e-3, 60e-3), (1.5, 12e-3, 10e-3)]:
         far = deflection if kind == "torsion" else 0.02 * deflection
         rate = float(stiffest(kind, np.array([far]), widest, long)[0])
         last, none = (make(share * rate, far, long) for share in (0.98, 1.02))
@@ -642,11 +611,15 @@ def test_a_torque_over_a_quarter_of_a_turn_is_held_by_springs_that_are_wound_up_
 
 
 def test_a_shape_whose_pads_do_not_shrink_with_it_fits_the_room():
-    """An arch of half the size, read off its analysis, with 15 % more room: the pads are as large as ever."""
+    """An arch of half the size, read off its analysis, with 15 % more room: the pads are as large as ever.
+
+    What it misses is the band, to which wide beams add 7 %.
+    """
     keys = {"force": "0.4384 N", "travel": "2.55 mm", "ripple": "1.44 %", "room": "[39.6 mm, 12.2 mm, 9.2 mm]"}
     asked = wish_of(None, keys | {"process": "laser"}).wish()
     offered = function_named(family("beam").propose)(asked, Run()).candidates
-    assert any(made(ProposalJob("beam", one, asked, 0)).good for one in offered)
+    missed = [made(ProposalJob("beam", one, asked, 0)).missed for one in offered]
+    assert any(all("needs" not in miss for miss in misses) for misses in missed)
 
 
 @pytest.mark.parametrize(

@@ -223,11 +223,36 @@ def test_reading_gives_back_what_was_written(given_table):
     assert to_csv(again) == data
 
 
+def _seen(cell):
+    """Return a cell as other programs have it: texts that they could take for formulas have an apostrophe in front."""
+    text = "" if cell is None else str(cell)
+    kept = (
+        isinstance(cell, str) and re.match(r"'*\s*[=+\-@＝＋－＠]", text) and not re.fullmatch(r"\s*.|-\d.*|-inf", text)
+    )
+    return f"'{text}" if kept else text
+
+
 @given(tables())
 def test_other_readers_see_the_same_rows(given_table):
     rows = list(csv.reader(io.StringIO(to_csv(given_table).decode(), newline=""), strict=True))
-    columns = [["" if cell is None else str(cell) for cell in column.cells()] for column in given_table.columns]
+    columns = [[_seen(cell) for cell in column.cells()] for column in given_table.columns]
     assert rows == [list(given_table.headers), *map(list, zip(*columns, strict=True))]
+
+
+FORMULAS = ["=cmd|' /C calc'!A0", "@SUM(1+1)", "+1+2", "-2+3", " =1+1", "\t=1", "\r=1", "＝1+1", "'=1", '="a",b']
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_spreadsheet_takes_a_text_for_a_formula(text):
+    data = to_csv(table(name=[text, "plain"], number=[-1.5, 2.0]))
+    ((_, (cell, number), _),) = (list(csv.reader(io.StringIO(data.decode(), newline=""), strict=True)),)
+    assert (cell, number) == (f"'{text}", "-1.5")
+    assert read_csv(data).as_dict()["name"] == [text, "plain"]
+
+
+@pytest.mark.parametrize("text", ["-", "a=b", "1-2", "force@5mm", "O'Neill", "'quoted'", "-5"])
+def test_a_text_that_is_no_formula_stays_as_it_is(text):
+    assert next(csv.reader(io.StringIO(to_csv(table(a=[text, "x"])).decode().split("\n", 1)[1]))) == [text]
 
 
 def test_pandas_reads_numbers_as_numbers():

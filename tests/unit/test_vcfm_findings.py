@@ -521,6 +521,7 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
     solids = {"sharp_corners", "mesh_coarse"}  # test_vcfm_solid.py
     wide = {"wide_beam"}  # test_wide_beams.py
     bought = {"spring_overstretched", "spring_slack", "no_spring_fits"}  # test_vcfm_bought_springs.py
+    bought |= {"spring_buckles"}  # test_spring_wire_and_buckling.py
     curves = {"target_curve"}  # test_target_curve.py
     assert tested | designs | solids | wide | bought | curves == set(FINDINGS)
     with pytest.raises(KeyError):

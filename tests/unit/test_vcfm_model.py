@@ -561,8 +561,8 @@ def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_wal
     ("name", "preload", "target"),
     [
         ("vcfm_pla", "1.9126 mm", 16.15),
-        ("vcfm_bought_springs", "1.92 mm", 16.15),
-        ("vcfm_bought_springs", "-1 mm", 8.55),
+        ("vcfm_bought_springs", "1.92 mm", 15.925),
+        ("vcfm_bought_springs", "-1 mm", 8.663),
     ],
 )
 def test_a_curve_with_a_preload_is_compared_with_the_force_that_the_design_has_there(name, preload, target):

@@ -13,7 +13,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.results import Design, Status
 from cfmkit.studies.verify_design_by_solid_model import verified
 
-QUICK = ("analysis.solid.poses=9", "analysis.solid.mesh=1 mm", "analysis.points=61", "design.verify=solid")
+QUICK = ("analysis.solid.poses=9", "analysis.solid.error=0.1", "analysis.points=61", "design.verify=solid")
 
 
 @pytest.mark.slow
@@ -163,7 +163,7 @@ def test_a_design_whose_force_pulls_keeps_its_target():
 
 def test_the_solid_has_the_target_of_the_beams():
     """Before, requirements on the deviation from it had no value."""
-    coarse = "analysis: {fidelity: solid, solid: {poses: 3, mesh: 2 mm}, travel: 2 mm, points: 5}"
+    coarse = "analysis: {fidelity: solid, solid: {poses: 3, error: 0.1}, travel: 2 mm, points: 5}"
     solid = cfmkit.analyze(cfmkit.loads(RESCALED.split("analysis:")[0] + coarse))
     assert solid.target == pytest.approx(20.0)
     found = api.evaluate(solid, ["nominal_force", "deviation_from_target"])

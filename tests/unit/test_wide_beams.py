@@ -67,7 +67,7 @@ def test_a_wide_strip_is_told_of():
 )
 def test_a_solid_of_beams_with_a_width_or_a_material_of_their_own_is_as_wide_as_it_is_meshed(mechanism, beam, words):
     short = ("[400 mm, 0 mm]", "[20 mm, 0 mm]"), ("travel: 100 mm", "travel: 0.5 mm\n  fidelity: solid")
-    mesh = "points: 5\n  solid: {mesh: 0.5 mm, poses: 3}"
+    mesh = "points: 5\n  solid: {error: 0.1, poses: 3}"
     own = ("width: 100 mm", f"width: {mechanism}"), ("end: tip}", f"end: tip, {beam}}}")
     found = cfmkit.analyze(cantilever(*short, ("points: 21", mesh), *own))
     told = [one.message for one in found.warnings if one.name == "wide_beam"]

@@ -170,7 +170,8 @@ def test_a_strip_moved_for_a_yield_has_it():
 
 def test_the_first_line_of_the_page_keeps_its_time():
     text = "3 mechanisms meet the wish; the time budget ended the search before everything was tried"
-    data = {"message": text, "proposals": [], "near_misses": [], "families": [], "warnings": [], "wish": {}}
+    data = {"message": text, "proposals": [], "unjudged": [], "near_misses": [], "families": [], "warnings": []}
+    data |= {"wish": {}}
     blocks = list(verb._page(data, Written("out", (), 94.7), False))
     assert blocks[0].right == "94.7 s"
     assert sum(len(span.text) for span in blocks[0].spans) + len("  94.7 s") <= 80

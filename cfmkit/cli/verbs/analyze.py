@@ -75,6 +75,8 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
         comparison_figures,
         comparison_files,
         comparison_lines,
+        comparison_warnings,
+        shortfall,
     )
     from cfmkit.runs.run import analysed
     from cfmkit.runs.run_outcome import Supplement
@@ -85,12 +87,13 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     comparison = compare(found.result, source)
     causes = comparison.causes(found.result)
     return found.beside(
-        comparison.metrics() | dict(causes),
+        comparison.metrics() | comparison.loss() | dict(causes),
         Supplement(
             comparison_data(comparison, source),
             comparison_files(source),
             comparison_lines(comparison, source) + causes_lines(causes),
-            source.warnings,
+            comparison_warnings(comparison, source),
+            shortfall=shortfall(comparison),
             figures=comparison_figures(comparison, spec.name),
         ),
     )

@@ -12,6 +12,7 @@ from cfmkit.cli.options import (
     FigureChoice,
     Fresh,
     Jobs,
+    NoLock,
     Quiet,
     Seed,
     Timeout,
@@ -99,6 +100,7 @@ class BatchOptions(Changing, FigureChoice):
     seed: Seed = 0
     report: WithReport = False
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: BatchOptions, terminal: Terminal) -> Answer:

@@ -91,12 +91,13 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     }
     return replace(
         found,
-        metrics=dict(found.metrics) | after.metrics(),
+        metrics=dict(found.metrics) | after.metrics() | after.loss(),
         supplement=Supplement(
             add.comparison_data(after, source) | add.calibration_data(calibration),
             files,
             (*add.comparison_lines(after, source), *add.calibration_lines(calibration, source.recording)),
-            (*source.warnings, *calibration.warnings),
+            (*add.comparison_warnings(after, source), *calibration.warnings),
+            shortfall=add.shortfall(after),
             figures=add.comparison_figures(after, name, calibration.before),
         ),
     )

@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cfmkit.cli.options import Common, Quiet, argument, flag
+from cfmkit.cli.options import Common, NoLock, Quiet, argument, flag
 from cfmkit.cli.page_block_types import Verbatim, whole_line
 from cfmkit.cli.verb_result import Answer
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
@@ -29,6 +29,7 @@ class CleanOptions(Common):
     folder: Annotated[str, argument("DIR", "Folder that runs have written to, or a parent of such folders.")]
     yes: Annotated[bool, flag("-y", "--yes", text="Remove without asking.")] = False
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: CleanOptions, terminal: Terminal) -> Answer:

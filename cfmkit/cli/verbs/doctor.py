@@ -14,6 +14,7 @@ from cfmkit._version import __version__
 from cfmkit.cli.options import Common
 from cfmkit.cli.page_block_types import LABEL, Field, Span, TextLine, Verbatim, field, listed
 from cfmkit.cli.verb_result import Answer
+from cfmkit.store.lock import SOFT_LOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -42,6 +43,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
         "folders": [
             {"name": what, "path": str(path), "writable": _writable(path)} for what, path in _folders().items()
         ],
+        "locks": _locks(),
         "solver": _solver(),
         "fonts": _fonts(),
         "caches": list(_caches()),
@@ -55,23 +57,27 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
 
 
 def _packages() -> Iterator[Record]:
-    """Yield what cfmkit uses, with the version that is there; None where it is missing."""
+    """Yield what cfmkit uses, with the version that is there, None where it is missing, and the versions allowed."""
     from importlib.metadata import PackageNotFoundError, requires, version
+
+    from packaging.requirements import Requirement
 
     try:
         needed = requires("cfmkit") or []
     except PackageNotFoundError:  # run from its source, not installed
         needed = []
     for text in needed:
-        name = re.split(r"[^\w.-]", text, maxsplit=1)[0]
         extra = re.search(r"extra == ['\"]([^'\"]+)", text)
         if extra and extra[1] not in _EXTRAS:
             continue
+        package = Requirement(text)
         try:
-            found: str | None = version(name)
+            found: str | None = version(package.name)
         except PackageNotFoundError:
             found = None
-        yield {"name": name, "version": found, "extra": extra[1] if extra else ""}
+        allowed = found is None or package.specifier.contains(found, prereleases=True)
+        needs = {"needs": str(package.specifier), "allowed": allowed}
+        yield {"name": package.name, "version": found, "extra": extra[1] if extra else "", **needs}
 
 
 _EXTRAS = ("cluster",)
@@ -93,6 +99,17 @@ def _writable(path: Path) -> bool:
     while not path.exists() and path != path.parent:
         path = path.parent
     return path.is_dir() and os.access(path, os.W_OK | os.X_OK)
+
+
+def _locks() -> Record:
+    """Return whether the current folder has file locks; None if it cannot be written to."""
+    from cfmkit.store.lock import has_native_locks
+
+    here = Path.cwd()
+    try:
+        return {"folder": str(here), "native": has_native_locks(here)}
+    except OSError:
+        return {"folder": str(here), "native": None}
 
 
 def _solver() -> Record:
@@ -138,9 +155,14 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
     for one in found["packages"]:
         if one["version"] is None and not one["extra"]:
             yield f"the package {one['name']} is missing: install cfmkit again"
+        if not one["allowed"]:
+            needed = f"{one['name']}{one['needs']}"
+            yield f"{one['name']} {one['version']} does not work with this cfmkit: pip install '{needed}'"
     for one in found["folders"]:
         if not one["writable"]:
             yield f"{one['path']} cannot be written to: {one['name']}"
+    if found["locks"]["native"] is False:
+        yield f"no file locks in {found['locks']['folder']}: {SOFT_LOCK} marks a live run, and stays if one is killed"
     if not found["fonts"]["path"]:
         yield f"the font {found['fonts']['name']} is not installed: figures use another one and are not byte-identical"
     for one in found["families"]:
@@ -155,6 +177,8 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
     access = Field("", lambda one: "writable" if one["writable"] else "cannot be written to")
     yield from listed("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
+    locks = {True: "by the operating system", False: f"none: the file {SOFT_LOCK} marks a live run", None: "not tried"}
+    yield from listed("file locks here", [{"locks": locks[found["locks"]["native"]]}], (field("locks", wraps=True),))
     compiled = found["solver"]["folder"] or "not yet: takes about 15 s at the first use, or run `cfmkit warm`"
     yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
     fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is incomplete"}

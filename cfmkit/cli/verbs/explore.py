@@ -11,9 +11,11 @@ from cfmkit.cli.failures import Stopped, told
 from cfmkit.cli.options import Changing, argument, flag, option
 from cfmkit.cli.page_block_types import line, whole_line
 from cfmkit.cli.verb_result import Answer
+from cfmkit.store.safe_disk_changes import reason
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
+    from cfmkit.runs.explorer_server import ExplorerServer
 
 PLACE = 23
 EXAMPLE = "cfmkit explore cam.yaml"
@@ -37,7 +39,8 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     or written. Ctrl-C ends the server.
     """
     from cfmkit.errors import UsageError
-    from cfmkit.runs.explorer_server import Explorer, ExplorerServer
+    from cfmkit.runs.explorer import Explorer
+    from cfmkit.runs.explorer_server import ExplorerServer
     from cfmkit.runs.specfile import STDIN
 
     if options.spec == STDIN:
@@ -48,17 +51,24 @@ def run(options: ExploreOptions, terminal: Terminal) -> Answer:
     try:
         server = ExplorerServer(explorer, options.port, lambda error: told(error, terminal))
     except OSError as error:
-        reported = (error.strerror or str(error)).lower()
-        raise UsageError(f"--port: {options.port} cannot be listened on: {reported}") from None
+        raise UsageError(f"--port: {options.port} cannot be listened on: {reason(error)}") from None
     with server:
         if options.json:  # the one document comes at the end
             terminal.complain([f"explore  {server.address}"])
         else:
             terminal.show(whole_line(f"explore  {server.address}"), line("end      with Ctrl-C"))
         if not options.no_browser:
-            import webbrowser
-
-            webbrowser.open(server.address)
+            _open_browser(server, terminal)
         with suppress(Stopped):  # the ordinary end, no failure
             server.serve_forever()
         return Answer({"address": server.address.partition("?")[0]})
+
+
+def _open_browser(server: ExplorerServer, terminal: Terminal) -> None:
+    """Start the browser with a file that leads to the page: other users of the computer can read its command line."""
+    import webbrowser
+
+    try:
+        webbrowser.open(server.write_redirect().as_uri())
+    except OSError as error:
+        terminal.complain([f"warning  no browser is opened ({reason(error)}): open the address above"])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, flag, option
+from cfmkit.cli.options import Changing, FigureChoice, Jobs, NoLock, Quiet, argument, flag, option
 from cfmkit.cli.page_block_types import Written
 from cfmkit.cli.verb_result import Answer
 
@@ -36,6 +36,7 @@ class FigureOptions(Changing, FigureChoice):
     no_plots: Annotated[bool, flag("--no-plots", text="A figure is all there is.", hidden=True)] = False
     jobs: Jobs = None
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: FigureOptions, terminal: Terminal) -> Answer:

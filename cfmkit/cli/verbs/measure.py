@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import FigureChoice, Measuring, Quiet, argument, data_record, flag, option
+from cfmkit.cli.options import FigureChoice, Measuring, NoLock, Quiet, argument, data_record, flag, option
 from cfmkit.cli.page_block_types import BAD, BLANK, LABEL, CellGrid, GridColumn, Paragraph, Span, TextLine, Written
 from cfmkit.cli.verb_result import Answer
+from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
@@ -52,43 +53,56 @@ class MeasureOptions(Measuring, FigureChoice):
     target: Annotated[str | None, option("--target", metavar="FORCE", text="Target force or torque.")] = None
     one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording without a return stroke.")] = False
     as_recorded: Annotated[bool, flag("--as-recorded", text="Keep spikes and the points next to reversals.")] = False
+    max_hole: Annotated[
+        str | None,
+        option(
+            "--max-hole",
+            metavar="SHARE",
+            text="Part of the window that may be missing in one piece, e.g. '5 %'; default: 2 %. With a larger hole "
+            "numbers have no value.",
+        ),
+    ] = None
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
-    from cfmkit.experiment.measurement_and_calibration_outputs import files
-    from cfmkit.runs.measure_and_calibrate_api import measure
+    from cfmkit.experiment.measurement_and_calibration_outputs import data_of, files
+    from cfmkit.runs.measure_and_calibrate_api import MeasurementSettings, measure_each
     from cfmkit.store import RunFolder
 
     out, form = _folder(options), options.form
-    report = measure(
-        options.data,
-        units=options.units,
-        window=options.window,
-        filter=options.filter or "default",
-        target=options.target,
-        tare=options.tare,
-        zero=options.zero,
-        flip=options.flips,
-        as_recorded=options.as_recorded,
-        one_branch=options.one_branch,
+    how = MeasurementSettings(
+        options.window,
+        options.filter or "default",
+        options.target,
+        options.tare,
+        options.zero,
+        options.flips,
+        options.as_recorded,
+        options.one_branch,
+        options.cycles,
+        options.max_hole,
     )
+    reports = measure_each(options.data, options.units, options.group, how)
+    data = data_of(reports)
+    code = next((report.status.exit_code for report in reports.values() if report.numbers.holes), ExitCode.OK)
     with RunFolder(out) as folder:
         folder.check("metrics.json", "curve.csv", "cycles.csv")
-        for name, data in files(report, not options.no_plots, form):
-            folder.write(name, data)
+        for name, content in files(reports, not options.no_plots, form):
+            folder.write(name, content)
         manifest = folder.commit(
             {
                 "command": "measure",
                 "arguments": list(terminal.arguments),
                 **data_record(options.data),
-                "status": "complete",
-                "exit_code": 0,
+                "status": data["status"],
+                "exit_code": int(code),
             }
         )
     written = Written(out, (*manifest.files, "manifest.json"))
-    return Answer(report.data | written.data, _page(report, written, terminal.verbose > 0))
+    return Answer(data | written.data, _pages(reports, written, terminal.verbose > 0), code)
 
 
 def _folder(options: MeasureOptions) -> str:
@@ -99,7 +113,13 @@ def _folder(options: MeasureOptions) -> str:
     return options.out or str(Path("cfm-out") / f"{Path(options.data).stem}-measure")
 
 
-def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator[Block]:
+def _pages(reports: Mapping[str, MeasureReport], written: Written, everything: bool) -> Iterator[Block]:
+    for report in reports.values():
+        yield from _page(report)
+    yield written.block(everything)
+
+
+def _page(report: MeasureReport) -> Iterator[Block]:
     source, data = report.source, report.data
     points = f"{len(source.recording)} points, {len(source.raw)} cycle{'s' * (len(source.raw) > 1)}"
     yield TextLine((Span(source.recording.name, LABEL), Span(f"  {points}")))
@@ -114,7 +134,6 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
     yield BLANK
     for item in report.warnings:
         yield Paragraph("warning", f"{item.name}: {item.message}", BAD)
-    yield written.block(everything)
 
 
 def _numbers(report: MeasureReport) -> CellGrid:
@@ -130,13 +149,19 @@ def _numbers(report: MeasureReport) -> CellGrid:
 
 
 def _shown(report: MeasureReport) -> list[str]:
+    from cfmkit.experiment.coverage import UNKNOWN
+
     curve = report.source.raw[0]
     stems = ("mean", "sd", "max", "min")
     several = len(curve.branches) > 1
     names = [f"{curve.kind}_{stem}{f'[{branch}]' if several else ''}" for branch in curve.branches for stem in stems]
     names += [f"{curve.kind}_ripple", "hysteresis_area", "deviation_from_target"]
     names += [f"{curve.kind}_repeatability[{branch}]" for branch in curve.branches]
-    return [name for name in names if report.numbers.raw[name].value is not None]
+    raw = report.numbers.raw
+    names += [f"coverage[{branch}]" if several else "coverage" for branch in curve.branches]
+    full = [name for name in names if name.startswith("coverage") and raw[name].value == 1.0]
+    unknown = [name for name in names if raw[name].reason.startswith(UNKNOWN)]
+    return [name for name in names if name not in full and (raw[name].value is not None or name in unknown)]
 
 
 def _short(quantity: Any) -> str:

@@ -14,13 +14,13 @@ from cfmkit.cli.options import (
     Common,
     Fresh,
     Jobs,
+    NoLock,
     NoPlots,
     Out,
     Quiet,
     Seed,
     WithReport,
     argument,
-    flag,
     option,
     seconds,
 )
@@ -49,14 +49,14 @@ if TYPE_CHECKING:
 PLACE = 5
 EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
 
-BUDGET = "60s"
+BUDGET = "3min"
 
 SPARE, WRITING = 4.0, 1.0
 """Before the end of the time budget no more figures are begun [s], those of one proposal take about two; and nothing
 but what was found is written."""
 
-VERIFYING, WRITTEN = 0.5, 0.1
-"""Shares of the time budget that are kept for the better models, with ``--verify``, and for files."""
+WRITTEN = 0.1
+"""Share of the time budget that is kept for files."""
 
 
 def _key(name: str, metavar: str, text: str) -> Any:
@@ -93,7 +93,7 @@ class SuggestOptions(Common):
         str | None, _key("hysteresis", "SHARE", "Largest energy loss of a cycle, as a share of its work.")
     ] = None
     cycles: Annotated[
-        str | None, _key("cycles", "N", "Required life in cycles; checked for materials with fatigue data.")
+        str | None, _key("cycles", "N", "Required life in cycles; judged for materials with fatigue data.")
     ] = None
     made_well: Annotated[
         str | None, _key("yield", "SHARE", "Required share of manufactured parts that meet the wish.")
@@ -105,9 +105,6 @@ class SuggestOptions(Common):
     time_budget: Annotated[
         str, option("--time-budget", metavar="TIME", shown=True, text="Time for the whole command: 60s, 10min.")
     ] = BUDGET
-    verify: Annotated[
-        bool, flag("--verify", text="Solve each proposal with the next more accurate model, too; takes longer.")
-    ] = False
     out: Out = None
     seed: Seed = 0
     jobs: Jobs = None
@@ -115,6 +112,7 @@ class SuggestOptions(Common):
     no_plots: NoPlots = False
     report: WithReport = False
     quiet: Quiet = False
+    no_lock: NoLock = False
 
 
 KEYS = (
@@ -132,8 +130,8 @@ BANDS = ("force", "torque")
 def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     """Suggest mechanisms for a wish: a force, a travel and a room. Start here if there is no spec yet.
 
-    Candidates from every family are designed and analysed from their written files with the exact model. Only those
-    that meet the whole wish are listed.
+    Candidates from every family are designed and analysed from their written files with the finest model. Those that
+    meet the whole wish are listed, then those of which not everything could be judged.
     """
     from cfmkit import families
     from cfmkit.cli.run_study_in_folder import noting
@@ -145,7 +143,6 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.store import RunFolder
     from cfmkit.studies.pool import Pool
     from cfmkit.studies.serial_and_cluster_executors import cores
-    from cfmkit.studies.suggest.comparison_with_better_model import with_better_models
     from cfmkit.studies.suggest.search import RESERVE, suggest
 
     start, begun = time.perf_counter(), time.time()
@@ -164,10 +161,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
             if jobs == 1:  # a process of its own, which can be ended when the time is up
                 working = replace(working, executor=Pool(1))
             reserve = max(SPARE, WRITTEN * budget) if options.no_plots else RESERVE
-            kept = reserve + VERIFYING * budget if options.verify else reserve
-            found = suggest(block.wish(), working, block.prefer, kept)
-            left = max(ends - reserve - time.time(), 0.0)
-            found = with_better_models(found, replace(working, time_budget=left), options.verify)
+            found = suggest(block.wish(), working, block.prefer, reserve)
             deadlines = suggestion_files.Deadlines(Clock(ends - SPARE), Clock(ends - WRITING))
             command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
             for name, content in suggestion_files.files(
@@ -248,7 +242,7 @@ def _folder(options: SuggestOptions) -> str:
     return str(Path("cfm-out") / f"{stem}-suggest")
 
 
-HEADS = ("", "", "mean", "ripple", "room", "safety", "parts")
+HEADS = ("", "", "mean", "ripple", "room", "safety", "parts", "model")
 """Of the table; "hysteresis" follows where a proposal has some, and "yield" where one is wished."""
 
 VARIANT = 1
@@ -261,24 +255,21 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
     yield TextLine((Span("suggest", LABEL), Span(f"  {head}")), f"{written.seconds:.1f} s")
     if rest:
         yield Paragraph("", rest)
+    listed = [*data["proposals"], *data["unjudged"]]
     if data["proposals"]:
         yield BLANK
-        more = _more(data)
-        rows = [
-            [*_row(str(number), one, data), *(_share(one[name]) for name in more)]
-            for number, one in enumerate(data["proposals"], 1)
-        ]
-        heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
-        yield CellGrid(heads, rows, gap=2, indented=True)
+        yield from _rows(data["proposals"], data, 1)
+    if data["unjudged"]:
+        yield BLANK
+        yield line("not judged in full", LABEL)
+        yield from _rows(data["unjudged"], data, len(data["proposals"]) + 1)
     if data["near_misses"]:
         yield BLANK
         yield line("near misses: one requirement not met", LABEL)
         near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
         yield CellGrid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
-    for number, one in enumerate(data["proposals"], 1):
-        if one["finer_deviation"] is not None:
-            yield Paragraph("verified" if number == 1 else "", f"{number} {one['family']}: {one['notes'][0]}")
-    silent = [one for one in data["families"] if not one["proposals"]]
+    named = {one["family"] for one in listed}
+    silent = [one for one in data["families"] if one["family"] not in named]
     if silent:
         yield BLANK
         yield line("no proposals from these families", LABEL)
@@ -287,25 +278,41 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
     yield BLANK
     yield written.block(everything)
-    if bare := [one["folder"] for one in data["proposals"] if not _complete(one["folder"], written.files)]:
+    if bare := [one["folder"] for one in listed if not _complete(one["folder"], written.files)]:
         yield Paragraph(
             "note",
-            f"the time ran out: of {', '.join(bare)} only design.yaml was written; `cfmkit analyze` of that file gives "
-            "the curve and figures, `cfmkit export --format dxf,svg,png` the files to cut and a drawing",
+            f"the time ran out: of {', '.join(bare)} only design.yaml was written, and what is cut if there was time; "
+            "`cfmkit analyze` of that file gives the curve and figures, `cfmkit export --format dxf,svg,png` the files "
+            "to cut and a drawing",
         )
-    if data["proposals"]:  # files to cut or print of the best
-        best = Path(written.folder) / data["proposals"][0]["folder"] / "design.yaml"
+    if listed:  # files to cut or print of the best
+        best = Path(written.folder) / listed[0]["folder"] / "design.yaml"
         yield next_command("cfmkit", "export", str(best))
 
 
+def _rows(listed: Sequence[Mapping[str, Any]], data: Mapping[str, Any], first: int) -> Iterator[Block]:
+    """Yield a table of mechanisms, and below it what else a row says: what was not judged, and warnings."""
+    more = _more(data)
+    rows = [
+        [*_row(str(number), one, data), *(_share(one[name]) for name in more)]
+        for number, one in enumerate(listed, first)
+    ]
+    heads = tuple(GridColumn(head, number == VARIANT) for number, head in enumerate((*HEADS, *more)))
+    yield CellGrid(heads, rows, gap=2, indented=True)
+    said = [(number, [*one["unjudged"], *one["warnings"]]) for number, one in enumerate(listed, first)]
+    cells = [[str(number), "; ".join(words)] for number, words in said if words]
+    if cells:
+        yield CellGrid((GridColumn("", False), GridColumn()), cells, gap=2, indented=True)
+
+
 def _complete(folder: str, files: Iterable[str]) -> bool:
-    """Return whether more of a proposal is there than its spec."""
-    return any(name.startswith(f"{folder}/") and name != f"{folder}/design.yaml" for name in files)
+    """Return True if a proposal's analysis is there, not its spec and its drawing alone."""
+    return f"{folder}/metrics.json" in files
 
 
 def _more(data: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the shares that follow the other columns of the table."""
-    lossy = any(one["hysteresis"] is not None for one in data["proposals"])
+    lossy = any(one["hysteresis"] is not None for one in (*data["proposals"], *data["unjudged"]))
     return (*(("hysteresis",) if lossy else ()), *(("yield",) if "yield" in data["wish"] else ()))
 
 
@@ -327,6 +334,7 @@ def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[s
         room_needed,
         "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
         str(one["parts"]),
+        one["model"],
     ]
 
 

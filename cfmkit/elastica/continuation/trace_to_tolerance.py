@@ -20,6 +20,7 @@ from cfmkit.elastica.kernels.status_codes import STALLED
 from cfmkit.elastica.model.drive import Control, Displacement, Drive, Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.outcome.member_efforts import ROUNDING, stiffest
 from cfmkit.elastica.outcome.path import Path, PathStatus
 
 if TYPE_CHECKING:
@@ -42,7 +43,6 @@ _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is s
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
 _COILED = 4.0  # turn of an unloaded shape in a step [rad] up to which that sees it: 14 kicks for two thirds of a turn
 _STARTS = 4  # of them where nothing bears the constant loads, if each bears more of them than the one before
-_ROUNDING = 30 * np.finfo(float).eps  # share of the stiffest segment's force for a unit motion: rounding, with room
 _NOISE = 0.1  # change of forces that small, by half the step, as a share of themselves: there is no force
 
 
@@ -224,19 +224,11 @@ def errors(problem: PathProblem, trail: Trail, indices: list[int], largest: floa
     ys, drives, far = trail.points.y[indices], trail.points.drive[indices], 0.1 * max(1.0, scale)
     found = []
     changes = fine.solve_each(ys, drives)[1].tolist()
-    if max(change[1] for change in changes) > _NOISE * scale and largest < _ROUNDING * _stiffest(fine):
+    if max(change[1] for change in changes) > _NOISE * scale and largest < ROUNDING * stiffest(fine):
         scale = 1.0  # nothing bears a load: forces are errors themselves
     for k, (pose, force, most) in zip(indices, changes, strict=True):
         found.append(max(pose, force / scale) if most <= far else _across(trail, fine, k, scale, far))
     return found
-
-
-def _stiffest(solver: Solver) -> float:
-    """Return the largest force on the end of a segment that is moved by a unit length, dimensionless."""
-    whole = np.add.reduceat(solver.table[:, :, 1:4].sum(axis=1), solver.cut.segment_step[:-1])
-    length, turn, stretch = whole.T
-    bent = 12.0 / (length**2 * turn)
-    return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
 
 
 def _across(trail: Trail, fine: Solver, index: int, scale: float, far: float) -> float:

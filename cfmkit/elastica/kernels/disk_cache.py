@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.elastica.kernels.machine_code import Code, linked, processor
 from cfmkit.store.content_hashes_and_versions import installed
-from cfmkit.store.private_cache_folder import place, private_folder, trusted
+from cfmkit.store.private_cache_folder import place, private_folder, resolve_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -99,13 +99,13 @@ def _file(name: str, ending: str) -> str:
 
 
 def _found(name: str, ending: str) -> Iterator[Path]:
-    """Yield the files of a door that only this user, or the system's owner, can have written."""
+    """Yield the files of a door, links resolved, that only this user or the system's owner can have written."""
     for folder in _places():
         path = folder / _file(name, ending)
         if not os.path.exists(path):  # a folder that may not be looked into holds nothing for us; Path.exists() raises
             continue
-        if trusted(path):
-            yield path
+        if real := resolve_trusted(path):
+            yield real
         else:
             _LOG.info("compiled code in %s is not used: others can write there", folder)
 
@@ -143,8 +143,8 @@ def _lock_file(name: str) -> int | None:
     for folder in _lasting():
         with contextlib.suppress(OSError):
             folder.mkdir(mode=0o755, parents=True, exist_ok=True)
-            if trusted(folder):
-                return os.open(folder / _file(name, "lock"), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            if real := resolve_trusted(folder):
+                return os.open(real / _file(name, "lock"), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
     return None
 
 
@@ -191,11 +191,10 @@ def write(name: str, code: Code) -> Path | None:
     """Keep the code of a door; return where, None if there is no folder that only this user can write to."""
     for folder in (*_lasting(), None):
         with contextlib.suppress(OSError):
-            own = private_folder("compiled") if folder is None else folder
+            if folder is not None:
+                folder.mkdir(mode=0o755, parents=True, exist_ok=True)  # one user compiles, all of them may read
+            own = private_folder("compiled") if folder is None else resolve_trusted(folder)
             if own is None:
-                break
-            own.mkdir(mode=0o755, parents=True, exist_ok=True)  # one user compiles, all of them may read
-            if not trusted(own):
                 continue
             _replace(own / _file(name, "code"), _written(code))
             _write_library(name, code, own)

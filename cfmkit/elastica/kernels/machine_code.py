@@ -124,6 +124,8 @@ def in_library(path: Path) -> Callable[[bytes, Any], int]:
     Strange
         If it is no library of this system, or calls what is nowhere to be found.
     """
+    if "$" in str(path):  # the system's loader replaces $LIB and the like, and would open another file
+        raise Strange(f"{path}: a path with a $")
     try:
         door: Any = ctypes.CDLL(str(path))[SYMBOL]
     except (OSError, AttributeError) as error:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.base import Room
+from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.network_from_spec import mirror_axis, thickest_of
 from cfmkit.families.beam.outline import drawing, regions
 from cfmkit.families.beam.strips_and_gaps import mirrored
+from cfmkit.families.run_control import Run
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -24,14 +26,20 @@ COARSE = 5e-5
 
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism, along and across its drive; equal legs stand side by side in the depth."""
-    if result.state is None or hasattr(result.state, "fine"):  # nothing was solved, or the part as a solid
+    """Return the box of a solved mechanism, along and across its drive; equal legs stand side by side in the depth.
+
+    A part that was solved as a solid moves as its beams do, to a fraction of a thickness.
+    """
+    if hasattr(result.state, "fine"):
+        given: Any = result.spec
+        result = analyze(given.replace({"analysis.fidelity": "reissner", "requirements": ()}), Run())
+    if result.state is None:
         return None
     solution: Solution = result.state
     mechanism = solution.spec.mechanism
     angle = solution.assembly.direction if solution.motion_dimension == "length" else 0.5 * np.pi
     axes = np.array([[np.sin(angle), -np.cos(angle)], [np.cos(angle), np.sin(angle)]])
-    drawn = drawing(solution.spec, COARSE)
+    drawn = drawing(solution.spec, COARSE, check=False)
     boxes = np.array([contour.extents for contour in drawn.contours if contour.layer == "cut"])
     corners = [boxes[:, [0, 1]], boxes[:, [0, 3]], boxes[:, [2, 1]], boxes[:, [2, 3]]]
     inside = [(points, 0.0) for points in (*corners, *_moved_pads(solution))] + _bent(solution)
@@ -39,9 +47,11 @@ def room(result: Result) -> Room | None:
     across, along = (high - low).tolist()
     legs = mechanism.copies.legs if mechanism.copies else 1
     deepest = max([drawn.sheet.thickness or 0.0, *(one.thickness for one in drawn.sheet.regions)])
-    corner, _ = _box(inside, np.eye(2))
+    corner, far = _box(inside, np.eye(2))
+    width, height = (far - corner).tolist()
     sideways = bool(abs(np.cos(angle)) > abs(np.sin(angle)))
-    return Room(across, along, legs * deepest, legs, corner=(float(corner[0]), float(corner[1])), sideways=sideways)
+    place = float(corner[0]), float(corner[1])
+    return Room(across, along, legs * deepest, legs, corner=place, sideways=sideways, drawn=(width, height))
 
 
 def _box(inside: list[tuple[FloatArray, float]], axes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -217,8 +217,6 @@ def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
     analysis = _lengths(analysis, ("travel", "window", "reference"), factor)
     if analysis.surface is not None:  # what is followed stays as it is
         analysis = analysis.model_copy(update={"surface": _lengths(analysis.surface, ("preload",), factor)})
-    if analysis.solid.mesh is not None:
-        analysis = analysis.model_copy(update={"solid": _lengths(analysis.solid, ("mesh",), factor)})
     return spec.model_copy(
         update={
             "mechanism": mechanism.model_copy(update=update),

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.model.network_under_drive import Layout
-from cfmkit.families.beam.network_elements_spec import PartSpec
-from cfmkit.families.beam.network_from_spec import mirror_axis
+from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.solid.meshed_part import MeshSolution
 
-EXACT = 1e-6
-"""Lines between points of a beam are no farther from its edges than this [m]."""
+EXACT = 1e-3
+"""Lines between points of a beam are no farther from its edges than this, in thicknesses of the thinnest one."""
 
 
 def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float]) -> tuple[FilletRow, ...]:
@@ -34,7 +33,7 @@ def fillets(assembly: Assembly, solved: MeshSolution, window: tuple[float, float
     spec = assembly.spec
     beams, nodes = _named(assembly)
     rows = []
-    for one in stressed_fillets(solved, (spec.mechanism.part or PartSpec()).fillet):
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
         joined = one.arc.touched(beams)
         node = min(nodes, key=lambda name: float(np.hypot(*(nodes[name] - one.arc.middle))))
         if (found := one.largest(*window)) is not None:
@@ -55,13 +54,14 @@ def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, F
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
     fits = Layout(network, assembly.drive()).fits
+    exact = EXACT * min(thinnest_of(beam.section) for beam in network.beams.values())
     beams = {
-        name: [polygon for strip in strips(network, fits, name, EXACT) for polygon in strip.polygons]
+        name: [polygon for strip in strips(network, fits, name, exact) for polygon in strip.polygons]
         for name in network.beams
     }
     nodes = {name: np.array([node.x, node.y]) for name, node in network.nodes.items()}
     if axis is not None:
         beams |= {f"{name}'": [mirrored(one, *axis) for one in own] for name, own in beams.items()}
         others = {name: mirrored(place[None], *axis)[0] for name, place in nodes.items()}
-        nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > EXACT}
+        nodes |= {f"{name}'": place for name, place in others.items() if np.hypot(*(place - nodes[name])) > exact}
     return beams, nodes

@@ -63,7 +63,7 @@ FINDINGS = {
     "pins_not_drawn": "beams turn on pins in the mechanism, but are one piece in the drawing",
     "gap_small": "two beams are closer than can be cut",
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
-    "mesh_coarse": "results on two meshes of the part differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "feature_small": "a beam is thinner than can be made",
 }
 
@@ -152,7 +152,10 @@ def _in_the_way(solution: Solution) -> str:
     said = f"check {', '.join(keys)}"
     if spec.fidelity != "inextensible":
         return said
-    along = list(_along_the_drive(spec))
+    along, tied = list(_along_the_drive(spec)), _over_determined(solution)
+    if tied and not set(tied) <= set(along):
+        reported = f"inextensible beams between places that do not move ({', '.join(tied)}) hold the network rigid"
+        return f"{said}; {reported}: leave one out, or set 'mechanism.axial: true'"
     if along:
         held = (
             f"inextensible beams that lie straight along the drive ({', '.join(along)}) do not move until they buckle"
@@ -160,6 +163,25 @@ def _in_the_way(solution: Solution) -> str:
         bent = "or bend them by analysis.imperfection, by at least 1e-8 of their length"
         return f"{said}; {held}: set 'mechanism.axial: true', {bent}"
     return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
+
+
+def _over_determined(solution: Solution) -> list[str]:
+    """Return the beams whose forces equilibrium leaves open before any load: the network is held by more than it needs.
+
+    They are what the null vectors of the tangent have, where these move nothing.
+    """
+    solver = solution.path.solver
+    tangent, _ = solver.tangent_at(solver.unstressed(), 0.0)
+    _, sizes, rows = np.linalg.svd(tangent)
+    null = rows[sizes <= _SINGULAR * sizes[0]]
+    if not len(null) or np.abs(null[:, : solver.n_free]).max(initial=0.0) > _STILL:
+        return []
+    forces = np.abs(null[:, solver.n_free :]).reshape(len(null), -1, 3).max(axis=(0, 2))
+    names = list(solution.path.layout.network.beams)
+    return [name for name, force in zip(names, forces.tolist(), strict=True) if force > _STILL]
+
+
+_SINGULAR, _STILL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
 
 
 def _along_the_drive(spec: BeamSpec) -> Iterator[str]:
@@ -372,7 +394,8 @@ def _width(solution: Solution) -> Iterator[Finding]:
     worst = int(share.argmax())
     place = format_short(float(solution.motion[worst]), solution.motion_dimension)
     if reported := too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"):
-        yield finding("wide_beam", reported, "mechanism.wide_beams=true")
+        wide, narrow = "mechanism.wide_beams=true", solution.spec.analysis.modes  # frequencies are of narrow beams only
+        yield finding("wide_beam", reported, (wide, "analysis.modes=0") if narrow else wide)
 
 
 def _gaps(solution: Solution) -> Iterator[Finding]:
@@ -386,7 +409,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
         yield finding("beams_touch", f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled")
     if part is None:
         return
-    least = max(part.min_gap, 2 * part.fillet)
+    least = max(part.min_gap, 2 * solution.spec.mechanism.fillet)
     if still is not None and still.size < least:
         yield finding(
             "gap_small",

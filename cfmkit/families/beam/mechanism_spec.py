@@ -26,7 +26,8 @@ from cfmkit.families.beam.network_elements_spec import (
     checked_thickness,
 )
 from cfmkit.specs.spec import Model, PositiveLength, refuse
-from cfmkit.stock.material_and_part_spec import SafetyFactor
+from cfmkit.specs.units import format_short
+from cfmkit.stock.material_and_part_spec import RoundedCorners, SafetyFactor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -46,6 +47,10 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
         for name in getattr(mechanism, group):
             if not _NAME.fullmatch(name):
                 yield (group, name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
+    if len(mechanism.nodes) == 1:
+        held = "{at: [0 mm, 0 mm], support: clamped}"
+        yield ("nodes",), f"a beam joins two nodes, and there is one: add another, such as 'wall: {held}'"
+        return
     references = list(_unknown(mechanism))
     yield from references
     if references:
@@ -170,14 +175,20 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
     along, across, rotation = HELD[node.support]
     if drive.kind == "rotation" or drive.kind == "moment":
         if rotation:
-            yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}"
+            yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}; 'pinned' lets it turn"
         return
     if drive.kind == "loads" and not any(map(_acts, drive.loads)):
         yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
     if along and across:
-        yield at, f"{drive.node!r} cannot move: its support is {node.support!r}"
+        way = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
+        yield at, f"{drive.node!r} cannot move: its support is {node.support!r}; {way} or 'free' lets it"
     elif across and not parallel(drive.direction, node.direction or 0.0):
-        yield ("drive", drive.kind, "direction"), f"{drive.node!r} slides along another direction"
+        way, own = format_short(drive.direction, "angle"), format_short(node.direction or 0.0, "angle")
+        yield (
+            ("drive", drive.kind, "direction"),
+            f"{drive.node!r} slides along {own} only ('mechanism.nodes.{drive.node}.direction'), not along {way}: make "
+            "both directions equal, or its support 'free'",
+        )
 
 
 def _acts(load: LoadSpec) -> bool:
@@ -209,7 +220,7 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
             yield ("nodes", name, "support"), "in stages in series, every support but the driven one is 'clamped'"
 
 
-class Mechanism(Model):
+class Mechanism(RoundedCorners, Model):
     """A planar network of slender beams, its loads and its drive."""
 
     material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
@@ -232,7 +243,7 @@ class Mechanism(Model):
             "beams' ends (guides with them), or forced into place (prestressed)"
         ),
     )
-    nodes: dict[str, NodeSpec] = Field(min_length=2, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
+    nodes: dict[str, NodeSpec] = Field(min_length=1, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
     beams: dict[str, MemberSpec] = Field(min_length=1, description="by name: {b1: {start: n1, end: n2}}")
     links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
     springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
@@ -250,6 +261,12 @@ class Mechanism(Model):
         """Return a value of each beam by name: its own, or that of the mechanism where it has none."""
         usual = getattr(self, key)
         return {name: getattr(beam, key) or usual for name, beam in self.beams.items()}
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of all beams [m]."""
+        given = self.of_beams("thickness").values()
+        return min(one if isinstance(one, float) else min(value for _, value in one) for one in given)
 
     @model_validator(mode="after")
     def _names_match(self) -> Self:

@@ -93,6 +93,8 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         closed=solution.everywhere,
         winding=solution.winding,
         ends=_ends(solution, stressed),
+        effort_error=solution.effort_error,
+        part_efforts=None if spec.mechanism.drive.kind == "loads" else solution.part_efforts,
         state=solution,
     )
 

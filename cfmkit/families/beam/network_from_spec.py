@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
+    from cfmkit.families.beam.mechanism_spec import Mechanism
     from cfmkit.families.beam.network_elements_spec import (
         LoadSpec,
         MemberSpec,
@@ -269,7 +270,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         of.modulus,
         beam.width or mechanism.width,
         _thickness(beam.thickness or mechanism.thickness),
-        axial=spec.fidelity != "inextensible",
+        axial=spec.fidelity != "inextensible" or between_held_places(mechanism, beam),
         shear=spec.fidelity in ("reissner", "solid"),
         poisson_ratio=of.poisson,
         wide=mechanism.wide_beams,
@@ -285,6 +286,16 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         beam.start_offset or (0.0, 0.0),
         beam.end_offset or (0.0, 0.0),
     )
+
+
+def between_held_places(mechanism: Mechanism, beam: MemberSpec) -> bool:
+    """Return True for a straight beam between two places that do not move.
+
+    Without stretching it could not even bend, and its axial force would be any: the whole network would be rigid.
+    """
+    ends = [mechanism.nodes[name] for name in (beam.start, beam.end)]
+    held = all(all(HELD[node.support][:2]) and node.moved is None for node in ends)
+    return held and beam.shape.kind == "straight" and not (beam.start_offset or beam.end_offset)
 
 
 def _thickness(given: Thickness) -> float | engine.Taper:

@@ -16,7 +16,6 @@ import numpy as np
 from cfmkit.elastica import PointLoad
 from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.export.contours import (
-    TOLERANCE,
     Contour,
     Curve2D,
     Drawing,
@@ -27,40 +26,54 @@ from cfmkit.export.contours import (
     circle,
     mark,
 )
-from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
-from cfmkit.export.union import quarter_pieces
+from cfmkit.export.union import OutlinePiece
+from cfmkit.families.beam.drawn_pieces import (
+    EYE,
+    HOLE,
+    STANDS,
+    BeamEnd,
+    area_of,
+    bars_between_halves,
+    both_halves,
+    disc,
+    drawn_parts,
+    ends_at,
+    is_padded,
+    pads_behind,
+)
 from cfmkit.families.beam.network_elements_spec import PartSpec
-from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis
+from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis, thinnest_of
 from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored, strips
 from cfmkit.families.beam.warnings_of_joined_beams import joined_unasked, pins_drawn_solid
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.network import Network
+    from cfmkit.export.beam_sections import BeamSection
     from cfmkit.families.beam.network_from_spec import Assembly
     from cfmkit.families.beam.spec import BeamSpec
 
-PAD = 4.0
-"""Depth of a pad behind the end of a beam, in thicknesses."""
+FINE = 2e-4
+"""How far outlines may be from the exact ones unless somebody states another value, in thicknesses of the thinnest
+beam: both edges together change its bending stiffness by 1.2e-3 at most."""
 
-EYE, HOLE = 2.5, 1.2
-"""Radii of the eye and of the hole at a pinned support, in thicknesses."""
+EXACT = 1e-5
+"""How far lines may be from the edges of the outline when it is measured, in thicknesses of the thinnest beam."""
 
-ROUGH = 1e-6
-"""A beam that ends nearer to its node than this stands on it [m]."""
+SHARP = 1e-4
+"""Fillets smaller than this are not drawn, in thicknesses of the thinnest beam."""
 
 SWEPT = 25
 """Poses at which what moves must be clear of the frame: in between beams go by less than their thickness."""
 
-_CORNERS = 64
-"""A polygon with so many lies within its circle by at most 0.12 % of the radius."""
-
-
 SHARE = 0.2
-"""Part of the tolerance that each step from the exact edges to the lines of the contour may take; there are four."""
+"""Part of the tolerance that polygons of eyes may be off."""
+
+SPARSE = 5.0
+"""How far lines between the points of a beam may be from its edges, in tolerances: edges are cubics between the points,
+which are nearer by the square of that again."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +91,8 @@ class HeldPlace:
         Polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye.
     seams : tuple of (2, 2) arrays
         Lines at which it begins [m].
+    padded : bool
+        Whether its shapes are pads.
     """
 
     name: str
@@ -85,19 +100,21 @@ class HeldPlace:
     at: FloatArray
     shapes: tuple[FloatArray, ...]
     seams: tuple[FloatArray, ...] = ()
+    padded: bool = False
 
 
-def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ...]:
+def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:
     """Return where the part of `drawing` is held, driven or loaded: pads from the root plane on, the holes of eyes.
 
     Parameters
     ----------
     spec : BeamSpec
         Whose part is drawn.
-    tolerance : float
+    tolerance : float, optional
         As for `drawing` [m].
     """
     assembly = assemble(spec)
+    tolerance = tolerance or _fine(assembly)
     beams = _strips(assembly, tolerance)
     loaded = {load.node for load in assembly.network.loads if isinstance(load, PointLoad)}
     return tuple(_held_places(assembly, beams, tolerance, loaded))
@@ -107,7 +124,7 @@ def _strips(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[Bea
     """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
-    return {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
+    return {name: strips(network, fits, name, SPARSE * tolerance) for name in network.beams}
 
 
 def _held_places(
@@ -115,9 +132,9 @@ def _held_places(
 ) -> Iterator[HeldPlace]:
     network, axis = assembly.network, mirror_axis(assembly)
     moving = moving_nodes(assembly)
-    bars = _bars(assembly, beams, *axis) if axis is not None else {}
+    bars = bars_between_halves(assembly, beams, *axis) if axis is not None else {}
     for node, about in network.nodes.items():
-        ends = _ends(assembly, beams, node)
+        ends = ends_at(assembly, beams, node)
         held = about.support.along or about.support.across or about.support.rotation
         if not ends or not (held or node in moving or node in loaded):
             continue
@@ -131,52 +148,54 @@ def _held_places(
                 mirrored(region.at[None], *axis)[0],
                 tuple(mirrored(shape, *axis) for shape in region.shapes),
                 tuple(mirrored(seam, *axis) for seam in region.seams),
+                region.padded,
             )
 
 
-def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], bulge: float) -> HeldPlace:
+def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) -> HeldPlace:
     """Return the place of the described half at which a node is held or driven."""
     about = assembly.network.nodes[node]
     at = np.array([about.x, about.y])
-    if _padded(assembly, node):
-        pads = [_pad(assembly, strip, last, _moves(assembly, node)) for strip, last in ends]
-        return HeldPlace(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
-    strip, last = ends[0]
-    index = -1 if last else 0
-    size = float(strip.thickness[index])
+    pads = [] if not is_padded(assembly, node) else list(pads_behind(assembly, node, ends))
+    if pads:
+        return HeldPlace(node, node, at, tuple(pad for pad, _ in pads), tuple(end.cap for _, end in pads), True)
+    end = ends[0]
     if about.support.across and not about.support.rotation and not on_axis(assembly, node):
-        return HeldPlace(node, node, at, (_disc(strip.points[index], HOLE * size, bulge),))
-    across = np.array([-math.sin(strip.angle[index]), math.cos(strip.angle[index])])
-    line = strip.points[index] + 0.5 * size * np.array([across, -across])
-    return HeldPlace(node, node, at, (line,), (line,))
+        return HeldPlace(node, node, at, (disc(end.at, HOLE * end.thickness, bulge),))
+    return HeldPlace(node, node, at, (end.cap,), (end.cap,))
 
 
-def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
+def drawing(spec: BeamSpec, tolerance: float | None = None, check: bool = True) -> Drawing:
     """Return the part, its centre lines, and the point table of every beam.
 
     Parameters
     ----------
     spec : BeamSpec
         What to draw.
-    tolerance : float
-        Largest distance of the contour from the exact edges [m].
+    tolerance : float, optional
+        Largest distance of the contour from the exact edges [m]; default: `FINE`.
+    check : bool
+        Whether a part that is not as specified is refused; False if only its size is needed.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the outline of a beam, or its area, is not that of the specification.
     """
     from cfmkit.export.union import merged
 
     assembly = assemble(spec)
+    fine = _fine(assembly)
+    tolerance = tolerance or fine
     beams = _strips(assembly, tolerance)
-    pieces, blocks, holes = _pieces(assembly, beams, SHARE * tolerance)
+    halves = both_halves(assembly, beams)
+    solid = drawn_parts(assembly, beams, SHARE * tolerance)
     frame = _frame(assembly, beams, tolerance)
-    lines = [_line(strip) for found in beams.values() for strip in found]
-    if (axis := mirror_axis(assembly)) is not None:
-        bars = _bars(assembly, beams, *axis)
-        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *bars.values()]
-        holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
-        lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
-        blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
-    part = spec.mechanism.part or PartSpec()
-    pieces = [*pieces, *frame]
-    contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
+    lines = [_line(strip) for strips_of in halves.values() for strip in strips_of]
+    part, fillet = spec.mechanism.part or PartSpec(), drawn_fillet(spec)
+    pieces = [*solid.pieces, *map(OutlinePiece.polygon, frame)]
+    contours = merged(pieces, fine / FINE, fillet, solid.holes)
+    sections = _checked(beams, pieces, solid.holes, contours, fine / FINE, fillet) if check else ()
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = [Contour((line,), "path") for line in lines]
     moving = moving_nodes(assembly)
@@ -186,7 +205,7 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
-    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, part.fillet))
+    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, fillet))
     return Drawing(
         "beams",
         (*contours, *paths, *marks),
@@ -195,14 +214,65 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
         _sheet(assembly, beams),
         dimensions=dimensions,
         facts=facts,
-        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, blocks, contours, part.fillet)),
+        warnings=(*pins_drawn_solid(spec), *joined_unasked(assembly, beams, solid.blocks, contours, fillet)),
+        tolerance=fine,
+        sections=sections,
     )
+
+
+def drawn_fillet(spec: BeamSpec) -> float:
+    """Return the radius of inside corners as drawn [m]: those much smaller than the beams are sharp corners."""
+    fillet = spec.mechanism.fillet
+    return fillet if fillet >= SHARP * spec.mechanism.thinnest else 0.0
+
+
+def _checked(
+    beams: dict[str, list[BeamStrip]],
+    pieces: Sequence[OutlinePiece],
+    holes: Sequence[OutlinePiece],
+    contours: Sequence[Contour],
+    thinnest: float,
+    fillet: float,
+) -> tuple[BeamSection, ...]:
+    """Return the sections of beams between joints, all of which the outline has; its area is that of its pieces.
+
+    Of pieces that are not the longest one of their beam, those count that fillets at both ends leave free.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        Where the outline is not what is specified.
+    """
+    from cfmkit.export.beam_sections import areas_of, check_area, free_sections
+
+    covered = [piece.covered(thinnest) for piece in pieces]
+    first = np.cumsum([0, *map(len, covered)])
+    sections, own, number = [], [], 0
+    for name, found in beams.items():  # the first of the pieces are these, in this order
+        longest = max(strip.length for strip in found)
+        for k, strip in enumerate(found):
+            low, high = (min(max(number + k + by, number), number + len(found)) for by in (-1, 2))
+            if strip.length >= min(longest, 4.0 * fillet):
+                sections.append(strip.section(name))
+                own.append(range(int(first[low]), int(first[high])))
+        number += len(found)
+    rings = [one.points(EXACT * thinnest) for one in contours]
+    areas = [area for one in covered for area in one]
+    judged = free_sections(sections, rings, areas, own, fillet)
+    sizes = [(-1.0 if one.hole else 1.0) * area_of(ring) for one, ring in zip(contours, rings, strict=True)]
+    check_area(sum(sizes), *areas_of(pieces, holes, thinnest, fillet))
+    return judged
+
+
+def _fine(assembly: Assembly) -> float:
+    return FINE * min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
 
 
 def standing_frame(spec: BeamSpec) -> tuple[FloatArray, ...]:
     """Return the polygons of the frame around the part and of the bars to its pads [m], if one is requested."""
     assembly = assemble(spec)
-    return _frame(assembly, _strips(assembly, TOLERANCE), TOLERANCE)
+    tolerance = _fine(assembly)
+    return _frame(assembly, _strips(assembly, tolerance), tolerance)
 
 
 def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> tuple[FloatArray, ...]:
@@ -219,7 +289,7 @@ def _frame(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: flo
     for place in places:
         about = nodes[place.node].support
         clamped = about.along and about.across and about.rotation and place.node not in moving
-        if clamped and len(place.shapes[0]) == 4:
+        if clamped and place.padded:
             pads |= {f"{place.name} ({k})" if k else place.name: shape for k, shape in enumerate(place.shapes)}
         else:
             covered += list(place.shapes)
@@ -280,7 +350,7 @@ def _dimensions(assembly: Assembly) -> Iterator[DrawnDimension]:
 
 def _distances(words: str, start: Any, end: Any, along: tuple[Literal["x", "y"], ...]) -> Iterator[DrawnDimension]:
     for axis in along:
-        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > ROUGH:
+        if abs(end["xy".index(axis)] - start["xy".index(axis)]) > STANDS * math.dist(start, end):
             yield DrawnDimension(words, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), axis)
 
 
@@ -318,141 +388,6 @@ def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
     if axis is not None:
         own += [Region(mirrored(one.polygon, *axis), one.thickness) for one in own]
     return Sheet(mechanism.width, tuple(own))
-
-
-def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:
-    return Smooth(mirrored(line.points, at, direction), mirrored(line.tangents, 0j, direction))
-
-
-def _pieces(
-    assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float
-) -> tuple[list[FloatArray], list[DrawnBlock], list[FloatArray]]:
-    """Return the polygons of one half, those of them that are pads, eyes and bars by name, and the holes in eyes."""
-    network = assembly.network
-    pieces = [part for found in beams.values() for strip in found for part in strip.polygons]
-    blocks: list[DrawnBlock] = []
-    holes = []
-
-    def add(name: str, shape: FloatArray, *nodes: str) -> None:
-        pieces.append(shape)
-        blocks.append(DrawnBlock(name, nodes, shape))
-
-    for name, found in beams.items():
-        beam = network.beams[name]
-        for one, two in itertools.pairwise(found):
-            pieces.append(_disc(one.points[-1], 0.5 * min(one.thickness[-1], two.thickness[0]), bulge))
-        for node, strip, last in ((beam.start, found[0], False), (beam.end, found[-1], True)):
-            size = float(strip.thickness[-1 if last else 0])
-            at = strip.points[-1 if last else 0]
-            pieces.append(_disc(at, 0.5 * size, bulge))
-            support = network.nodes[node].support
-            if _padded(assembly, node):
-                add(f"the pad of {name} at {node}", _pad(assembly, strip, last, _moves(assembly, node)), node)
-            elif support.across and not support.rotation:
-                add(f"the eye of {name} at {node}", _disc(at, EYE * size, bulge), node)
-                holes.append(_disc(at, HOLE * size, bulge))
-            for arm in _arm(network, node, at, PAD * size):
-                add(f"the arm of {name} at {node}", arm, node)
-    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
-    for link in network.links:
-        a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
-        if np.hypot(*(b - a)) > 0:
-            add(f"the bar from {link.master} to {link.node}", _bar(a, b, PAD * thick), link.master, link.node)
-    return pieces, blocks, holes
-
-
-def _padded(assembly: Assembly, node: str) -> bool:
-    """Tell whether the beams at a node end in a pad: at a clamp, at a guide, at what moves as one with another node.
-
-    Not on the mirror axis: there the beams of the two halves meet.
-    """
-    if on_axis(assembly, node):
-        return False
-    found = assembly.network.nodes[node]
-    linked = {link.node for link in assembly.network.links}
-    return (found.support.rotation and found.support.across) or node in linked
-
-
-def _moves(assembly: Assembly, node: str) -> bool:
-    """Tell whether a pad at a node moves: it is driven, guided or linked."""
-    about = assembly.network.nodes[node].support
-    return node in moving_nodes(assembly) or not (about.along and about.across and about.rotation)
-
-
-def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
-    """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
-    ends = _ends(assembly, beams, node)
-    if ends and _padded(assembly, node):
-        middle: FloatArray = _pad(assembly, *ends[0], _moves(assembly, node)).mean(axis=0)
-        return middle
-    found = assembly.network.nodes[node]
-    return np.array([found.x, found.y])
-
-
-def _ends(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[tuple[BeamStrip, bool]]:
-    """Return the strips that end at a node, and whether with their last point."""
-    network = assembly.network
-    firsts = [(found[0], False) for name, found in beams.items() if network.beams[name].start == node]
-    return firsts + [(found[-1], True) for name, found in beams.items() if network.beams[name].end == node]
-
-
-def _arm(network: Network, node: str, at: FloatArray, width: float) -> list[FloatArray]:
-    """Return the bar from a node to the end of a beam that stands beside it [m]; none where it stands on it."""
-    place = np.array([network.nodes[node].x, network.nodes[node].y])
-    return [_bar(place, at, width)] if np.hypot(*(at - place)) > ROUGH else []
-
-
-def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
-    """Return a polygon whose sides are no farther than `bulge` [m] within the circle."""
-    turn = np.linspace(0.0, 2 * math.pi, max(_CORNERS, 4 * quarter_pieces(radius, bulge)), endpoint=False)
-    return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
-
-
-def _pad(assembly: Assembly, strip: BeamStrip, last: bool, moves: bool) -> FloatArray:
-    """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
-    part = assembly.spec.mechanism.part
-    index = -1 if last else 0
-    at, angle, size = strip.points[index], float(strip.angle[index]), float(strip.thickness[index])
-    out = np.array([math.cos(angle), math.sin(angle)]) * (1 if last else -1)
-    side = np.array([-out[1], out[0]])
-    depth, half = PAD * size, 0.5 * PAD * size
-    if part is not None and part.pad is not None:
-        depth, half = part.pad[0], 0.5 * part.pad[1]
-    if part is not None and part.frame is not None:
-        depth = (part.frame.shuttle if moves else part.frame.wall) or depth
-    return np.array(
-        [at + half * side, at - half * side, at - half * side + depth * out, at + half * side + depth * out]
-    )
-
-
-def _bar(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
-    """Return a bar around the line between two places, with square ends half a width beyond them."""
-    along = (b - a) / np.hypot(*(b - a))
-    side, over = 0.5 * width * np.array([-along[1], along[0]]), 0.25 * width * along
-    return np.array([a - over - side, b + over - side, b + over + side, a - over + side])
-
-
-def _bars(
-    assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float
-) -> dict[str, FloatArray]:
-    """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
-    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
-    found: dict[str, FloatArray] = {}
-    for node in sorted(moving_nodes(assembly)):
-        ends = _ends(assembly, beams, node)
-        if not ends or on_axis(assembly, node):
-            continue
-        padded = _padded(assembly, node)
-        middle = _pad(assembly, *ends[0], True)[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
-        other = mirrored(middle[None], at, direction)[0]
-        if np.hypot(*(other - middle)) > 0:
-            found[node] = _bar(middle, other, _shuttle(assembly) or PAD * thick)
-    return found
-
-
-def _shuttle(assembly: Assembly) -> float | None:
-    part = assembly.spec.mechanism.part
-    return part.frame.shuttle if part is not None and part.frame is not None else None
 
 
 def _line(strip: BeamStrip) -> Smooth:

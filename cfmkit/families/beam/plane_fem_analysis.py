@@ -6,6 +6,7 @@ model of beams; an eye turns about its hole as one piece. No contact, no plastic
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
@@ -17,17 +18,9 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.fem_stress_in_each_fillet import fillets
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.network_elements_spec import PartSpec
-from cfmkit.families.beam.network_from_spec import (
-    assemble,
-    constant_load,
-    mirror_axis,
-    on_axis,
-    resolve,
-    thinnest_of,
-)
+from cfmkit.families.beam.network_from_spec import assemble, constant_load, mirror_axis, on_axis, resolve, thinnest_of
 from cfmkit.families.beam.node_motions_from_fem import SolidNodes
-from cfmkit.families.beam.outline import drawing, regions, standing_frame
+from cfmkit.families.beam.outline import drawing, drawn_fillet, regions, standing_frame
 from cfmkit.families.beam.requested_node_columns import output_columns
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges, target_of
 from cfmkit.families.beam.strips_and_gaps import mirrored
@@ -37,6 +30,7 @@ from cfmkit.families.fem_results import fillet_table, largest_concentration
 from cfmkit.families.findings import bracket, sharp_inside
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.units import between, format_short
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -52,21 +46,21 @@ if TYPE_CHECKING:
     from cfmkit.families.fem_results import FilletRow
     from cfmkit.families.run_control import Run
     from cfmkit.results import Finding
+    from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution, Part
     from cfmkit.solid.path_up_to_load import LoadPath
-    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
     from cfmkit.tables import Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolidSolution(ShortRepr):
-    """A part that was solved on two meshes.
+    """A part that was solved.
 
     Attributes
     ----------
     assembly : Assembly
         The network that the part is drawn from.
-    meshes : TwoMeshes
+    solved : AdaptiveSolution
     motion : (n,) array
         Travel of the points of the curve [m or rad].
     reached : LoadPath or None
@@ -74,7 +68,7 @@ class SolidSolution(ShortRepr):
     """
 
     assembly: Assembly
-    meshes: TwoMeshes
+    solved: AdaptiveSolution
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
     reached: LoadPath | None = None
 
@@ -90,8 +84,8 @@ class SolidSolution(ShortRepr):
 
     @property
     def fine(self) -> MeshSolution:
-        """The finer mesh, whose values are reported."""
-        return self.meshes.fine
+        """The part on its mesh."""
+        return self.solved.solution
 
     @property
     def copies(self) -> int:
@@ -133,6 +127,11 @@ class SolidSolution(ShortRepr):
         return stable if self.reached is None else stable & (self.fine.course.law().derivative()(self.motion) > 0.0)
 
     @property
+    def effort_error(self) -> float:
+        """Error of the mesh [N or N m]."""
+        return self.error.force * float(np.abs(self.effort).max())
+
+    @property
     def everywhere(self) -> None:
         """Nothing: a pose between two of these takes seconds."""
 
@@ -165,8 +164,8 @@ class SolidSolution(ShortRepr):
 
     @cached_property
     def error(self) -> MeshError:
-        """What the two meshes differ by."""
-        return self.meshes.error
+        """How closely force and stress are known."""
+        return self.solved.error
 
     @cached_property
     def fillets(self) -> tuple[FilletRow, ...]:
@@ -191,15 +190,15 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     """
 
     try:
-        assembly, meshes = _solved(spec, run)
+        assembly, solved = _solved(spec, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    if why := meshes.no_curve(2):
+    if why := solved.no_curve(2):
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
-        message = f"no curve: {why}; check mechanism.drive, {keys}, analysis.solid.mesh"
+        message = f"no curve: {why}; check mechanism.drive, {keys}"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    solution = _under_load(spec, assembly, meshes) if driven_by_load(spec) else _moved(assembly, meshes)
+    solution = _under_load(spec, assembly, solved) if driven_by_load(spec) else _moved(assembly, solved)
     message = _ended(solution)
     if len(solution.motion) < 2:
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {message}")
@@ -222,13 +221,14 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         target=target_of(solution),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
+        effort_error=solution.effort_error,
         tables={"fillets": partial(_fillet_table, solution)},
         state=solution,
     )
 
 
-def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, TwoMeshes]:
-    """Return the network that a part is drawn from and the part on two meshes, moved far enough where a load drives it.
+def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, AdaptiveSolution]:
+    """Return the network that a part is drawn from and the part, moved far enough where a load drives it.
 
     Raises
     ------
@@ -241,46 +241,46 @@ def _solved(spec: BeamSpec, run: Run) -> tuple[Assembly, TwoMeshes]:
     return assembly, driven_part(spec, assembly).solved(run.progress)
 
 
-def _moved(assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+def _moved(assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
     """Return the points of the curve of a part that is moved: even ones, as far as its path leads."""
-    spec, travel = assembly.spec, meshes.fine.course.travel
+    spec, travel = assembly.spec, solved.solution.course.travel
     asked, forwards = np.linspace(0.0, spec.extent, spec.analysis.points), np.sign(spec.extent)
     reached = forwards * asked <= forwards * travel[-1] * (1 + 1e-12)
-    return SolidSolution(assembly, meshes, read_only(asked[reached]))
+    return SolidSolution(assembly, solved, read_only(asked[reached]))
 
 
-def _under_load(spec: BeamSpec, assembly: Assembly, meshes: TwoMeshes) -> SolidSolution:
+def _under_load(spec: BeamSpec, assembly: Assembly, solved: AdaptiveSolution) -> SolidSolution:
     """Return the points of the curve of a part under a load: even loads, or an even travel through its maxima."""
     from cfmkit.solid.path_up_to_load import travels_at, up_to_load, with_poses
 
     load, through = load_of_one(spec), spec.analysis.through_folds
-    fine, reached = up_to_load(meshes.fine, load, through)
-    meshes = replace(meshes, fine=with_poses(fine, _ends_of_windows(spec, reached.end)))
+    fine, reached = up_to_load(solved.solution, load, through)
+    solved = replace(solved, solution=with_poses(fine, _ends_of_windows(spec, reached.end)))
     if through:
         motion = read_only(np.linspace(0.0, reached.end, spec.analysis.points))
     else:
         motion = travels_at(fine.course, np.linspace(0.0, load, spec.analysis.points))
-    return SolidSolution(assembly, meshes, motion, reached)
+    return SolidSolution(assembly, solved, motion, reached)
 
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.boundary_and_element_sizes import with_arcs
-    from cfmkit.solid.meshed_part import TURN, HeldOrDriven, Part, largest_in, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, largest_in, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     frame = standing_frame(spec)
-    cut = [contour for contour in drawing(_without_frame(spec, frame)).contours if contour.layer == "cut"]
+    drawn = drawing(_without_frame(spec, frame))
+    cut = [contour for contour in drawn.contours if contour.layer == "cut"]
     material, width = (next(iter(spec.mechanism.of_beams(key).values())) for key in ("material", "width"))
     law = LAWS[material.law](material.modulus, material.poisson)
     places = [
         HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams, _load(assembly, one))
         for one in regions(spec)
     ]
-    fillet = (spec.mechanism.part or PartSpec()).fillet
-    rings = tuple(with_arcs(ring, fillet, TURN) for ring in rings_of(cut))
     thinnest = _thinnest(assembly)
-    return Part(rings, thinnest, width, law, tuple(places), (), largest_in(rings, thinnest), frame)
+    rings = rings_of(cut, thinnest)
+    largest = largest_in(rings, thinnest)
+    return Part(rings, thinnest, width, law, tuple(places), (), largest, frame, drawn.sections)
 
 
 def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
@@ -290,7 +290,7 @@ def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
     part = spec.mechanism.part
     if not frame or part is None or part.frame is None:
         return spec
-    pads = [one for place in regions(spec) for one in place.shapes if len(one) == 4]
+    pads = [one for place in regions(spec) for one in place.shapes if place.padded]
     kept = outside([one.at for one in part.holes], frame, pads)
     holes = tuple(one for one, keep in zip(part.holes, kept, strict=True) if keep)
     alone = part.model_copy(update={"frame": part.frame.model_copy(update={"ground": None}), "holes": holes})
@@ -299,11 +299,9 @@ def _without_frame(spec: BeamSpec, frame: tuple[FloatArray, ...]) -> BeamSpec:
 
 def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
     """Return the part with the travels that it is solved for."""
-    from cfmkit.solid.meshed_part import ACROSS
-    from cfmkit.solid.two_meshes import DrivenPart
+    from cfmkit.solid.adaptive_solution import DrivenPart
 
-    part = part_of(spec, assembly)
-    return DrivenPart("beams", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+    return DrivenPart("beams", part_of(spec, assembly), spec.analysis.solid.error, tuple(_stops(spec)))
 
 
 def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
@@ -434,6 +432,13 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     if not _turns(solution.spec):
         numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | _limit(solution)
         numbers |= ranges(solution) if solution.reached is None else {}
+        if solution.solved.critical_points:
+            first = solution.solved.critical_points[0]
+            numbers |= {
+                "bifurcation_displacement": first.travel,
+                "critical_force": solution.copies * first.effort,
+                "critical_error": None if math.isnan(first.error) else first.error,
+            }
     return quantities(DEFINITIONS, numbers) | largest_concentration(solution.fillets)
 
 
@@ -452,12 +457,10 @@ def _limit(solution: SolidSolution) -> dict[str, float | None]:
     return {"limit_force": solution.copies * sense * float(law(first)) if first < law.x[-1] else None}
 
 
-def _sharp(fillet: float) -> str:
-    """Return what is wrong with fillets of a radius [m] that the outline does not have; empty if it has them."""
-    from cfmkit.export.union import ROUGH
-    from cfmkit.solid.boundary_and_element_sizes import smallest_arc
-
-    if 0.0 < fillet < smallest_arc(ROUGH):
+def _sharp(spec: BeamSpec) -> str:
+    """Return what is wrong with fillets that the outline does not have; empty if it has them."""
+    fillet = spec.mechanism.fillet
+    if fillet > 0.0 == drawn_fillet(spec):
         radius = format_short(fillet, "length")
         return f"in the outline, fillets of {radius} are sharp corners: the stress there has no value"
     return sharp_inside(fillet, ())
@@ -467,11 +470,13 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
     if reported := _ended(solution):
         yield finding("ends_early" if course.touching is None else "self_contact", reported)
-    for place in course.bifurcations:
-        at = format_short(place, "angle" if _turns(spec) else "length")
-        yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
-    if reported := _sharp((spec.mechanism.part or PartSpec()).fillet):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    for point in solution.solved.critical_points:
+        at = format_short(point.travel, "angle" if _turns(spec) else "length")
+        load = format_short(solution.copies * point.effort, "torque" if _turns(spec) else "force")
+        known = "" if math.isnan(point.error) else f" (both within {100 * point.error:.2g} %)"
+        yield finding("bifurcation", f"the part leaves its path at {at} and {load}{known} for a stable branch")
+    if reported := _sharp(spec):
+        yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     yield from drawing(spec).warnings
     for name, reported in solution.error.too_large():
         yield finding(name, reported)

@@ -25,15 +25,19 @@ from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples
 from cfmkit.families.run_control import Run
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening, is_too_wide
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.specs.yamlio import read_document
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Room
     from cfmkit.families.wishes import Wish
+    from cfmkit.results import Result
 
 SHAPES = ("lan-2010", "lan-flat", "lan-wide", "lan-tall", "arch", "end-effector", "end-effector-leg")
 """Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
@@ -54,6 +58,9 @@ FLAT = 1.0
 """Least width of a beam over its thickness: narrower ones leave the plane."""
 
 OFFERED = 14
+
+WIDE_LAST = 100.0
+"""Promise of shapes whose beams are too wide to curl: they come after all others."""
 
 SAYS_LESS = 1e3
 """Times by which a shape that cannot travel so far misses more: the reason is that of one that can, if there is any."""
@@ -188,9 +195,12 @@ def _sized(
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if wish.good_parts is None else -thicker * thin
+    strain = wish.strength_used * strength / material.modulus
+    promise += WIDE_LAST * is_too_wide(wish, wide, thicker * thin, strain)
     variant = called(f"shape {kept.name}", wish, block)
-    finish = "cfmkit.families.beam.proposals_for_wish:finish"
-    return Candidate(variant, spec, False, finish, promise, ("mechanism.thickness", "mechanism.width"))
+    here = "cfmkit.families.beam.proposals_for_wish"
+    free = "mechanism.thickness", "mechanism.width"
+    return Candidate(variant, spec, False, f"{here}:finish", promise, free, f"{here}:correct")
 
 
 def _width(wish: Wish, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:
@@ -215,33 +225,49 @@ def _written(
 
 
 def finish(spec: BeamSpec, wish: Wish) -> BeamSpec:
-    """Return a rescaled shape with the flattest window and the width that its model with stretch and shear wants.
-
-    The force is linear in the width. Where the stress of that model is above the allowable one, the beams get
-    thinner and wider: it falls nearly as the thickness.
-    """
-    made, allowed = spec, wish.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
+    """Return a rescaled shape with the flattest window and the width that its model with stretch and shear wants."""
+    made = spec
     for _ in range(2):
-        longer = 1.12 * float(made.analysis.travel or 0.0)
-        result = analyze(made.replace({"analysis.travel": longer, "analysis.window": None}), Run())
-        found = flattest(result, wish.travel)
-        if found is None:
+        refitted, thinner = _refitted(made, wish, analyze)
+        if refitted is None:
             return made
-        curve = result.curve
-        at = np.linspace(*found, 101)
-        mean = float(np.interp(at, curve.motion, curve.effort).mean())
-        top = float(np.interp(at, curve.motion, np.maximum.accumulate(curve.extra["max_stress"].values)).max())
-        thinner = min(1.0, 0.99 * allowed / top)
-        thickness = float(made.mechanism.thickness) * thinner  # type: ignore[arg-type]
-        width = made.mechanism.width * wish.target / (mean * thinner**3)
-        made = made.replace(
-            {
-                "mechanism.thickness": thickness,
-                "mechanism.width": width,
-                "analysis.travel": Place(found[1], "length"),
-                "analysis.window": tuple(Place(end, "length") for end in found),
-            }
-        )
+        made = refitted
         if thinner == 1.0:
             break
     return made
+
+
+def correct(spec: BeamSpec, wish: Wish) -> BeamSpec:
+    """Return a shape with the flattest window, the thickness and the width that it needs as a solid."""
+    from cfmkit.families.beam.plane_fem_analysis import analyze as solve_solid
+
+    solid = spec.replace({"analysis.fidelity": "solid"})
+    refitted, _ = _refitted(solid, aim_below_stiffening(spec, wish, analyze), solve_solid)
+    return solid if refitted is None else refitted
+
+
+def _refitted(spec: BeamSpec, wish: Wish, model: Callable[[BeamSpec, Run], Result]) -> tuple[BeamSpec | None, float]:
+    """Return a shape over its flattest window by a model, its force as wished, and by what its beams became thinner.
+
+    The force is linear in the width. Where the stress is above the allowable one, the beams get thinner and wider: it
+    falls nearly as the thickness. None where the curve is shorter than the travel.
+    """
+    longer = 1.12 * float(spec.analysis.travel or 0.0)
+    free = {"analysis.travel": longer, "analysis.window": None, "requirements": (), "sensitivity": None}
+    result = model(spec.replace(free), Run())
+    found = flattest(result, wish.travel)
+    if found is None:
+        return None, 1.0
+    curve, allowed = result.curve, wish.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
+    mean = float(np.interp(np.linspace(*found, 101), curve.motion, curve.effort).mean())
+    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
+    thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
+    thickness = float(spec.mechanism.thickness) * thinner  # type: ignore[arg-type]
+    changes = {
+        "mechanism.thickness": thickness,
+        "mechanism.width": spec.mechanism.width * wish.target / (mean * thinner**3),
+        "analysis.travel": Place(found[1], "length"),
+        "analysis.window": tuple(Place(end, "length") for end in found),
+        "requirements": (),
+    }
+    return spec.replace(changes), thinner

@@ -52,6 +52,12 @@ DEFINITIONS = {
     "limit_force": ("force", "first limit point of a growing force: it snaps there"),
     "limit_displacement": ("length", "first limit point of a growing displacement: it snaps there"),
     "bifurcation_force": ("force", "first bifurcation under a growing force"),
+    "critical_force": ("force", "force of the part as a solid at the first bifurcation on its travel"),
+    "critical_error": (
+        "ratio",
+        "error of `critical_force` and, of the part as a solid, of `bifurcation_displacement`, relative to each: by "
+        "how much they differ on a coarser mesh, at least 1e-4",
+    ),
     "bifurcation_displacement": ("length", "first bifurcation under a growing displacement"),
     "error_estimate": ("ratio", "estimated error of forces and positions, relative to the largest of the path"),
     "gap_min": ("length", "smallest gap between two beams before any load, away from common nodes"),
@@ -134,7 +140,8 @@ def ranges(solution: OnCurve) -> dict[str, float | None]:
     numbers |= {"nominal_force": along.back(nominal), "stress_at_end": _stress_at(along, end)}
     if solution.assembly.allowable_stress is not None:
         numbers["stress_limit_displacement"] = along.back(_stress_reaches(along, solution.assembly.allowable_stress))
-    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), along) if nominal else None
+    known = abs(nominal) > (solution.effort_error or 0.0)  # else 95 % of it are rounding
+    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), along) if known else None
     if start is not None and start <= end and end > 0:
         numbers |= {"range_start": along.back(start), "range_fraction": (end - start) / end}
         if nominal > 0:  # else no band lies around the force there

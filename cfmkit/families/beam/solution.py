@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.outcome.between_points import between_loads, between_points
 from cfmkit.elastica.outcome.folding_path_between_points import along_the_way
+from cfmkit.elastica.outcome.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
@@ -109,6 +110,42 @@ class Solution(ShortRepr):
         by_motion = self.spec.mechanism.drive.kind in ("displacement", "rotation")
         effort = self.path.effort if by_motion else self.path.drive
         return read_only(np.where(self.accurate, self.assembly.effort_unit * effort[self.keep], np.nan))
+
+    @cached_property
+    def effort_error(self) -> float | None:
+        """Numerical error of the effort [N or N m]; None under a load, which is the effort itself."""
+        if self.spec.mechanism.drive.kind not in ("displacement", "rotation"):
+            return None
+        return self.assembly.effort_unit * effort_error(self.path, self.spec.analysis.tolerance)
+
+    def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest effort of one beam or spring of one copy at places of the motion of any shape [N or N m].
+
+        Where the path turns back, between its points, and of several states at one place the largest.
+        """
+        if self.everywhere is not None:
+            return self._part_efforts_at(np.ravel(places)).reshape(np.shape(places))
+        motion, efforts = self.with_ends.motion, self.with_ends.largest_member_efforts
+        low, high = np.minimum(motion[1:], motion[:-1]), np.maximum(motion[1:], motion[:-1])
+        at = np.clip(places, low.min(), high.max())[:, None]
+        share = np.clip((at - motion[:-1]) / np.where(high > low, np.diff(motion), 1.0), 0.0, 1.0)
+        between = (1.0 - share) * efforts[:-1] + share * efforts[1:]
+        return np.asarray(np.where((at >= low) & (at <= high), between, 0.0).max(axis=1))
+
+    def _part_efforts_at(self, places: FloatArray) -> FloatArray:
+        assert self.everywhere is not None
+        there = self.everywhere.at(places)
+        alone = replace(self, path=there, keep=np.arange(len(there)), ends=())
+        return np.where(there.accurate, alone.largest_member_efforts, np.nan)
+
+    @cached_property
+    def largest_member_efforts(self) -> FloatArray:
+        """Largest effort of one beam or spring of one copy at every point of the curve [N or N m]."""
+
+        def motion(path: Path) -> FloatArray:
+            return replace(self, path=path, keep=np.arange(len(path)), ends=()).motion
+
+        return read_only(largest_member_efforts(self.path, self.keep, motion))
 
     @cached_property
     def accurate(self) -> Any:
@@ -228,6 +265,10 @@ class OnCurve(Protocol):
     @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         """Of each beam, or of the part, the largest stress (n,) [Pa] and its place."""
+
+    @property
+    def effort_error(self) -> float | None:
+        """Numerical error of the effort [N or N m]; None: not known."""
 
     @property
     def accurate(self) -> Any:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
+from cfmkit.export.beam_sections import BeamSection
+from cfmkit.export.contours import Line, Smooth
+from cfmkit.export.union import OutlinePiece
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -18,20 +21,35 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.network import Network
+    from cfmkit.export.contours import Edge
 
 STEPS, MOST_STEPS = 160, 20_000
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+STRAIGHT = 1e-9  # of the thickness: edges that bulge less are lines
+TINY = 1e-30  # of a complex step
 NEAR = 3.0  # thicknesses beside a common end that are no gap
 TOGETHER = 0.25  # of the thickness: ends closer than this are one
 
 
 @dataclass(frozen=True)
 class BeamStrip:
-    """A smooth piece of a beam: centre line (n, 2) [m], its angle [rad] and the thickness [m] there."""
+    """A smooth piece of a beam.
+
+    Attributes
+    ----------
+    points : (n, 2) array
+        Of its centre line [m].
+    angle, thickness : (n,) array
+        There [rad], [m].
+    curvature, slope : (n,) array
+        How fast these change along the line [1/m], [1].
+    """
 
     points: FloatArray
     angle: FloatArray
     thickness: FloatArray
+    curvature: FloatArray
+    slope: FloatArray
 
     @property
     def sides(self) -> tuple[FloatArray, FloatArray]:
@@ -39,6 +57,50 @@ class BeamStrip:
         normal = np.column_stack([-np.sin(self.angle), np.cos(self.angle)])
         half = 0.5 * self.thickness[:, None] * normal
         return self.points + half, self.points - half
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """Its boundary, counter-clockwise: right edge, end, left edge, start."""
+        along = np.column_stack([np.cos(self.angle), np.sin(self.angle)])
+        aside = np.column_stack([-along[:, 1], along[:, 0]])
+        bend, opens = 0.5 * (self.thickness * self.curvature)[:, None], 0.5 * self.slope[:, None]
+        left, right = self.sides
+        ways = ((1.0 - bend) * along + opens * aside, (1.0 + bend) * along - opens * aside)
+        one, other = (way / np.hypot(*way.T)[:, None] for way in ways)
+        start, end = ((tuple(right[k].tolist()), tuple(left[k].tolist())) for k in (0, -1))
+        return Smooth(right, other), Line(*end), Smooth(left[::-1], -one[::-1]), Line(*start[::-1])
+
+    @property
+    def straight(self) -> bool:
+        """Whether its edges are straight lines."""
+        chords = [line[-1] - line[0] for line in self.sides]
+        off = [np.abs(chord[0] * (line - line[0])[:, 1] - chord[1] * (line - line[0])[:, 0]).max() / np.hypot(*chord)
+               for line, chord in zip(self.sides, chords, strict=True)]  # fmt: skip
+        return bool(max(off) <= STRAIGHT * float(self.thickness.min()))
+
+    @property
+    def length(self) -> float:
+        """Of its centre line [m]."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+    def section(self, beam: str) -> BeamSection:
+        """Return the section in its middle, of a beam of that name."""
+        k = len(self.points) // 2
+        across = np.array([-np.sin(self.angle[k]), np.cos(self.angle[k])])
+        return BeamSection(beam, self.points[k], across, float(self.thickness[k]), self.length)
+
+    @property
+    def piece(self) -> OutlinePiece:
+        """What of the part it is."""
+        if self.straight:
+            left, right = self.sides
+            return OutlinePiece.polygon(np.array([right[0], right[-1], left[-1], left[0]]))
+        return OutlinePiece(self.edges, tuple(self.polygons))
+
+    def mirrored(self, at: complex, direction: float) -> BeamStrip:
+        """Return its mirror image about the line through a point [m] along a direction [rad]."""
+        points, angle = mirrored(self.points, at, direction), 2.0 * direction - self.angle
+        return replace(self, points=points, angle=angle, curvature=-self.curvature)
 
     @property
     def sagitta(self) -> float:
@@ -111,7 +173,10 @@ def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
     middle = float(place[len(place) // 2])
     thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
-    return BeamStrip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness))
+    turn = np.imag(fit.angle(t + 1j * TINY, inside)) / TINY / np.real(fit.speed(t, inside))
+    slope = np.full(len(t), (thickness[-1] - thickness[0]) / ((place[-1] - place[0]) * float(np.real(fit.length))))
+    angle = np.real(fit.angle(t, inside))
+    return BeamStrip(*(read_only(one) for one in (points, angle, thickness, turn + np.zeros(len(t)), slope)))
 
 
 def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:

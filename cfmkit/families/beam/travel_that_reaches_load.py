@@ -65,15 +65,13 @@ def moved_far_enough(
     cfmkit.errors.GeometryError
         If the part cannot be meshed.
     """
-    from cfmkit.solid.meshed_part import ACROSS, COARSER
     from cfmkit.solid.path_up_to_load import travel_for
 
     guess = _travel_of_beams(assemble(spec))
     moved = moved_by(spec, guess)
     found = part(moved, assemble(moved))
-    fine = spec.analysis.solid.mesh or found.thinnest / ACROSS
     travel = travel_for(
-        found.meshed(COARSER * fine),
+        found.meshed(),
         load_of_one(spec),
         guess,
         max(spec.analysis.solid.poses, 5),

@@ -25,9 +25,12 @@ def _parts(spec: CamSpec) -> Iterator[BoughtPart]:
     rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
     count = len(rates) if len(rates) > 1 else springs.count or 1
     limit = f", up to {mm(springs.max_elongation)}" if springs.max_elongation else ""
+    opens = f", initial tension {newton(springs.initial_tension)}" if springs.initial_tension else ""
     tight = f", stretched by {mm(mechanism.preload)} at the start" if mechanism.preload else ""
     reported = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
-    yield BoughtPart("between the rollers", springs.name or "", count, f"extension spring, {reported}{limit}{tight}")
+    yield BoughtPart(
+        "between the rollers", springs.name or "", count, f"extension spring, {reported}{opens}{limit}{tight}"
+    )
     if bearings := mechanism.bearings:
         rated = f", C {newton(bearings.dynamic_rating)}" if bearings.dynamic_rating else ""
         rated += f", C0 {newton(bearings.static_rating)}" if bearings.static_rating else ""

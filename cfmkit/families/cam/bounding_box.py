@@ -12,7 +12,7 @@ from cfmkit.families.cam.part_positions_for_pictures import pose, roller_path
 from cfmkit.stock.springs.made_to_measure import extension_spring
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.spec import Springs
+    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.results import Result
 
 PLATE = 0.008

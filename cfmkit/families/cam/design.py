@@ -42,13 +42,14 @@ from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, refusals_answered
 from cfmkit.results import OVERWRITTEN, Design, Finding, Status
 from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
-from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.spec import offers
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
+    from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism
+    from cfmkit.families.cam.springs_spec import Springs
     from cfmkit.families.cam.statics import Loads
     from cfmkit.families.run_control import Run
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
@@ -63,7 +64,7 @@ class Choice:
     active: tuple[str, ...] = ()
     note: str = ""
     preload: float = 0.0
-    """Elongation of the springs at the start [m]."""
+    """Elongation of the springs at the start, with that which stands for their initial tension [m]."""
 
 
 @refusals_answered
@@ -149,7 +150,7 @@ def _law(
 ) -> SlopeLaw:
     """Return the slope law of a designed profile; the elongation `preload` [m] is the mechanism's unless given."""
     mechanism = spec.mechanism
-    half = 0.5 * (mechanism.preload if preload is None else preload)
+    half = 0.5 * (mechanism.effective_preload if preload is None else preload)
     law = SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
     shape = target_shape(target, _slider_weight(spec, target))
     if shape is None:
@@ -213,13 +214,13 @@ def _from_springs(spec: CamSpec, target: CamDesign, pull: float, factor: float, 
     springs = spec.mechanism.springs
     constant = pull / (4.0 * springs.total)
     if smallest is None or not _undercuts(spec, _law(spec, target, constant, factor), smallest):
-        return Choice(constant, springs, preload=spec.mechanism.preload)
+        return Choice(constant, springs, preload=spec.mechanism.effective_preload)
     softer = springs.scaled_to(pull / (4.0 * smallest))
     note = (
         f"to avoid undercut A is raised from {mm(constant)} to {mm(smallest)}; the springs must then add up to "
         f"{rate(softer.total)} instead of {rate(springs.total)}"
     )
-    return Choice(smallest, softer, ("design.avoid_undercut",), note, spec.mechanism.preload)
+    return Choice(smallest, softer, ("design.avoid_undercut",), note, spec.mechanism.effective_preload)
 
 
 def _with_preload(spec: CamSpec, target: CamDesign, pull: float, factor: float, _smallest: float | None) -> Choice:
@@ -236,8 +237,9 @@ def _with_preload(spec: CamSpec, target: CamDesign, pull: float, factor: float, 
                 "('mechanism.roller_radius') or less friction ('design.friction')",
             )
         )
-    preload = 2.0 * half * (1 + 1e-12)
-    return Choice(constant, mechanism.springs, note=_preload_note(mechanism, preload), preload=preload)
+    opened = mechanism.springs.tension_stretch
+    preload = max(2.0 * half * (1 + 1e-12), opened)
+    return Choice(constant, mechanism.springs, note=_preload_note(mechanism, preload - opened), preload=preload)
 
 
 def _preload_note(mechanism: Mechanism, preload: float) -> str:
@@ -263,7 +265,7 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
             {"design.force_constant": at_least(smallest)},
         )
     springs = spec.mechanism.springs.scaled_to(pull / (4.0 * constant))
-    return Choice(constant, springs, preload=spec.mechanism.preload)
+    return Choice(constant, springs, preload=spec.mechanism.effective_preload)
 
 
 def _from_catalogue(
@@ -294,20 +296,18 @@ def _with_spring(
     Between axes that are farther apart than its free length a spring is stretched at the start; its initial tension
     acts like more of that.
     """
-    from cfmkit.families.cam.spec import Springs
+    from cfmkit.families.cam.springs_spec import Springs
 
     label, (pull, factor, smallest) = f"{count} x {item.name}", wanted
-    preload, reserve = spec.mechanism.preload, item.initial_tension / item.rate
+    opened = item.initial_tension / item.rate
+    preload = spec.mechanism.preload + opened
     if item.free_length is not None:
         room = 2.0 * spec.mechanism.rest_half_width
         if item.free_length > room * (1 + 1e-9):
             text = f"too long ({mm(item.free_length)} relaxed between axes {mm(room)} apart at the start)"
             return Miss(label, item.free_length / room - 1.0, text)
-        preload = room - item.free_length + reserve
-    largest = None if item.largest is None else item.largest + reserve
-    springs = Springs(
-        stiffness=item.rate, count=count, max_elongation=largest, name=item.name, wound=wire_of(item), life=item.life
-    )
+        preload = room - item.free_length + opened
+    springs = Springs.of(item, count)
     constant = pull / (4.0 * springs.total)
     law = _law(spec, target, constant, factor, preload)
     if smallest is not None and _undercuts(spec, law, smallest):
@@ -321,7 +321,7 @@ def _with_spring(
         return Miss(label, target.stroke / max(reached, 1e-9) - 1.0, text)
     if target.spring_life is not None:
         most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
-        if missed := SpringInUse.of(item, preload - reserve, most - reserve).misses_life(target.spring_life):
+        if missed := SpringInUse.of(item, preload - opened, most - opened).misses_life(target.spring_life):
             return Miss(label, *missed)
     rest = spec.mechanism.rest_half_width - 0.5 * preload
     gap = two_way_gap(law, target, loads_of(spec, springs.total, rest), spec.mechanism.rolling_friction)
@@ -349,7 +349,7 @@ def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
     path, end = reach(law, target.stroke)
     limit = springs.max_elongation
     if limit:
-        end = min(end, law.rest_half_width + 0.5 * limit - law.preload)
+        end = min(end, law.rest_half_width + 0.5 * (limit + springs.tension_stretch) - law.preload)
     return max(float(path.travel(end)), 0.0) if end > law.rest_half_width else 0.0
 
 
@@ -413,9 +413,10 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
             ),
             {"design.stroke": at_most(reached)},
         )
-    elongation, limit = 2.0 * (end - law.rest_half_width + law.preload), springs.max_elongation
+    limit, opened = springs.max_elongation, springs.tension_stretch
+    elongation = 2.0 * (end - law.rest_half_width + law.preload) - opened
     if limit and elongation > limit:
-        shorter = max(float(path.travel(law.rest_half_width + 0.5 * limit - law.preload)), 0.0)
+        shorter = max(float(path.travel(law.rest_half_width + 0.5 * (limit + opened) - law.preload)), 0.0)
         raise Infeasible(
             finding(
                 "spring_overstretched",
@@ -480,11 +481,13 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
         "rest_half_width": mechanism.rest_half_width,
         "roller_radius": mechanism.roller_radius,
     }
-    springs = choice.springs.model_dump(exclude_none=True)
+    springs = choice.springs.model_dump(exclude_none=True, exclude_unset=True)
     for stated in ("preload", "rest_length"):  # what the file says is replaced by what was chosen, nothing included
         springs.pop(stated, None)
     if choice.preload:
-        profile["preload"] = springs["preload"] = choice.preload
+        profile["preload"] = choice.preload
+        if stretched := max(choice.preload - choice.springs.tension_stretch, 0.0):
+            springs["preload"] = stretched
     changes: dict[str, Any] = {"mechanism.profile": profile, "mechanism.springs": springs}
     if (shape := target_shape(target, _slider_weight(spec, target))) is not None and target.target is not None:
         points = tuple(zip(shape.places, shape.values, strict=True))

@@ -19,6 +19,7 @@ from cfmkit.families.cam.part_positions_for_pictures import (
     swallowtail,
 )
 from cfmkit.families.cam.scalar_results import constant_force
+from cfmkit.numerics.holes_in_samples import holes_between
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.plots.bands_from_requirements import limits_on
@@ -249,7 +250,9 @@ def springs(result: Result) -> Figure:
     diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
     figure = diagram_figure(Heading.of(result, "elongation of the springs"), [diagram], right_mm=17.0)
     stiffness, count = float(to_border(solution.assembly.loads.stiffness, "stiffness")), spring_count(solution)
-    right_axis(figure.axes[0], stiffness, f"force of {'the spring' if count == 1 else f'the {count} springs'} [N]")
+    words = "the spring" if count == 1 else f"the {count} springs"
+    tension = count * solution.assembly.spec.mechanism.springs.initial_tension
+    right_axis(figure.axes[0], stiffness, f"force of {words} [N]", float(to_border(tension, "force")))
     return figure
 
 
@@ -369,6 +372,8 @@ def _over_height(built: Built, side: int, values: FloatArray, heights: FloatArra
     y = built.registration.points[side][used, 1]
     order = np.argsort(y, kind="stable")
     found: FloatArray = np.interp(heights, y[order], values[used][order])
+    for low, high in holes_between(y[order], heights[0], heights[-1]):
+        found[(heights > low) & (heights < high)] = np.nan
     return found
 
 
@@ -381,7 +386,7 @@ def shares(result: Result) -> Figure:
         Series(parts["friction_up"], "friction, up", VERMILLION, prefer=0.6),
         Series(parts["friction_down"], "friction, down", PURPLE, prefer=0.6),
     ]
-    if np.abs(parts["rest"]).max() > 0:
+    if np.nanmax(np.abs(parts["rest"])) > 0:
         series.append(Series(parts["rest"], "rest length", OCHRE, prefer=0.8))
     over = built.travel + built.origin
     diagram = Diagram(over, Scale("displacement", "length"), Scale("force added to the design's", "force"), series)

@@ -70,6 +70,7 @@ FINDINGS = {
     "profile_outliers": "measured points are so far off that the registration ignored them",
     "noise_understated": "neighbouring points differ by more than the stated noise of the measurement explains",
     "noise_overstated": "the stated noise of the measurement is larger than all errors of the profile",
+    "profile_hole": "a part of a flank was not measured: the force there is not known, nor what holds over it",
     "part_measured": "the flanks were measured over a part of the travel only",
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
@@ -243,8 +244,9 @@ def _dead_point(solution: Solution) -> Iterator[Finding]:
 
 def _travel_at(solution: Solution, elongation: float) -> float:
     """Return the travel at which the springs are stretched by so much [m]."""
-    track, rest = solution.assembly.track, solution.assembly.loads.rest_half_width
-    return min(track.slider_at(rest + 0.5 * elongation) - track.start, float(solution.travel[-1]))
+    track, opened = solution.assembly.track, solution.assembly.spec.mechanism.springs.tension_stretch
+    half_width = solution.assembly.loads.rest_half_width + 0.5 * (elongation + opened)
+    return min(track.slider_at(half_width) - track.start, float(solution.travel[-1]))
 
 
 def _springs(solution: Solution) -> Iterator[Finding]:
@@ -282,7 +284,8 @@ def _lift_off(solution: Solution) -> Iterator[Finding]:
     loads = solution.assembly.loads
     beside = abs(loads.sideways[0])
     if beside and beside > float(spring_force(solution.states, loads)[0]):
-        released = _travel_at(solution, beside / loads.stiffness)
+        opened = loads.stiffness * solution.assembly.spec.mechanism.springs.tension_stretch
+        released = _travel_at(solution, (beside - opened) / loads.stiffness)
         yield finding(
             "lift_off",
             f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
@@ -324,12 +327,28 @@ def findings_of_built(built: Built) -> list[Finding]:
     """Return what the user must know about the measured profile."""
     found = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
     last = built.assembly.stroke
-    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
-        span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
+    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0 or built.unmeasured:
+        ends = [
+            float(built.travel[0]),
+            *(place for hole in built.unmeasured for place in hole),
+            float(built.travel[-1]),
+        ]
+        spans = [f"{mm(low)} to {mm(high)}" for low, high in zip(ends[::2], ends[1::2], strict=True)]
         found.append(
-            finding("part_measured", f"the flanks were measured for {span} of the travel only, which is {mm(last)}")
+            finding(
+                "part_measured",
+                f"the flanks were measured for {' and '.join(spans)} of the travel only, which is {mm(last)}",
+            )
         )
+    if built.unmeasured:
+        found.append(finding("profile_hole", unmeasured(built)))
     return found
+
+
+def unmeasured(built: Built) -> str:
+    """Return what is said of parts of the flanks without points."""
+    spans = " and ".join(f"{mm(low)} to {mm(high)}" for low, high in built.unmeasured)
+    return f"a flank has no points where the rollers touch it from {spans} of travel: the force there is not known"
 
 
 def _built_mechanics(built: Built) -> Iterator[Finding]:
@@ -349,7 +368,7 @@ def _built_mechanics(built: Built) -> Iterator[Finding]:
         place = f"at {mm(float(built.travel[top]))} of travel"
         if reported := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
             yield reported
-    held = ~np.isfinite(built.forces(1.0)[0])
+    held = ~np.isfinite(built.forces(1.0)[0]) & np.isfinite(built.sides.slope[0]) & np.isfinite(built.sides.slope[1])
     if held.any():
         friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]
         yield finding(

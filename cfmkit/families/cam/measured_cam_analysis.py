@@ -28,7 +28,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.contact_pressure import allowable_stress, stress
-from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
+from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out, unmeasured
 from cfmkit.families.cam.geometry.designed_and_built_flanks import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.mechanism_from_spec import (
     assemble,
@@ -43,13 +43,14 @@ from cfmkit.families.cam.scalar_results import (
     design_values,
     largest,
     pressure_of,
-    requested_travel,
     target_force,
     values_of_built,
 )
 from cfmkit.families.cam.solution import Assembly, Built, Sides
+from cfmkit.families.cam.window_of_measured_cam import large_holes, requested_travel
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
 from cfmkit.numerics.rigid_point_registration import (
     CurveFrame,
     Registration,
@@ -61,10 +62,11 @@ from cfmkit.numerics.rigid_point_registration import (
 from cfmkit.numerics.smoothing_spline import smoothed
 from cfmkit.results import Quantity, Result, Status, quantities
 from cfmkit.specs.data_file_paths import DataSource
+from cfmkit.specs.units import between
 from cfmkit.tables.measured_outline import read_sides
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.spec import CamSpec
@@ -99,7 +101,9 @@ def analyze_built(spec: CamSpec) -> Result:
         check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    short, found = (ended.message, [ended]) if ended else ("", [])
+    holes = built.unmeasured
+    short = ended.message if ended else unmeasured(built) if large_holes(built) else ""
+    found = [ended] if ended else []
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
     )
@@ -117,7 +121,7 @@ def analyze_built(spec: CamSpec) -> Result:
             *findings_of_built(built),
         ),
         travel=requested_travel(built),
-        valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
+        valid=_between_holes(built, holes),
         target=(
             target_force(spec, assembly)
             if spec.design or assembly.spec.mechanism.profile.curve
@@ -127,6 +131,14 @@ def analyze_built(spec: CamSpec) -> Result:
         allowable_stress=allowable_stress(spec.mechanism),
         state=built,
     )
+
+
+def _between_holes(built: Built, holes: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Return the intervals of displacement at which both contacts are on measured points [m]."""
+    inner = [place for hole in holes for place in hole]
+    ends = [float(built.travel[0]), *inner, float(built.travel[-1])]
+    pairs = zip(ends[::2], ends[1::2], strict=True)
+    return tuple((low + built.origin, high + built.origin) for low, high in pairs if low < high)
 
 
 def registered(assembly: Assembly) -> Registration:
@@ -191,8 +203,27 @@ def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack,
     found = []
     for u, error, used in zip(registration.parameters, registration.errors, registration.used, strict=True):
         flank = built_flank(design, u[used], error[used], noise)
-        found.append(built_track(flank, mechanism.roller_radius, mechanism.brace_length))
+        track = built_track(flank, mechanism.roller_radius, mechanism.brace_length)
+        found.append(replace(track, holes=_holes(track, np.sort(np.interp(u[used], *flank.arc)), assembly)))
     return found[0], found[1]
+
+
+def _holes(track: BuiltTrack, places: FloatArray, assembly: Assembly) -> tuple[tuple[float, float], ...]:
+    """Return where the slider is while the contact is in a hole between measured points, if that is large [m]."""
+    found = []
+    for low, high in holes_between(places, places[0], places[-1]):
+        inside = track.slider[(track.contact > low) & (track.contact < high)]
+        if len(inside) and np.ptp(inside) > LARGEST_HOLE * _narrowest_window(track, assembly):
+            found.append((float(inside[0]), float(inside[-1])))
+    return tuple(found)
+
+
+def _narrowest_window(track: BuiltTrack, assembly: Assembly) -> float:
+    """Return the width of the narrowest window over which something is measured, by default of the travel [m]."""
+    spec = assembly.spec
+    travel = spec.analysis.travel or float(track.slider[-1]) - assembly.track.start
+    windows = [between(ends, (0.0, travel)) for _, ends in spec.windows()]
+    return min([travel, *(high - low for low, high in windows)])
 
 
 def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[FloatArray, Finding | None]:
@@ -233,6 +264,9 @@ def _solved(
         sides,
         shares_of(assembly, designed, sides),
         displacement_origin(assembly),
+        tuple(
+            (low - assembly.track.start, high - assembly.track.start) for track in tracks for low, high in track.holes
+        ),
     )
 
 
@@ -368,16 +402,25 @@ class BuiltTrack:
         Roller centre [m].
     slope : (n,) array
         dy/dx of the track.
+    contact : (n,) array
+        Arc length of the flank at which the roller touches it [m].
+    holes : tuple of (float, float)
+        Slider positions between which the contact is where nothing was measured [m].
     """
 
     slider: FloatArray
     x: FloatArray
     y: FloatArray
     slope: FloatArray
+    contact: FloatArray
+    holes: tuple[tuple[float, float], ...] = ()
 
     def at(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return x [m] and slope of the track at slider positions."""
-        return np.interp(slider, self.slider, self.x), np.interp(slider, self.slider, self.slope)
+        """Return x [m] and slope of the track at slider positions; no slope is known in a hole."""
+        slope = np.interp(slider, self.slider, self.slope)
+        for low, high in self.holes:
+            slope = np.where((slider > low) & (slider < high), np.nan, slope)
+        return np.interp(slider, self.slider, self.x), slope
 
 
 def built_flank(design: DesignFlank, points: FloatArray, errors: FloatArray, noise: float) -> BuiltFlank:
@@ -422,7 +465,7 @@ def built_track(flank: BuiltFlank, roller_radius: float, brace_length: float) ->
         gap = centers + lift[:, None] * base.normals - at.points
         lift = lift + (roller_radius - np.hypot(gap[:, 0], gap[:, 1])) / (at.normals * base.normals).sum(axis=1)
     centers = centers + lift[:, None] * base.normals
-    return _over_slider(centers, flank.frame(contact), brace_length)
+    return _over_slider(centers, flank.frame(contact), contact, brace_length)
 
 
 def _lift(
@@ -444,11 +487,11 @@ def _lift(
     return best, places[where]
 
 
-def _over_slider(centers: FloatArray, contact: CurveFrame, brace: float) -> BuiltTrack:
+def _over_slider(centers: FloatArray, frame: CurveFrame, contact: FloatArray, brace: float) -> BuiltTrack:
     x, y = centers.T
     slider = y + np.sqrt((brace - x) * (brace + x))
     # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.
     rising = slider >= np.maximum.accumulate(slider)
     rising[1:] &= np.diff(np.maximum.accumulate(slider)) > 0
-    slope = contact.normals[:, 0] / -contact.normals[:, 1]
-    return BuiltTrack(slider[rising], x[rising], y[rising], slope[rising])
+    slope = frame.normals[:, 0] / -frame.normals[:, 1]
+    return BuiltTrack(slider[rising], x[rising], y[rising], slope[rising], contact[rising])

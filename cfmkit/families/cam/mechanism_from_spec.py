@@ -48,7 +48,7 @@ def resolve(spec: CamSpec) -> CamSpec:
         "brace_length": profile.brace_length or mechanism.brace_length,
         "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
         "roller_radius": profile.roller_radius or mechanism.roller_radius,
-        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
+        "preload": (mechanism.effective_preload if profile.preload is None else profile.preload) or None,
         "stroke": stroke,
     }
     changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
@@ -66,7 +66,7 @@ def _resolved_left(mechanism: Mechanism, left: Left, stroke: float) -> Left:
         "brace_length": profile.brace_length or left.brace_length or mechanism.brace_length,
         "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
         "roller_radius": profile.roller_radius or left.roller_radius or mechanism.roller_radius,
-        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
+        "preload": (mechanism.effective_preload if profile.preload is None else profile.preload) or None,
         "stroke": profile.stroke or stroke,
     }
     return left.model_copy(update={"profile": profile.model_copy(update=written)})

@@ -116,6 +116,8 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
         closed=DenseLoop(solution),
+        effort_error=solution.effort_error,
+        part_efforts=DenseLoop(solution).part_efforts,
         tables=listed(parts_of(spec)),
         state=solution,
     )
@@ -295,6 +297,14 @@ class DenseLoop(ShortRepr):
         states, found = self._at(branch, places)
         pressed = flank_pressure(self.solution.assembly, states, found.contact)
         return np.asarray(stress(pressed).reshape(np.shape(places)))
+
+    def part_efforts(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the force of the strongest spring on the slider, without any weight, at displacements [N]."""
+        assembly, springs = self.solution.assembly, self.solution.assembly.spec.mechanism.springs
+        strongest = max(springs.each) if isinstance(springs.each, tuple) else springs.each
+        alone = replace(assembly.loads, roller_weight=0.0, slider_weight=0.0, sideways=(0.0, 0.0), off_plane=0.0)
+        unweighted = DenseLoop(replace(self.solution, assembly=replace(assembly, loads=alone)))
+        return np.asarray(strongest / assembly.loads.stiffness * np.abs(unweighted.effort(branch, places)))
 
     def _at(self, branch: str, places: FloatArray) -> tuple[TrackStates, Forces]:
         """Return where the rollers are at displacements, and the forces there, as one row."""

@@ -19,7 +19,8 @@ import numpy as np
 
 from cfmkit.families.cam.bounding_box import depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
-from cfmkit.families.cam.spec import CamSpec, Springs
+from cfmkit.families.cam.spec import CamSpec
+from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.families.findings import mm
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
@@ -32,6 +33,13 @@ if TYPE_CHECKING:
 
 FRICTION = 0.002
 """Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
+
+SLIDING = 0.1
+"""Friction of the plain slider pin, of the springs' hooks and of the guide where none is stated and hysteresis is
+wished: greased steel; assumed."""
+
+PIN_SHARE = 0.25
+"""Diameter of the slider pin and of the pins that springs hook on, over that of a roller: assumed."""
 
 DRAWN = 60_000
 """Proportions that are looked at."""
@@ -187,6 +195,11 @@ def _written(
         },
         "contact": {"width": thick, "material": material},
     }
+    if wish.hysteresis is not None:
+        mechanism |= {
+            "pins": {"diameter": PIN_SHARE * 2.0 * size["roller"], "friction": SLIDING},
+            "guide": {"friction": SLIDING},
+        }
     data = {
         "family": "cam",
         "name": "suggested",

@@ -1,4 +1,4 @@
-"""What a yield of cams depends on: values of the design that may change for it, and values that a process errs in."""
+"""What a yield of cams depends on: values of the design that may change for it, and values that err."""
 
 from __future__ import annotations
 
@@ -35,6 +35,8 @@ PLACES = "mechanism.brace_length", "mechanism.rest_half_width", "mechanism.rolle
 """Holes of the braces and the slider, and the contour: one that lies farther out by e meets a roller larger by e."""
 
 
-def errors(_spec: CamSpec) -> dict[str, str]:
-    """Return which values a process errs in: where holes and the contour lie; springs are bought."""
-    return dict.fromkeys(PLACES, "position")
+def errors(spec: CamSpec) -> dict[str, str]:
+    """Return which values err: where the process puts holes and the contour, and the rates of bought springs."""
+    rate = spec.mechanism.springs.stiffness
+    listed = [f".{number}" for number in range(len(rate))] if isinstance(rate, tuple) else [""]
+    return dict.fromkeys(PLACES, "position") | {f"mechanism.springs.stiffness{one}": "rate" for one in listed}

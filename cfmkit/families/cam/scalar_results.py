@@ -13,6 +13,7 @@ from cfmkit.families.cam.geometry.roller_track_on_cut_cam import TrackStates
 from cfmkit.families.cam.geometry.slope_law_for_curve import CurveSlopeLaw
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
+from cfmkit.families.cam.window_of_measured_cam import large_holes, profile_coverage, requested_travel, window_mask
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -21,8 +22,6 @@ from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, 
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
@@ -48,7 +47,7 @@ BUILT_DEFINITIONS = {
     ),
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
     "registration_y_per_width": (
-        "ratio",
+        "factor",
         "shift in y that the registration finds for a cam that is wider on both flanks, per width along its normal",
     ),
     "profile_force_sd": ("force", "standard deviation (n - 1) of the force error due to the profile"),
@@ -68,6 +67,7 @@ BUILT_DEFINITIONS = {
         "95th percentile over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force",
     ),
+    "profile_coverage": ("ratio", "part of the window in which both rollers touch measured parts of the flanks"),
     "loop_area_per_friction": (
         "energy",
         "area of the loop per unit of rolling friction, over the window: a measured loop area divided by it is the "
@@ -94,7 +94,10 @@ DEFINITIONS = {
         "largest force on the way up while the roller pivots on the corner; none if friction holds it there",
     ),
     "jam_travel": ("length", "travel at the start over which the mechanism self-locks: no force moves the slider up"),
-    "spring_elongation_max": ("length", "largest elongation of the springs"),
+    "spring_elongation_max": (
+        "length",
+        "largest elongation of the springs from their relaxed length; initial tension is no elongation",
+    ),
     "contact_force_max": ("force", "largest contact force between a roller and the cam"),
     "pressure_angle_max": (
         "angle",
@@ -200,7 +203,9 @@ def _wire(solution: Solution) -> dict[str, Quantity]:
     wire = springs.wound
     wound = None if wire is None else wire.wound("extension")
     fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
-    least, most = (stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max()))
+    least, most = (
+        springs.initial_tension * (end >= 0.0) + stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max())
+    )
     return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
 
 
@@ -381,7 +386,7 @@ def largest_pressure(flank: FlankSamples) -> tuple[float | None, float]:
 
 def _half_gap(flank: FlankSamples) -> float | None:
     up, down = flank.up.slider, flank.down.slider
-    usable = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
+    usable = np.isfinite(up) & np.isfinite(down) & (up + down > flank.solution.effort_error)
     return largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
 
 
@@ -426,31 +431,23 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "profile_force_sd": float(np.nanstd(share, ddof=1)),
         "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
         "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
+        "profile_coverage": profile_coverage(built),
         "loop_area_per_friction": loop_area_per_friction(built),
     }
-    return {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    unknown = OF_THE_FORCE if large_holes(built) else ()
+    known = {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+    why = "a part of the flanks was not measured"
+    return known | {name: Quantity(None, *BUILT_DEFINITIONS[name], why) for name in unknown}
+
+
+OF_THE_FORCE = ("profile_force_sd", "profile_force_share", "loop_area_per_friction")
+"""What needs the force everywhere in the window."""
 
 
 def pressure_of(built: Built, way: float) -> FloatArray:
     """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
     track, forces = built.assembly.track, built.forces(way)
     return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
-
-
-def window_mask(built: Built) -> NDArray[np.bool_]:
-    """Return which travels lie in ``analysis.window``."""
-    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
-    if window is None:
-        return np.ones(len(place), dtype=bool)
-    low, high = between(window, requested_travel(built))
-    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
-    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
-
-
-def requested_travel(built: Built) -> tuple[float, float]:
-    """Return where the displacement starts and where it was to end [m]."""
-    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
-    return start + built.origin, end + built.origin
 
 
 def loop_area_per_friction(built: Built) -> float:

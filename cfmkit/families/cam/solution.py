@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.statics import Forces, Loads, jams, levers, load_on_contact, load_on_slider
+from cfmkit.results import round_off
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -134,7 +135,15 @@ class Solution(ShortRepr):
     @cached_property
     def elongation(self) -> FloatArray:
         """Elongation of the springs [m]."""
-        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width)
+        opened = self.assembly.spec.mechanism.springs.tension_stretch
+        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width) - opened
+
+    @property
+    def effort_error(self) -> float:
+        """Rounding of the sum of springs and weights on the slider [N]."""
+        weight = self.assembly.loads.slider_weight
+        both = np.concatenate([self.up.slider, self.down.slider])
+        return round_off(np.stack([both - weight, np.full(len(both), weight)]))
 
     @property
     def corner_travel(self) -> float:
@@ -211,6 +220,8 @@ class Built(ShortRepr):
         Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
     origin : float
         What is added to the travel to give the displacement [m].
+    holes : tuple of (float, float)
+        Travels between which a contact is where nothing was measured, of either flank [m].
     """
 
     assembly: Assembly
@@ -220,11 +231,25 @@ class Built(ShortRepr):
     sides: Sides
     shares: dict[str, FloatArray]
     origin: float
+    holes: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def unmeasured(self) -> tuple[tuple[float, float], ...]:
+        """Travels between which the force is not known, in their order, those that overlap joined [m]."""
+        joined: list[tuple[float, float]] = []
+        for low, high in sorted(self.holes):
+            low, high = max(low, float(self.travel[0])), min(high, float(self.travel[-1]))
+            if joined and low <= joined[-1][1]:
+                joined[-1] = joined[-1][0], max(joined[-1][1], high)
+            elif low < high:
+                joined.append((low, high))
+        return tuple(joined)
 
     @property
     def elongation(self) -> FloatArray:
         """Elongation of the springs, (n,) [m]."""
-        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width
+        opened = self.assembly.spec.mechanism.springs.tension_stretch
+        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width - opened
 
     def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""

@@ -8,79 +8,24 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
+from cfmkit.families.cam.springs_spec import Springs
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, NonNegativeLength, OldWords, PositiveLength, Spec, refuse
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
-from cfmkit.stock.material_and_part_spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
+from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Time, format_short
+from cfmkit.stock.material_and_part_spec import (
+    Friction,
+    Guide,
+    MaterialField,
+    MaterialSpec,
+    Pins,
+    ProcessField,
+    SafetyFactor,
+)
+from cfmkit.stock.springs.spec import Catalogue, Life
 
 Positive = Field(gt=0)
-PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
-
-
-class Springs(Model):
-    """Springs in parallel between the two roller axes."""
-
-    stiffness: PositiveStiffness | tuple[PositiveStiffness, ...] | None = Field(
-        None, description="of one spring, or a list with the measured value of each; default: from 'wound'"
-    )
-    count: int | None = Field(
-        None, ge=1, le=1000, description="number of equal springs; default 1, or the list's length"
-    )
-    preload: NonNegativeLength | None = Field(
-        None, description="elongation of the springs at the start, with the rollers at `rest_half_width`; default 0"
-    )
-    rest_length: PositiveLength | None = Field(
-        None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
-    )
-    max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed for a spring")
-    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
-    wound: SpringWire | None = Field(
-        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
-    )
-    life: Life | None = None
-
-    @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, "extension")
-        return self
-
-    @model_validator(mode="after")
-    def _one_way_to_say_preload(self) -> Self:
-        if self.preload is not None and self.rest_length is not None:
-            raise ValueError("'preload' and 'rest_length' say the same: give one of them")
-        return self
-
-    @model_validator(mode="after")
-    def _count_fits_the_list(self) -> Self:
-        if isinstance(self.stiffness, tuple):
-            if not self.stiffness:
-                raise ValueError("'stiffness' needs at least one value")
-            if self.count not in (None, len(self.stiffness)):
-                raise ValueError(f"'count' is {self.count} but 'stiffness' lists {len(self.stiffness)} springs")
-        return self
-
-    @property
-    def each(self) -> float | tuple[float, ...]:
-        """Stiffness of one spring, or of each, [N/m]."""
-        return 0.0 if self.stiffness is None else self.stiffness
-
-    @property
-    def total(self) -> float:
-        """K, the sum of all parallel springs [N/m]."""
-        if isinstance(self.each, tuple):
-            return sum(self.each)
-        return self.each * (self.count or 1)
-
-    def scaled_to(self, total: float) -> Springs:
-        """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any."""
-        made = {} if self.wound is None else {"wound": None, "name": None, "life": None}
-        if isinstance(self.stiffness, tuple):
-            values = tuple(value * total / self.total for value in self.stiffness)
-            return self.model_copy(update={"stiffness": values} | made)
-        return self.model_copy(update={"stiffness": total / (self.count or 1)} | made)
 
 
 class Masses(Model):
@@ -120,6 +65,9 @@ class Plate(Model):
     )
     thickness: PositiveLength | None = Field(
         None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if stated"
+    )
+    process: ProcessField | None = Field(
+        None, description="manufacturing process: laser, wire-edm, fdm, sls or mill, or your own values; default: laser"
     )
 
 
@@ -304,14 +252,19 @@ class Mechanism(Model):
         return self.springs.preload or 0.0
 
     @property
+    def effective_preload(self) -> float:
+        """Elongation at the start of springs without initial tension that pull as hard as these [m]."""
+        return self.preload + self.springs.tension_stretch
+
+    @property
     def springs_rest(self) -> float:
-        """Half the distance of the roller axes with the springs at rest [m]."""
-        return self.rest_half_width - 0.5 * self.preload
+        """Half the distance of the roller axes at which the springs, extended as they are, would pull no more [m]."""
+        return self.rest_half_width - 0.5 * self.effective_preload
 
     @property
     def springs_rest_as_cut(self) -> float:
-        """Half the distance of the roller axes at which the springs are at rest that the profile is cut for [m]."""
-        preload = self.preload if self.profile.preload is None else self.profile.preload
+        """The same distance that the profile is cut for [m]."""
+        preload = self.effective_preload if self.profile.preload is None else self.profile.preload
         return (self.profile.rest_half_width or self.rest_half_width) - 0.5 * preload
 
     @field_validator("springs", mode="before")

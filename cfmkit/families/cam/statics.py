@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.roller_track_on_cut_cam import Track, TrackStates, TrackStretch
     from cfmkit.families.cam.geometry.slope_law import Real
 
-GRAVITY = 9.81
-"""Standard acceleration used throughout [m/s^2]."""
+GRAVITY = 9.80665
+"""Standard acceleration of gravity, exact by definition (3rd CGPM, 1901) [m/s^2]."""
 
 JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
 """Where to look for a jam along a part of the track: mostly it is at the ends."""

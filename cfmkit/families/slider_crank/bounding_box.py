@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Room
+from cfmkit.families.run_control import Run
 from cfmkit.families.slider_crank.outline import drawing
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.unit_springs import JOINTS
@@ -25,8 +26,16 @@ PLATES = 3
 
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved."""
-    if result.state is None or result.spec.fidelity == "solid":
+    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved.
+
+    A part that was solved as a solid moves as its beams do, to a fraction of a thickness.
+    """
+    spec: Any = result.spec
+    if result.state is not None and spec.fidelity == "solid":
+        from cfmkit.families.slider_crank.printed.model import analyze
+
+        result = analyze(spec.replace({"analysis.fidelity": spec.piece, "requirements": ()}), Run())
+    if result.state is None:
         return None
     return _linkage(result) if result.spec.fidelity == "prb" else _part(result)
 
@@ -92,12 +101,12 @@ def _linkage(result: Result) -> Room:
     high = np.max([pin.max(axis=0) + radius for pin, radius in pins], axis=0)
     along, across = high - low
     count = int(np.count_nonzero(solution.assembly.rates))
-    depth, why = _depth(spec, solution.assembly.rates)
+    depth, why = _depth(spec, solution.assembly.rates, solution.extremes.largest_turns)
     reported = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}{why}"
     return Room(float(across), float(along), depth, 3 + count, reported, (float(low[0]), float(low[1])), True)
 
 
-def _depth(spec: SliderCrankSpec, rates: np.ndarray) -> tuple[float | None, str]:
+def _depth(spec: SliderCrankSpec, rates: np.ndarray, turns: np.ndarray) -> tuple[float | None, str]:
     """Return the depth of links and springs [m], and what of it is taken; None, and why, where a part has no size.
 
     Crank and coupler lie above each other, the crank on the ground. The pivot's spring is below, all others are above:
@@ -107,18 +116,21 @@ def _depth(spec: SliderCrankSpec, rates: np.ndarray) -> tuple[float | None, str]
     if part is None or part.sheet is None:
         return None, "; the depth of links is not known (mechanism.part.sheet)"
     high = {}
-    for name in (name for name, rate in zip(JOINTS, rates, strict=True) if rate):
+    for name, turn in ((name, turn) for name, rate, turn in zip(JOINTS, rates, turns, strict=True) if rate):
         coils = springs.coils_at(name)
         if not coils:
             return None, f"; the spring at the {name.replace('_', ' ')} has no size"
-        high[name] = max(height_of(name, coil) for coil in coils)
+        high[name] = max(height_of(name, coil, float(turn)) for coil in coils)
     below, above = high.pop("pivot", 0.0), max(high.values(), default=0.0)
     return PLATES * part.sheet + below + above, f"; {PLATES} sheets and the springs on both sides of them"
 
 
-def height_of(name: str, coil: Wound) -> float:
-    """Return how far the spring of a joint stands out from the links [m]: at a pin, or lying beside the coupler."""
-    return coil.outer_diameter if name == "slider" else coil.body_length
+def height_of(name: str, coil: Wound, turn: float) -> float:
+    """Return how far the spring of a joint stands out from the links [m]: lying beside the coupler, or at a pin.
+
+    There it is longest when it is wound up by `turn` [rad].
+    """
+    return coil.outer_diameter if name == "slider" else coil.body_length_wound_up(turn)
 
 
 def _sizes(springs: Springs) -> str:

@@ -32,6 +32,8 @@ FINDINGS = {
     "crank is",
     "effort_changes_sign": "the force or torque changes sign within the window",
     "joint_overrotated": "a spring is deflected beyond its limit",
+    "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
+    "spring_binds_on_pin": "a torsion spring becomes narrower than its pin when it is wound up",
     "infeasible_targets": "no springs meet the targets of the design",
     "spring_at_bound": "a spring rate is at one of its bounds",
     "spring_dropped": "the best rate of a spring is zero: the design omits it",
@@ -53,7 +55,7 @@ FINDINGS = {
     "wide_beam": "strip or flexures are so wide that they cannot curl across their width: they are stiffer than "
     "in beam theory",
     "sharp_corners": "without fillets the stress in inside corners has no value",
-    "mesh_coarse": "results on two meshes of the part differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "too_thin": "a thickness is below the thinnest wall of the process",
     "lateral_buckling": "the part bends out of its plane nearly as easily as in its plane",
     "side_force": "the transverse force on the guide is large: friction in the guide adds to the force",

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
+from cfmkit.families.flattest_window import flattest
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
 from cfmkit.families.slider_crank.sprung_linkages_for_wish import (
@@ -24,8 +25,9 @@ from cfmkit.families.slider_crank.sprung_linkages_for_wish import (
     pushed_linkage,
     turned_linkages,
 )
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
-from cfmkit.specs.units import format_short
+from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 
 if TYPE_CHECKING:
@@ -73,8 +75,12 @@ THICKEST, THICKEST_TAPERED = 0.1, 0.05
 
 OFFERED = 24
 
-PART = "cfmkit.families.slider_crank.proposals_for_wish:part"
-"""What finishes the parts of one piece."""
+HERE = "cfmkit.families.slider_crank.proposals_for_wish"
+PART, CORRECT = f"{HERE}:part", f"{HERE}:correct"
+"""What finishes the parts of one piece, and what corrects them by their solids."""
+
+FARTHER = 1.1
+"""How far a solid is followed, over its travel, to look for a flatter window."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -245,6 +251,7 @@ def _strip(
         True,
         PART,
         largest_first(crank, wish),
+        correct=CORRECT,
     )
 
 
@@ -257,9 +264,8 @@ def _tapered(
     wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
     spec = plain.spec.replace({"design.beam": shape})
-    return Candidate(
-        called("tapered strip", wish, material), spec, True, plain.finish, LATER + abs(crank / wish.room[1] - 0.35)
-    )
+    promise = LATER + abs(crank / wish.room[1] - 0.35)
+    return Candidate(called("tapered strip", wish, material), spec, True, plain.finish, promise, correct=CORRECT)
 
 
 def _flexures(
@@ -291,7 +297,46 @@ def _flexures(
         True,
         PART,
         largest_first(crank, wish),
+        correct=CORRECT,
     )
+
+
+def correct(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a part over its flattest window, with the thicknesses and the widths that it needs as a solid.
+
+    The force is linear in the widths, the stress falls nearly as the thickness.
+    """
+    from cfmkit.families.run_control import Run
+    from cfmkit.families.slider_crank.printed.model import analyze
+    from cfmkit.families.slider_crank.printed.plane_fem_analysis import analyze as solve_solid
+
+    wish = aim_below_stiffening(spec, wish, analyze)
+    solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
+    _, end = solid.analysis.travel or (0.0, 0.0)
+    result = solve_solid(solid.replace({"analysis.travel": (0.0, FARTHER * end), "analysis.window": None}), Run())
+    found, material = flattest(result, wish.travel), solid.mechanism.material
+    if found is None or material is None:
+        return solid
+    curve, allowed = result.curve, wish.strength_used * (material.allowable(1.0) or np.inf)
+    mean = float(np.interp(np.linspace(*found, 101), curve.motion, curve.effort).mean())
+    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
+    thinner = min(1.0, 0.99 * allowed / float(np.interp(found[1], curve.motion, stress)))
+    window = tuple(Place(place, "length") for place in found)
+    changes: dict[str, Any] = {"analysis.travel": (0.0, found[1]), "analysis.window": window}
+    return solid.replace(changes | _scaled(solid, thinner, wish.target / (mean * thinner**3)))
+
+
+def _scaled(spec: SliderCrankSpec, thinner: float, wider: float) -> dict[str, Any]:
+    """Return the thicknesses and widths of a strip, or of flexures, times two factors, by their paths."""
+    strip = spec.mechanism.beam
+    if strip is not None and spec.piece == "beam":
+        thick = strip.thickness
+        many = tuple(thinner * one for one in thick) if isinstance(thick, tuple) else thinner * thick
+        return {"mechanism.beam.thickness": many, "mechanism.beam.width": wider * strip.width}
+    names = "pivot", "crank_pin", "slider_pin"
+    sizes: dict[str, Any] = {name: getattr(spec.mechanism.flexures, name) for name in names}
+    thicknesses = {f"mechanism.flexures.{name}.thickness": thinner * one.thickness for name, one in sizes.items()}
+    return thicknesses | {f"mechanism.flexures.{name}.width": wider * one.width for name, one in sizes.items()}
 
 
 def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
@@ -309,8 +354,4 @@ def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     if not mean > 0.0:
         return made
     factor = wish.target / mean
-    if made.fidelity == "beam" and made.mechanism.beam is not None:
-        return made.replace({"mechanism.beam.width": made.mechanism.beam.width * factor})
-    names = ("pivot", "crank_pin", "slider_pin")
-    parts = {name: getattr(made.mechanism.flexures, name).width * factor for name in names}
-    return made.replace({f"mechanism.flexures.{name}.width": width for name, width in parts.items()})
+    return made.replace(_scaled(made, 1.0, factor))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.designing.bounds_and_rounding import around
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.stock.material_and_part_spec import sheet_of
 
 if TYPE_CHECKING:
@@ -53,14 +54,13 @@ def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple
 
 
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
-    """Return which values a process errs in: how thick a strip comes out everywhere; of links, where holes lie.
-
-    Springs are bought: their rates are no matter of the process.
-    """
+    """Return which values err: the thickness of a strip, everywhere; of links, where holes lie; rates of springs."""
     mechanism = spec.mechanism
     if mechanism.beam is not None:
         return {"mechanism.beam.offset": "thickness"} if spec.fidelity == "beam" else {}
     if mechanism.flexures is not None:
         return {}
     given = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
-    return {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}
+    found = {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}
+    rates = zip(JOINTS, mechanism.springs.rates, strict=True)
+    return found | {f"mechanism.springs.{name}": "rate" for name, rate in rates if rate > 0.0}

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
-from cfmkit.families.slider_crank.springs.spec import Limits, SpringDesign, Springs
+from cfmkit.families.slider_crank.springs.spec import Limits, Links, SpringDesign, Springs
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import PositiveLength, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio, format_short
@@ -43,6 +43,11 @@ class Mechanism(Printed):
         "single", description="mirrored: a second set of legs, mirrored at the guide, which then carries no load"
     )
     pins: Pins | None = Field(None, description="at pivot, crank pin and slider pin: their friction")
+    links: Links | None = Field(
+        None,
+        description="width of crank and coupler between springs at joints; with 'material' and 'part.sheet' their "
+        "strength is known; default: 0.16 of the shorter one's length",
+    )
     guide: Guide | None = Field(None, description="of the slider: its friction")
     limits: Limits | None = Field(None, description="largest rotations and travel of the springs")
 
@@ -55,6 +60,13 @@ class Mechanism(Printed):
     def _coupler_is_known(self) -> Self:
         if (self.coupler_length is None) == (self.stretched_position is None):
             raise ValueError("give either 'coupler_length' or 'stretched_position', from which it follows")
+        return self
+
+    @model_validator(mode="after")
+    def _links_are_wider_than_their_pins(self) -> Self:
+        if self.links is not None and self.pins is not None and self.links.width <= self.pins.diameter:
+            reported = f"links must be wider than the pins in them, {format_short(self.pins.diameter, 'length')}"
+            refuse("Mechanism", {("links", "width"): reported})
         return self
 
     @model_validator(mode="after")

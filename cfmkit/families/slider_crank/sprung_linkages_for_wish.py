@@ -20,18 +20,23 @@ from cfmkit.families.slider_crank.flattest_springs_that_fit import STILL, Sprung
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
+from cfmkit.families.slider_crank.springs.link_strength import least_sheet, link_loads, links_that_bear
 from cfmkit.families.slider_crank.springs.outline import EYE_SHARE
+from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, shortest_torsion_spring, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flattest_springs_that_fit import HeldEffort
-    from cfmkit.families.wishes import Wish
+    from cfmkit.families.slider_crank.springs.link_strength import LinkLoads
+    from cfmkit.families.wishes import MaterialBlock, Wish
     from cfmkit.stock.springs.helical_spring_formulas import Wound
 
 
@@ -87,8 +92,15 @@ force stay in the first window and the room; and the largest deviation that is w
 WEAK = 0.9
 """Of the torque wished: linkages whose springs hold less by the bound are not designed; it knows some places only."""
 
-LINK_SHARE = 1.0 / 12.0
-"""Thickness of links with springs at their pins over the depth wished: three quarters are left for the springs."""
+LINK_SHARES = (1.0 / 12.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.5, 1.0 / 4.5)
+"""Thickness of links with springs at their pins over the depth wished: three quarters to a third are left for the
+springs."""
+
+SLIDING = 0.1
+"""Friction of plain pins and of a plain guide where none is stated: greased steel, or dry POM on steel; assumed."""
+
+PIN_IN_COIL = 0.9
+"""Largest diameter of a pin over the inner one of a torsion spring around it, wound up: makers leave a tenth."""
 
 FINISH = "cfmkit.families.slider_crank.sprung_linkages_for_wish:finish"
 """What finishes linkages with springs at their pins."""
@@ -150,7 +162,7 @@ def _turned(wish: Wish, share: float, linkage: tuple[float, float, float, float]
         "name": "suggested",
         "mechanism": {
             "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
-            "unloaded_angle": low, "springs": {}, **_plates(wish),
+            "unloaded_angle": low, "springs": {},
         },
         "analysis": {"angle": (low, within[1]), "points": 961},
     }  # fmt: skip
@@ -165,16 +177,18 @@ def _within(wish: Wish, unloaded: float) -> tuple[float, float]:
     return 0.0, max(1.6 * wish.travel, math.radians(60.0))
 
 
-def _turning(wish: Wish, link: Linkage, unloaded: float) -> SprungMotion:
+def _turning(wish: Wish, link: Linkage, unloaded: float, sheet: float | None = None) -> SprungMotion:
     """Return what springs have to do at the joints of a linkage: up to half a turn from where they are relaxed."""
     low, high = _within(wish, unloaded)
     ends = low, min(high, unloaded + math.pi)
-    return _sprung(wish, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler))
+    return _sprung(wish, Assembly(link, unloaded, np.zeros(len(JOINTS))), ends, min(link.crank, link.coupler), sheet)
 
 
-def _sprung(wish: Wish, assembly: Assembly, ends: tuple[float, float], widest: float) -> SprungMotion:
+def _sprung(
+    wish: Wish, assembly: Assembly, ends: tuple[float, float], widest: float, sheet: float | None = None
+) -> SprungMotion:
     """Return what springs have to do where the effort may be held between two ends of the motion."""
-    deep = _depth_of_springs(wish, thickness_of_links(wish))
+    deep = _depth_of_springs(wish, sheets_of_links(wish)[0] if sheet is None else sheet)
     return SprungMotion(assembly, *ends, wish.travel, widest, deep, shared=wish.depth is not None)
 
 
@@ -183,7 +197,7 @@ def _depth_of_springs(wish: Wish, sheet: float) -> float:
     return max(wish.room[:2]) if wish.depth is None else wish.depth - PLATES * sheet
 
 
-def _pushing(spec: SliderCrankSpec, wish: Wish) -> list[SprungMotion]:
+def _pushing(spec: SliderCrankSpec, wish: Wish, sheet: float | None = None) -> list[SprungMotion]:
     """Return what springs have to do at the pins of a linkage that is pushed, what is wanted most first.
 
     A window at the beginning of the travel: there the springs turn least. Torsion springs that stay in the room even
@@ -198,28 +212,54 @@ def _pushing(spec: SliderCrankSpec, wish: Wish) -> list[SprungMotion]:
     beside = min(link.crank, link.coupler)
     inside = min(beside, wish.room[0] - high, wish.room[1] - float(ends.position[0]))
     windows = (first, first + wish.travel), (first, last)
-    return [_sprung(wish, assembly, window, wide) for wide in (inside, beside) for window in windows if wide > 0.0]
+    return [
+        _sprung(wish, assembly, window, wide, sheet) for wide in (inside, beside) for window in windows if wide > 0.0
+    ]
 
 
-def _plates(wish: Wish) -> dict[str, Any]:
-    """Return of which sheet links are, where their depth matters."""
-    return {} if wish.depth is None else {"part": {"sheet": thickness_of_links(wish)}}
+def sheets_of_links(wish: Wish) -> tuple[float, ...]:
+    """Return of which sheets links may be that have springs at their pins, the thinnest first [m].
 
-
-def thickness_of_links(wish: Wish) -> float:
-    """Return how thick the links of springs at pins are [m]; zero where their depth does not matter."""
-    return 0.0 if wish.depth is None else max(LINK_SHARE * wish.depth, wish.thinnest)
+    Shares of the depth wished; where depth does not matter, shares of the room's shorter side.
+    """
+    deep = 0.5 * min(wish.room[:2]) if wish.depth is None else wish.depth
+    return tuple(dict.fromkeys(max(share * deep, wish.thinnest) for share in LINK_SHARES))
 
 
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
-    """Return a linkage with the springs that hold the torque or the force best, over a window as long as is wished.
+    """Return a linkage with the springs that hold the torque or the force best, and with links that bear them.
+
+    The window is as long as is wished. The thinnest links that bear the springs' loads are taken: thicker ones leave
+    less depth for the springs.
 
     Raises
     ------
     cfmkit.errors.SolutionError
-        If no springs that fit come near it.
+        If no springs that fit come near it, or no links bear them.
     """
-    held = _torque_held(spec, wish) if wish.kind == "torque" else _force_held(spec, wish)
+    sprung, reason, least = None, "", 0.0
+    materials = wish.materials or ({"name": "steel-s235"},)
+    for sheet in sheets_of_links(wish):
+        if sheet < least:
+            continue
+        if sprung is None or wish.depth is not None:  # where depth does not matter, the same springs fit
+            try:
+                sprung = _with_springs(spec.replace({"mechanism.part.sheet": sheet}), wish, sheet)
+            except SolutionError as problem:
+                raise SolutionError(reason or str(problem)) from None
+        sprung = sprung.replace({"mechanism.part.sheet": sheet})
+        for block in materials:
+            linked = with_links(sprung, wish, block)
+            if linked is not None:
+                return linked
+        least = min(_least_sheet(sprung, wish, block) for block in materials)
+        reason = f"links neither bear the loads of the springs nor stay straight under them: {mm(least)} thick at least"
+    raise SolutionError(reason)
+
+
+def _with_springs(spec: SliderCrankSpec, wish: Wish, sheet: float) -> SliderCrankSpec:
+    """Return a linkage with the springs that hold the torque or the force best, wound beside links of a sheet [m]."""
+    held = _torque_held(spec, wish, sheet) if wish.kind == "torque" else _force_held(spec, wish, sheet)
     if held is None or held.deviation > HOPELESS:
         off = "" if held is None else f" nearer than {percent(held.deviation)}"
         raise SolutionError(f"no springs of steel wire that fit at the pins hold this {wish.kind}{off}")
@@ -239,15 +279,71 @@ def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     return wound(sprung, wish)
 
 
-def _torque_held(spec: SliderCrankSpec, wish: Wish) -> HeldEffort | None:
+def with_links(spec: SliderCrankSpec, wish: Wish, block: MaterialBlock) -> SliderCrankSpec | None:
+    """Return a linkage whose links and pins bear its springs, of a material; None if there are none of its sheet.
+
+    Where hysteresis is wished, pins and guide rub.
+    """
+    material, sheet = MaterialSpec.model_validate(dict(block)), spec.mechanism.part.sheet  # type: ignore[union-attr]
+    allowable = material.allowable(1.0)
+    if allowable is None or sheet is None:
+        return None
+    loads = _loads(spec)
+    widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
+    link = links_that_bear(loads, sheet, material.modulus, wish.strength_used * allowable, wish.thinnest, widest)
+    if link is None:
+        return None
+    changes: dict[str, Any] = {
+        "mechanism.material": dict(block), "mechanism.links.width": link.width, "mechanism.pins.diameter": link.hole,
+    }  # fmt: skip
+    if wish.hysteresis is not None:
+        changes |= {"mechanism.pins.friction": SLIDING, "mechanism.guide.friction": SLIDING}
+    return spec.replace(changes)
+
+
+def _loads(spec: SliderCrankSpec) -> LinkLoads:
+    """Return what acts on the links over the motion of the analysis."""
+    assembly = assemble(spec)
+    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
+    return link_loads(assembly, grid_over(assembly, low, high), spec.mechanism.sets)
+
+
+def _least_sheet(spec: SliderCrankSpec, wish: Wish, block: MaterialBlock) -> float:
+    """Return how thick links of a material have to be at least, if they are as wide as they may be [m]."""
+    material = MaterialSpec.model_validate(dict(block))
+    allowable = material.allowable(1.0)
+    return (
+        math.inf if allowable is None else least_sheet(_loads(spec), material.modulus, wish.strength_used * allowable)
+    )
+
+
+def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
+    """Return how far each torsion spring that is bought turns from where it is relaxed [rad]."""
+    assembly = assemble(spec)
+    low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
+    turns = MotionExtremes(assembly, low, high).largest_turns
+    bought = {one.at for one in spec.mechanism.springs.bought}
+    return {name: float(turn) for name, turn in zip(JOINTS[:3], turns, strict=False) if name in bought}
+
+
+def _hole_of_coil(spec: SliderCrankSpec, name: str, turn: float) -> float:
+    """Return the largest pin that the torsion spring of a joint still turns around when wound up by a turn [m]."""
+    return min(
+        PIN_IN_COIL * (coil.coil * coil.turns / (coil.turns + turn / (2.0 * math.pi)) - coil.wire)
+        for coil in spec.mechanism.springs.coils_at(name)
+    )
+
+
+def _torque_held(spec: SliderCrankSpec, wish: Wish, sheet: float) -> HeldEffort | None:
     unloaded = float(spec.mechanism.unloaded_angle or 0.0)
-    return flattest_springs(_turning(wish, linkage_of(spec.mechanism), unloaded), wish.target, FLAT * wish.ripple)
+    turning = _turning(wish, linkage_of(spec.mechanism), unloaded, sheet)
+    return flattest_springs(turning, wish.target, FLAT * wish.ripple)
 
 
-def _force_held(spec: SliderCrankSpec, wish: Wish) -> HeldEffort | None:
+def _force_held(spec: SliderCrankSpec, wish: Wish, sheet: float) -> HeldEffort | None:
     """Return the springs of the first motion that are flat enough, else the flattest of all; none is left out."""
     best: HeldEffort | None = None
-    for motion in _pushing(spec, wish):
+    for motion in _pushing(spec, wish, sheet):
         held = flattest_springs(motion, wish.target, 0.0)
         if held is not None and (best is None or held.deviation < best.deviation):
             best = held
@@ -280,20 +376,20 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates
     turns = {JOINTS[k]: (rates[k], float(max(high[k], -low[k]))) for k in np.flatnonzero(rates)}
     pulled = JOINTS[3] not in turns or low[3] > -STILL * turns[JOINTS[3]][1]
-    part = spec.mechanism.part
+    part, pin = spec.mechanism.part, spec.mechanism.pins.diameter if spec.mechanism.pins else 0.0
     deep = room = _depth_of_springs(wish, (part.sheet if part else None) or 0.0)
     if wish.depth is not None and "pivot" in turns:
         # that of the pivot is on the other side of the links: first it takes as little as it can
-        least = shortest_torsion_spring(*turns["pivot"], widest)
-        deep = room - (0.0 if least is None else least.body_length)
+        least = shortest_torsion_spring(*turns["pivot"], widest, pin)
+        deep = room - (0.0 if least is None else least.body_length_wound_up(turns["pivot"][1]))
     bought: dict[str, Wound] = {}
     for name in sorted(turns, key="pivot".__eq__):
         if name == "pivot" and wish.depth is not None:
-            deep = room - max((height_of(other, coil) for other, coil in bought.items()), default=0.0)
+            deep = room - max((height_of(other, coil, turns[other][1]) for other, coil in bought.items()), default=0.0)
         if name == "slider":
             coil = extension_spring(*turns[name], rest if pulled else 0.0)
         else:
-            coil = torsion_spring(*turns[name], deep)
+            coil = torsion_spring(*turns[name], deep, pin)
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil
@@ -322,7 +418,7 @@ def pushed_linkage(wish: Wish, lengths: Proportions, crank: float, first: float)
         "name": "suggested",
         "mechanism": {
             "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
-            "unloaded_offset": 4e-4, "springs": {}, **_plates(wish),
+            "unloaded_offset": 4e-4, "springs": {},
         },
         "analysis": pushed_analysis((first, lengths.reach * crank)),
     }  # fmt: skip

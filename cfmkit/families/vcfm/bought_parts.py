@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, newton, rate
 from cfmkit.stock.parts_list import BoughtPart
+from cfmkit.stock.springs.guides import guide_cure, guide_needed, guide_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,12 +29,13 @@ def parts_of(spec: VcfmSpec) -> tuple[BoughtPart, ...]:
         data.append(f"{mm(springs.free_length)} relaxed")
     if wire := springs.wound:
         data.append(f"wire {mm(wire.wire)}, mean coil {mm(wire.coil)}, {wire.turns:g} turns")
+    data += guide_words(springs)
     place = "below the shuttle" if springs.kind == "compression" else "above the shuttle"
     return (BoughtPart(place, springs.name or "", springs.count, ", ".join(data)),)
 
 
-def spring_faults(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Yield (name, what is wrong) of bought springs over the travel and all preloads."""
+def spring_faults(solution: Solution) -> Iterator[tuple[str, ...]]:
+    """Yield (name, what is wrong, settings that cure it) of bought springs over the travel and all preloads."""
     springs = solution.spec.mechanism.springs
     if springs is None:
         return
@@ -45,6 +47,14 @@ def spring_faults(solution: Solution) -> Iterator[tuple[str, str]]:
             "spring_overstretched",
             f"with a preload of {mm(worst.preload)} the springs are deflected by {mm(most)}, their limit is "
             f"{mm(limit)}, reached {place} ('mechanism.springs.max_elongation')",
+        )
+    if not springs.is_guided and most > springs.unguided * (1 + 1e-9):
+        yield (
+            "spring_buckles",
+            f"a spring of {mm(springs.free_length or 0.0)} buckles when it is deflected by {mm(springs.unguided)} "
+            f"(ends {springs.seats}), and is deflected by {mm(most)} with a preload of {mm(worst.preload)}; "
+            f"{guide_needed(springs.coil, 'mechanism.springs')}",
+            *guide_cure(springs.coil, "mechanism.springs"),
         )
     least = min(push.preload for push in solution.pushes)
     if least < 0:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import Field
 
 from cfmkit.specs.spec import NonNegativeLength, PositiveLength
-from cfmkit.stock.material_and_part_spec import CutPart, PartFrame
+from cfmkit.stock.material_and_part_spec import CutPart, PartFrame, RoundedCorners
 
 
 class StandingFrame(PartFrame):
@@ -25,3 +27,12 @@ class VcfmPart(CutPart):
     frame: StandingFrame | None = Field(
         None, description="{wall, shuttle, ground, stop, seat}: thicknesses, a stop of the travel, a seat of the spring"
     )
+
+
+class CutLeaves(RoundedCorners):
+    """What a mechanism of `bistable` leaves, and a `positive` spring unless that is bought, knows of its part."""
+
+    @property
+    def thinnest(self: Any) -> float:
+        """Smallest thickness of all leaves that are cut [m]."""
+        return min(float(one.thickness) for one in (self.bistable, self.positive) if one is not None)

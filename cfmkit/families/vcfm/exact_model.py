@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.interpolated_equilibrium_path import traced
+from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, traced
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
@@ -167,6 +167,7 @@ class ExactSampler:
     pushed: Any
     pulled: Any
     sides: list[Any]
+    accuracy = RESOLVED
     coils: Coils | None
     """The law of bought springs, which have no path; None where the spring is a structure of leaves."""
 

@@ -14,7 +14,6 @@ from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import both_images, nominal_stresses
 from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaf_laws_from_spec import strip_of
-from cfmkit.stock.material_and_part_spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -45,7 +44,7 @@ def fillets(solution: Solution) -> tuple[tuple[FilletRow, ...], tuple[FilletRow,
 
 def _rows(solution: Solution, piece: str, moved: str, ways: Sequence[Any]) -> tuple[FilletRow, ...]:
     """Return the fillets of one piece that is pushed and pulled."""
-    radius = (solution.spec.mechanism.part or CutPart()).fillet
+    radius = solution.spec.mechanism.fillet
     pushed, pulled = (way.solved for way in ways)
     rows = []
     for one in _both_ways(pushed, pulled, radius):

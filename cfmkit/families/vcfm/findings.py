@@ -59,9 +59,10 @@ FINDINGS = {
     "too_thin": "the design needs a leaf that is thinner than can be made",
     "envelope": "the design does not fit into the given space",
     "wide_beam": "leaves are so wide that they cannot curl across their width: they are stiffer than in beam theory",
-    "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
+    "mesh_coarse": "the force or the largest stress of the solid is not known as closely as requested",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "spring_overstretched": "bought springs are deflected beyond their limit",
+    "spring_buckles": "a compression spring is pressed beyond the deflection at which it buckles, without a guide",
     "spring_slack": "bought springs are slack over a part of the travel",
     "no_spring_fits": "no spring of the catalogue fits",
     "stress_unreachable": "no leaf length brings the exact stress below the allowable stress",
@@ -288,8 +289,8 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
 
 
 def _bought_springs(solution: Solution) -> Iterator[Finding]:
-    for name, reported in spring_faults(solution):
-        yield finding(name, reported)
+    for name, reported, *cures in spring_faults(solution):
+        yield finding(name, reported, *cures)
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:
@@ -336,12 +337,11 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 def _width(solution: Solution) -> Iterator[Finding]:
     exact = solution.spec.analysis.fidelity == "exact"
-    cures, hint = (
-        (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' accounts for it")
-    )
+    wide, hint = "mechanism.wide_beams=true", "; only 'analysis.fidelity: exact' accounts for it"
+    cure = wide if exact else (wide, "analysis.fidelity=exact")
     for name, share, place in solution.hindered_curling:
         if reported := too_soft(share, f"in the {name} at {mm(place)}"):
-            yield finding("wide_beam", reported + hint, *cures)
+            yield finding("wide_beam", reported + ("" if exact else hint), cure)
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:

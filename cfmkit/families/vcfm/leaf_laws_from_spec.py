@@ -17,8 +17,9 @@ from cfmkit.families.vcfm.leaves.v_beam import VBeam
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Spring
-    from cfmkit.families.vcfm.spec import Bistable, BoughtSprings, LeafMaterial, Positive, VcfmSpec
+    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
 
 
 RIM = 0.75
@@ -107,8 +108,8 @@ def room_of_coils(springs: BoughtSprings) -> float:
 
 
 def closed_length(springs: BoughtSprings) -> float:
-    """Return the length of a spring with its turns on each other [m]; 0 where its wire is not known."""
-    return 0.0 if springs.wound is None else springs.wound.wound(springs.kind).body_length
+    """Return the length of a spring with its turns on each other [m]; 0 if neither it nor its wire is stated."""
+    return springs.body_length or (0.0 if springs.coil is None else springs.coil.body_length)
 
 
 def parts(spec: VcfmSpec) -> Parts:

@@ -35,16 +35,18 @@ from cfmkit.families.vcfm.leaf_sizing import (
 from cfmkit.families.vcfm.leaves.v_beam import STEEP, VBeam, onset_and_exit
 from cfmkit.results import Design, Status
 from cfmkit.stock.material_and_part_spec import sheet_of
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, nearest
-from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.guides import guide_words
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, guide_rod_for, nearest
+from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-    from cfmkit.families.vcfm.spec import BoughtSprings, VcfmDesign, VcfmSpec
+    from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
 
 BACK = 1.5
@@ -74,6 +76,8 @@ class LeavesAroundSprings:
         Where the leaves' stiffness is constant [m].
     half_beams : int
         Number of leaves.
+    listed : bool
+        Whether the springs are from a catalogue, and not those of the mechanism.
     """
 
     springs: BoughtSprings
@@ -81,27 +85,48 @@ class LeavesAroundSprings:
     leaf: LeafStrip
     linear: tuple[float, float]
     half_beams: int
+    listed: bool = False
+
+    @property
+    def deflection(self) -> float:
+        """Largest one of a spring, with the preload and at the end of the leaves' linear range [m]."""
+        return float(self.linear[1]) + self.target.preload_stroke
+
+    @property
+    def held_springs(self) -> BoughtSprings:
+        """The springs as they are to be built: with a rod if they would buckle without a guide.
+
+        What a catalogue offers as a guide is left out if the springs do not need one.
+        """
+        springs, coil, buckles = self.springs, self.springs.coil, self.deflection > self.springs.unguided
+        known = springs.model_dump(exclude_unset=True)
+        if buckles and not springs.is_guided and coil is not None:
+            return type(springs).model_validate(known | {"guide_rod": guide_rod_for(coil)})
+        if self.listed and springs.is_guided and not buckles:
+            plain = {key: value for key, value in known.items() if key not in ("guide_rod", "guide_tube")}
+            return type(springs).model_validate(plain)
+        return springs
 
     @property
     def label(self) -> str:
         """Number and name."""
         return f"{self.springs.count} x {self.springs.name or 'the spring'}"
 
-    def rank(self, wanted: VcfmDesign) -> tuple[float, float, int]:
-        """Return what springs that fit are sorted by: how far below the limit, length of leaves [m], number."""
+    def rank(self, wanted: VcfmDesign) -> tuple[bool, float, float, int]:
+        """Return what springs that fit are sorted by: guide, how far below the limit, length of leaves [m], number."""
         below = 0.0
         if wanted.rise is not None:
             below = 1.0 - self.target.height / wanted.rise
         elif wanted.preload is not None:
             below = 1.0 - self.target.preload_stroke / wanted.preload
-        return round(below, 6), float(self.leaf.length), self.springs.count
+        return self.held_springs.is_guided, round(below, 6), float(self.leaf.length), self.springs.count
 
 
 def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     """Return the design with leaves around springs of the catalogue, or around those of the mechanism.
 
-    Of springs that fit the one is taken whose rise, or preload, comes nearest to the largest that is allowed; where
-    neither is limited, the one with the shortest leaves.
+    Of springs that fit those come first that need no guide against buckling, and of these the one whose rise, or
+    preload, comes nearest to the largest that is allowed; if neither is limited, the one with the shortest leaves.
 
     Parameters
     ----------
@@ -152,7 +177,7 @@ def _with_next(spec: VcfmSpec, target: VcfmDesign, one: LeavesAroundSprings) -> 
 
 def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings, Offer | None]]:
     """Yield springs in their numbers, with their places in the catalogue; without one those of the mechanism."""
-    from cfmkit.families.vcfm.spec import BoughtSprings
+    from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 
     given = spec.mechanism.springs
     if not target.catalogue:
@@ -169,11 +194,12 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
                 "initial_tension": offer.initial_tension if offer.kind == "extension" else 0.0,
                 "max_elongation": offer.largest,
                 "free_length": offer.free_length,
+                "body_length": None if offer.wound is not None else offer.body_length,
                 "outer_diameter": offer.outer_diameter,
                 "name": offer.name,
                 "wound": wire_of(offer),
                 "life": offer.life,
-            }
+            } | support_of(offer)
             known = {key: value for key, value in about.items() if value is not None}
             yield BoughtSprings.model_validate(known), offer
 
@@ -224,7 +250,7 @@ def _around(
             return Miss(label, 1.0, problem.finding.message)
     else:
         leaf = _wide_enough(spec, own, thickness, length)
-    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count)
+    found = LeavesAroundSprings(springs, own, leaf, onset_and_exit(leaf), count, offer is not None)
     return _missed(spec, target, found, offer) or found
 
 
@@ -239,11 +265,12 @@ def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: floa
 
 def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
     """Return what springs miss with the leaves around them; None where they fit."""
-    springs, leaf, own = found.springs, found.leaf, found.target
-    most = float(found.linear[1]) + own.preload_stroke
+    springs, leaf = found.springs, found.leaf
+    most, held = found.deflection, found.held_springs
     limits = (
         ("deflected by", most, springs.max_elongation, "they allow"),
         ("deflected by", most, room_of_coils(springs), "their turns touch at"),
+        ("deflected by", most, np.inf if held.is_guided else held.unguided, "without a guide they buckle at"),
         ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
         ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
         ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
@@ -281,7 +308,7 @@ def _written(spec: VcfmSpec, found: LeavesAroundSprings) -> VcfmSpec:
     return spec.replace(
         {
             "mechanism.positive": None,
-            "mechanism.springs": found.springs.model_dump(exclude_unset=True),
+            "mechanism.springs": found.held_springs.model_dump(exclude_unset=True),
             "mechanism.bistable.half_beams": found.half_beams,
             "mechanism.bistable.length": float(leaf.length),
             "mechanism.bistable.angle": float(leaf.angle),
@@ -350,6 +377,8 @@ def _made(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings) -> Des
         stated = max((abs(one) for one in spec.analysis.preloads), default=0.0)
         if "analysis" in spec.model_fields_set and abs(stated - own.preload_stroke) > NOTED * own.preload_stroke:
             note += f"; 'analysis' is stated for {mm(stated)}: leave it out to see these springs at their own preload"
+    if (words := guide_words(found.held_springs)) and found.deflection > found.springs.unguided:
+        note += f"; {' and '.join(words)}: alone they would buckle when deflected by {mm(found.springs.unguided)}"
     made = completed(
         _written(spec, found), own.model_copy(update={"force": target.force}), found.linear, found.leaf.angle
     )

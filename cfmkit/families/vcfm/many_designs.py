@@ -34,7 +34,8 @@ from cfmkit.families.vcfm.leaves.v_beam import (
 from cfmkit.families.vcfm.solution import FLAT_PLACES, goes_beyond, is_constant, leaves_plane
 from cfmkit.metrics.continuous_means_and_extremes import extremes as extremes_next_to
 from cfmkit.metrics.longest_interval_in_band import extremes, flat_window
-from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
+from cfmkit.metrics.spread import STATIC_BALANCE, ManyWindows, metric_of, metrics_of, static_balance
+from cfmkit.results import ROUND_OFF
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
     if spec.analysis.travel is None:
         return None
     block = block.in_places((0.0, spec.travel))
-    if not _applies(spec, block) or not names <= set(SCALARS) | set(METRICS):
+    if not _applies(spec, block) or not names <= set(SCALARS) | METRICS:
         return None
     values = [np.full(block.size, np.nan) for _ in block.measures]
     done = _sound(spec, block, names)
@@ -89,7 +90,7 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         for measure, found in zip(block.measures, values, strict=True):
             found[chosen] = _measured(slab, measure)
             if measure.name in METRICS:
-                done[chosen] &= slab.inside(measure.window).mean > 0
+                done[chosen] &= slab.inside(measure.window).mean > slab.error
         for name, mask in warned(spec, slab).items():
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = mask
     named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
@@ -197,8 +198,31 @@ class Slab:
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the forces inside a window."""
         if window not in self._windows:
-            self._windows[window] = ManyWindows(*self._inside(window), self._extremes)
+            self._windows[window] = ManyWindows(*self._inside(window), self._extremes, self.error)
         return self._windows[window]
+
+    @cached_property
+    def error(self) -> FloatArray:
+        """Rounding of the sums of leaves and spring, (k,) [N]: as `results.round_off` has it."""
+        leaves, spring = self._parts(self.grid[None, :])
+        return np.asarray(ROUND_OFF * (leaves + spring).max(axis=1))
+
+    def _parts(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the sizes of the forces of all leaves and of the spring at travels (k or 1, n), (k, n) each [N]."""
+        shape = len(self.half_beams), travel.shape[1]
+        leaves, spring = self.half_beams * self.leaf.force(travel), self.spring.force(travel)
+        return np.broadcast_to(np.abs(leaves), shape), np.broadcast_to(np.abs(spring), shape)
+
+    def static_balance(self, window: tuple[float, float] | None) -> FloatArray:
+        """Return the largest force in a window over that of one leaf, or of the spring, (k,)."""
+        many = self.inside(window)
+        part, _ = extremes_next_to(self._largest_part, many.motion[None, :], self._largest_part(many.motion[None, :]))
+        return np.asarray(static_balance(many.spread, part))
+
+    def _largest_part(self, travel: FloatArray) -> FloatArray:
+        """Return the largest force of one leaf, or of the spring, at travels of each design, (k, n) [N]."""
+        leaves, spring = self._parts(travel)
+        return np.asarray(np.maximum(leaves / self.half_beams, spring))
 
     def _extremes(self, travel: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the largest and smallest force: next to the samples, or where the leaves buckle and straighten."""
@@ -258,10 +282,12 @@ class Slab:
 def _measured(slab: Slab, measure: Measure) -> FloatArray:
     if measure.name in SCALARS:
         return np.ravel(np.broadcast_to(SCALARS[measure.name](slab), (len(slab.half_beams), 1)))
+    if measure.name == STATIC_BALANCE:
+        return slab.static_balance(measure.window)
     return metric_of(measure.name, slab.inside(measure.window), slab.target)
 
 
-METRICS = metrics_of("force")
+METRICS = metrics_of("force") | {STATIC_BALANCE}
 """Metrics of one branch inside its window."""
 
 

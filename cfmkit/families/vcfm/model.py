@@ -23,7 +23,7 @@ from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.numerics.where_condition_ends import last_places
-from cfmkit.results import Result, Status
+from cfmkit.results import ROUND_OFF, Result, Status
 from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ def result_of(solution: Solution, run: Run) -> Result:
         stress_overrated=solution.overrating,
         load_cases=curves[1:],
         closed=DenseCurve(solution),
+        effort_error=solution.effort_error,
+        part_efforts=solution.part_efforts,
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}
         | listed(parts_of(spec)),
         state=solution,
@@ -248,6 +250,7 @@ class LawSampler:
     """Samples of closed forms."""
 
     problem = ""
+    accuracy = ROUND_OFF
 
     def __init__(self, parts: Parts) -> None:
         """Keep the laws."""

@@ -49,6 +49,9 @@ GAP = 0.01
 FITS = 1.02
 """Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
 
+FINE = 2e-4
+"""How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
+
 POINTS = 201
 """Of the edge of a cosine arch."""
 
@@ -67,20 +70,21 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     spring = [] if bought else spring_contours(spec, low - GAP)
     dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
     part = spec.mechanism.part or CutPart()
-    rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
-    notes = _sharp(rounded, part.fillet)
+    rounded = [filleted(contour, spec.mechanism.fillet) for contour in (*leaves, *spring)]
+    notes = _sharp(rounded, spec.mechanism.fillet)
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
     contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring, sizes))
     notes = (*_notes(spec), *frame_notes(spec, sizes), *notes)
-    return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts)
+    near = min(TOLERANCE, FINE * spec.mechanism.thinnest)
+    return Drawing("vcfm", contours, (table,), notes, _sheet(spec, spring), dimensions, facts, tolerance=near)
 
 
 def sharp_corners(spec: VcfmSpec) -> tuple[str, ...]:
     """Return one line per inside corner of leaves and spring that no fillet fits, with its place."""
     leaves, low = leaves_contours(spec)
     spring = [] if spec.mechanism.springs is not None else spring_contours(spec, low - GAP)
-    part = spec.mechanism.part or CutPart()
-    return _sharp([filleted(contour, part.fillet) for contour in (*leaves, *spring)], part.fillet)
+    fillet = spec.mechanism.fillet
+    return _sharp([filleted(contour, fillet) for contour in (*leaves, *spring)], fillet)
 
 
 def _sharp(rounded: Sequence[tuple[Contour, tuple[complex, ...]]], fillet: float) -> tuple[str, ...]:
@@ -294,10 +298,10 @@ class SolvedPiece:
 
 def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     """Return one leaf between shuttle and wall; both leaves of a V where the shuttle can turn."""
-    about, part = spec.mechanism.bistable, spec.mechanism.part or CutPart()
+    about, fillet = spec.mechanism.bistable, spec.mechanism.fillet
     strip = strip_of(about, spec.mechanism.material)
     half, far = 0.5 * spec.mechanism.frame.shuttle_width, 0.5 * spec.mechanism.frame.shuttle_width + float(strip.reach)
-    rise, over = float(strip.rise), 2.0 * (max(about.profile[1]) + part.fillet)
+    rise, over = float(strip.rise), 2.0 * (max(about.profile[1]) + fillet)
     upper, lower = (_edge(spec, side, (half, 0.0)) for side in (1.0, -1.0))
     out = far + spec.mechanism.frame.block
     right: list[Item] = [(0.0, over), (half, over), *upper, (far, over - rise), (out, over - rise)]
@@ -305,21 +309,21 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     wall = np.array([[far, over - rise], [out, over - rise], [out, -over - rise], [far, -over - rise]])
     if about.guided:
         shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
-        return SolvedPiece(filleted(_contour(right), part.fillet)[0], shuttle, (wall,), True)
+        return SolvedPiece(filleted(_contour(right), fillet)[0], shuttle, (wall,), True)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
-    return SolvedPiece(filleted(_whole(right), part.fillet)[0], shuttle, (wall, wall * np.array([-1.0, 1.0])), True)
+    return SolvedPiece(filleted(_whole(right), fillet)[0], shuttle, (wall, wall * np.array([-1.0, 1.0])), True)
 
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
-    about, frame, part = spec.mechanism.flexures, spec.mechanism.frame, spec.mechanism.part or CutPart()
+    about, frame, fillet = spec.mechanism.flexures, spec.mechanism.frame, spec.mechanism.fillet
     half = 0.5 * frame.block
     if about.structure == "straight":
         right, bottom = _straight(spec, 0.0)
         x, middle, out = half + about.length, -frame.block, half + about.length + frame.block
         end = np.array([[x, middle + half], [out, middle + half], [out, middle - half], [x, middle - half]])
         top = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
-        return SolvedPiece(filleted(_contour(right), part.fillet)[0], top, (end,), False)
+        return SolvedPiece(filleted(_contour(right), fillet)[0], top, (end,), False)
     if about.structure == "u-shape":
         outer, inner, base = _bend(spec, 0.0)
         low, high = _corners(inner)[1][1], _corners(inner)[0][1]
@@ -327,7 +331,7 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
         around += [(0.0, low), *_back(inner), (0.0, high)]
         top = np.array([[0.0, 0.0], [half, 0.0], [half, high], [0.0, high]])
         foot = np.array([[0.0, low], [half, low], [half, base - frame.block], [0.0, base - frame.block]])
-        return SolvedPiece(filleted(_contour(around), part.fillet)[0], top, (foot,), False)
+        return SolvedPiece(filleted(_contour(around), fillet)[0], top, (foot,), False)
     outer, inner, base = _diamond(spec, 0.0)
     middle, (leaf, corner) = 0.5 * (base - frame.block), (inner[0], inner[1])
     out, x = _corners(outer[3:4])[0][0], _corners(outer[1:2])[0][0]
@@ -335,7 +339,7 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     start = _corners([leaf])[0][1]
     top = np.array([[0.0, 0.0], [half, 0.0], [half, start], [0.0, start]])
     line = np.array([[x, middle], [out, middle]])
-    return SolvedPiece(filleted(_contour([*around, (0.0, start)]), part.fillet)[0], top, (line,), False, True)
+    return SolvedPiece(filleted(_contour([*around, (0.0, start)]), fillet)[0], top, (line,), False, True)
 
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
@@ -362,7 +366,7 @@ def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]
     half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
     rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
     # high enough for the fillet beside it; where the spring closes, its inner edges meet, not these
-    room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * (spec.mechanism.part or CutPart()).fillet
+    room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * spec.mechanism.fillet
     rim = max(RIM * about.thickness, v + FITS * room)
     high = top - frame.block
     up, down = high - rise, high - rise - frame.corner

@@ -27,7 +27,7 @@ from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, tr
 from cfmkit.families.vcfm.outline import drawing, sharp_corners, solved_leaf, solved_spring
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between
-from cfmkit.stock.material_and_part_spec import CutPart
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.outline import SolvedPiece
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
+    from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart
     from cfmkit.solid.meshed_part import MeshSolution, Part
-    from cfmkit.solid.two_meshes import DrivenPart
 
 GATHERED = 1.5
 """Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
@@ -55,7 +55,6 @@ class SolidPath:
     Attributes
     ----------
     solved : MeshSolution
-        The finer mesh, where there are two.
     """
 
     solved: MeshSolution
@@ -124,16 +123,17 @@ class SolidSampler(ExactSampler):
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
         leaf, *spring = elastic_parts(spec)
         leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
-        self.pushed, self.mesh_error = _path(leaves.fine), leaves.error
-        self.pulled = _pulled(spec, leaf, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
+        self.pushed, self.mesh_error = _path(leaves.solution), leaves.error
+        self.pulled = _pulled(spec, leaves, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("bistable", (self.pushed, self.pulled), 1.0)
         for one in spring:
             self.chain = spring_chain(spec)
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
             springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
-            pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
-            self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
+            pull = _pulled(spec, springs, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
+            self.sides, self.mesh_error = [_path(springs.solution), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("positive", self.sides, self.chain.travel)
+        self.accuracy = self.mesh_error.force
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Tell at which travels [m] leaves and, unless it is bought, spring have a pose."""
@@ -170,13 +170,12 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
         )
         for number, one in enumerate(piece.held, start=1)
     ]
-    return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
+    return Part(rings_of((piece.contour,), about.thickness), about.thickness, about.width, law, (shuttle, *walls))
 
 
 def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
     """Return leaf and, unless it is bought, spring as solved: pushed. Decks and studies of meshes ask for them, too."""
-    from cfmkit.solid.meshed_part import ACROSS
-    from cfmkit.solid.two_meshes import DrivenPart
+    from cfmkit.solid.adaptive_solution import DrivenPart
 
     spec = spec.replace({"analysis.fidelity": "solid"})
     pieces, ends = {"leaf": solved_leaf(spec)}, {"leaf": spec.travel}
@@ -190,9 +189,8 @@ def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
         places["spring"] = [share * (preload + place) for place in own]
     found = []
     for name, piece in pieces.items():
-        part = part_of(spec, piece)
-        size = spec.analysis.solid.mesh or part.thinnest / ACROSS
-        found.append(DrivenPart(f"vcfm-{name}", part, size, _stops(spec, ends[name], 1, places[name])))
+        part, stops = part_of(spec, piece), _stops(spec, ends[name], 1, places[name])
+        found.append(DrivenPart(f"vcfm-{name}", part, spec.analysis.solid.error, stops))
     return tuple(found)
 
 
@@ -210,9 +208,11 @@ def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ())
     return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
 
 
-def _pulled(spec: VcfmSpec, driven: DrivenPart, end: float, report: Callable[[float], None]) -> SolidPath:
-    """Return a part that is pulled back to a travel [m], on one mesh and with a quarter of the poses."""
-    return _path(driven.part.meshed(driven.size).densely(_stops(spec, end, 4), report))
+def _pulled(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Callable[[float], None]) -> SolidPath:
+    """Return a part that is pulled back to a travel [m], on the mesh found for pushing, with a quarter of the poses."""
+    from cfmkit.solid.adaptive_solution import BETWEEN_SHARE
+
+    return _path(pushed.meshed.densely(_stops(spec, end, 4), report, BETWEEN_SHARE * pushed.error.target))
 
 
 def _path(solved: MeshSolution) -> SolidPath:
@@ -234,10 +234,10 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         outlines(drawing(spec))  # what cannot be cut is not solved: fillets too large make mountains of elements
         sampler = SolidSampler(spec, spec.travel, back, run)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check mechanism.part"
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except SolutionError as error:
-        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; check analysis.solid.mesh")
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}")
     found = result_of(solution := solve(spec, made, sampler), run)
     warnings = (*found.warnings, *_findings(spec, sampler))
     if not found.curves:
@@ -249,8 +249,8 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
-    if reported := sharp_inside((spec.mechanism.part or CutPart()).fillet, sharp_corners(spec)):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    if reported := sharp_inside(spec.mechanism.fillet, sharp_corners(spec)):
+        yield finding("sharp_corners", reported, usual_fillet(spec.mechanism.thinnest))
     for name, reported in sampler.mesh_error.too_large():
         yield finding(name, reported)
     about = spec.mechanism

@@ -23,21 +23,22 @@ import numpy as np
 from cfmkit.errors import SolutionError
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import Infeasible
+from cfmkit.families.run_control import Run
+from cfmkit.families.stiffening_of_wide_beams import is_too_wide
 from cfmkit.families.vcfm.design import closed_form
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
+from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.offer_type_and_generic_series import generic
 from cfmkit.stock.springs.spec import CatalogueSpring
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.arrays import FloatArray
-    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.design import DesignSizes
-    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.wishes import MaterialBlock, Wish
 
 
@@ -76,13 +77,17 @@ TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid", "2 Vs, c
 SOFTEST = 0.9
 """Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
 
+WIDE_LAST = 100.0
+"""Promise of designs whose leaves are too wide to curl: they come after all others."""
+
 APART = 1.2
 """Room across that a helical spring takes, over its diameter: as they are drawn."""
 
 OFFERED = 28
 
 FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
-"""What finishes what the family's design has made."""
+CORRECT = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
+"""What finishes what the family's design has made, and what corrects it by its solids."""
 
 
 def propose(wish: Wish, run: Run) -> FamilyOffer:
@@ -103,11 +108,13 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
                 # of made parts those with thick leaves are most alike: an error of the thickness counts three times
                 thick = min(sizes.leaf.thickness, sizes.side.thickness)
                 promise = over["across"] * over["along"] if wish.good_parts is None else -thick
-                found.append(Candidate(variant, spec, True, FINISH, float(promise)))
+                promise += WIDE_LAST * _is_too_wide(wish, block, sizes)
+                found.append(Candidate(variant, spec, True, FINISH, float(promise), correct=CORRECT))
             if (coiled := _coiled(wish, block, spec, sizes)) is not None:
                 found.append(coiled)
     if found:
-        plain = sorted(found, key=lambda one: one.promise)
+        ranked = sorted(found, key=lambda one: one.promise)
+        plain = [one for one in ranked if one.promise < 0.5 * WIDE_LAST] or ranked
         return FamilyOffer(tuple(_varied([*plain, *_with_structures(plain)])[:OFFERED]))
     if closest is None:
         return FamilyOffer(
@@ -115,6 +122,13 @@ def propose(wish: Wish, run: Run) -> FamilyOffer:
             "this travel, force and adjustment within the stress"
         )
     return _out_of_reach(wish, *closest)
+
+
+def _is_too_wide(wish: Wish, block: MaterialBlock, sizes: DesignSizes) -> bool:
+    """Return True if the Vs or the spring probably cannot curl, and stiffen by more than the band of the wish."""
+    material = MaterialSpec.model_validate(dict(block))
+    strain = wish.strength_used * (material.allowable(1.0) or 0.0) / material.modulus
+    return any(is_too_wide(wish, float(one.width), float(one.thickness), strain) for one in (sizes.leaf, sizes.side))
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
@@ -224,8 +238,10 @@ def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes
         return None
     promise = across * (stands + min(one.free_length or 0.0 for one in springs))
     promise = promise if wish.good_parts is None else -float(leaf.thickness)
-    listed = spec.replace({"design.catalogue": tuple(springs)})
-    return Candidate(called("2 Vs, catalogue springs", wish, block), listed, True, FINISH, float(promise))
+    # the spring decides how wide the leaves are: of those for which there is a place, one whose leaves fit the depth
+    listed = spec.replace({"design.catalogue": tuple(springs), "design.max_width": wish.depth})
+    variant = called("2 Vs, catalogue springs", wish, block)
+    return Candidate(variant, listed, True, FINISH, float(promise), correct=CORRECT)
 
 
 def _springs_beside(wish: Wish, spec: VcfmSpec, travel: float, place: float) -> Iterator[CatalogueSpring]:
@@ -286,45 +302,25 @@ def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
     raised = 0.0 if wish.adjustable is None or design is None or not design.adjustment else max(wish.adjustable)
     forces = wish.target, max(raised, wish.target)
     made, end, stiffness = with_structure(spec, name, forces, wish.travel, strength)
-    return _over_flattest(made, wish, _preloads(spec, wish, 1.0 / stiffness), end)
+    return _over_flattest(made, wish, preloads_for(spec, wish, 1.0 / stiffness), end)
 
 
 def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
     window = spec.analysis.window
-    return _over_flattest(spec, wish, _preloads(spec, wish), float(window[1]) if window else wish.travel)
-
-
-def _preloads(spec: VcfmSpec, wish: Wish, per_force: float | None = None) -> tuple[float, ...]:
-    """Return the preloads with which the force is that of the middle and both ends of the adjustment [m].
-
-    `per_force` is the preload for a change of the force [m/N]; None: that of the design, or of its bought springs.
-    """
-    design, bought = spec.design, spec.mechanism.springs
-    if wish.adjustable is None or design is None or not design.adjustment:
-        return (0.0,)
-    if per_force is None:
-        per_force = design.preload_stroke / design.adjustment if bought is None else 1.0 / coils(bought).stiffness
-    low, high = wish.adjustable
-    return (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
+    return _over_flattest(spec, wish, preloads_for(spec, wish), float(window[1]) if window else wish.travel)
 
 
 def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end: float) -> VcfmSpec:
     """Return a mechanism with preloads and the flattest window, looked for up to a little behind an end [m]."""
     from cfmkit.families.flattest_window import flattest
-    from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.exact_model import analyze
-    from cfmkit.families.vcfm.leaf_laws_from_spec import spring_room
 
     wide = end + 0.2 * wish.travel
     keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
-    made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
-    closing = wide + max(preloads) - spring_room(made)
-    if closing > 0.0:
-        # higher corners, so that the spring stays open: a rigid part, which no force depends on
-        made = made.replace({"mechanism.frame.corner": made.mechanism.frame.corner + 1.1 * closing})
-    result = analyze(made, Run())
-    found = flattest(result, wish.travel)
+    free = {"analysis.window": None, "analysis.travel": wide, "requirements": ()}
+    made = opened(spec.replace(keys | free), wide, preloads)
+    found = flattest(analyze(made, Run()), wish.travel)
     if found is None:
         return made
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
@@ -400,9 +396,9 @@ def with_structure(
         over = [stress / strength for stress in found.stresses]
         if max(over) <= 1.0:
             break
-        made = _longer(made, [max(1.0, sqrt(1.02 * one)) for one in over])
+        made = lengthened(made, [max(1.0, sqrt(1.02 * one)) for one in over])
         found = _fitted(made, forces, travel)
-    made = _wider(made, found)
+    made = widened(made, found.wide, found.stiff)
     return made, found.end, found.stiffness
 
 
@@ -426,7 +422,7 @@ def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
         sampler = ExactSampler(spec, end, 0.0)
     if sampler.problem:
         raise SolutionError(sampler.problem)
-    tried = [one for one in (_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
+    tried = [one for one in (fit_in_window(sampler, at, forces[0], travel) for at in centres) if one is not None]
     if not tried:
         raise SolutionError("no widths of this structure give the force over the travel")
     _, at, wide, stiff = min(tried)
@@ -438,42 +434,3 @@ def _fitted(spec: VcfmSpec, forces: tuple[float, float], travel: float) -> _Fit:
     law, preload = parts(spec).spring, (forces[1] - forces[0]) / stiffness
     more = float(law.stress(last + preload) / law.stress(last))
     return _Fit(wide, stiff, (leaf, more * float(stresses[1])), last, stiffness)
-
-
-def _in_window(
-    sampler: ExactSampler, at: float, force: float, travel: float
-) -> tuple[float, float, float, float] | None:
-    """Return what is left of the force around a place, the place and both factors; None where one is not above zero."""
-    places: FloatArray = np.linspace(at - 0.5 * travel, at + 0.5 * travel, 61)
-    columns = np.column_stack([sampler.leaves(places).force, sampler.spring(places)[0]])
-    if not np.isfinite(columns).all():
-        return None
-    (wide, stiff), *_ = np.linalg.lstsq(columns, np.full(len(places), force), rcond=None)
-    if not (wide > 0.0 and stiff > 0.0):
-        return None
-    left = np.abs(columns @ np.array([wide, stiff]) / force - 1.0).max()
-    return float(left), at, float(wide), float(stiff)
-
-
-def _wider(spec: VcfmSpec, fit: _Fit) -> VcfmSpec:
-    parts = spec.mechanism
-    return spec.replace(
-        {
-            "mechanism.bistable.width": parts.bistable.width * fit.wide,
-            "mechanism.positive.width": parts.flexures.width * fit.stiff,
-        }
-    )
-
-
-def _longer(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
-    """Return a mechanism whose leaves of the same rise, and whose spring, are longer by factors."""
-    leaf, spring = spec.mechanism.bistable, spec.mechanism.flexures
-    rise, length = leaf.length * sin(leaf.angle), leaf.length * factors[0]
-    changes = {
-        "mechanism.bistable.length": length,
-        "mechanism.bistable.angle": asin(rise / length),
-        "mechanism.positive.length": spring.length * factors[1],
-    }
-    if leaf.flexure_length is not None:
-        changes["mechanism.bistable.flexure_length"] = leaf.flexure_length * factors[0]
-    return spec.replace(changes)

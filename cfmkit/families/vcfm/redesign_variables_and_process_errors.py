@@ -47,6 +47,7 @@ def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
 
 
 def errors(spec: VcfmSpec) -> dict[str, str]:
-    """Return which values a process errs in: the thicknesses of both kinds of leaves; bought springs have none."""
-    made = ("positive", "bistable") if spec.mechanism.springs is None else ("bistable",)
-    return {f"mechanism.{one}.thickness": "thickness" for one in made}
+    """Return which values err: the thicknesses of both kinds of leaves, or of leaves and the rate of bought springs."""
+    if spec.mechanism.springs is None:
+        return {f"mechanism.{one}.thickness": "thickness" for one in ("positive", "bistable")}
+    return {"mechanism.bistable.thickness": "thickness", "mechanism.springs.stiffness": "rate"}

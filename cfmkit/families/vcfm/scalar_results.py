@@ -32,7 +32,7 @@ DEFINITIONS = {
     "first_stiffness": ("stiffness", "stiffness K_b1 of the leaves as made"),
     "rise": ("length", "h of the leaves: travel to the flat pose"),
     "slenderness": (
-        "ratio",
+        "factor",
         "rise over thickness of the leaves, Q: above pi they buckle, above 3.195 they are bistable",
     ),
     "linear_start": ("length", "travel at which the leaves buckle"),
@@ -50,6 +50,9 @@ DEFINITIONS = {
     "rest_position": ("length", "rest position of the shuttle at the nominal preload, from the as-made position"),
     "rest_shift_max": ("length", "largest distance of a rest position from the as-made position, over all preloads"),
     "force_change_max": ("force", "largest change of the mean force due to a preload, relative to the nominal one"),
+    "adjusted_force_min": ("force", "smallest mean force over the window, of all preloads"),
+    "adjusted_force_max": ("force", "largest mean force over the window, of all preloads"),
+    "adjusted_ripple_max": ("ratio", "largest (max - min)/max of the force over the window, of all preloads"),
     "force_per_preload": (
         "stiffness",
         "largest change of the mean force due to a preload, over the change of the preload",
@@ -127,7 +130,7 @@ def _mismatch(solution: Solution) -> dict[str, float | None]:
     one, alone, span = solution.character, solution.spring_alone, solution.window[1] - solution.window[0]
     difference = abs(one.positive_stiffness - one.negative_stiffness)
     return {
-        "stiffness_mismatch": difference * span / alone if alone else None,
+        "stiffness_mismatch": difference * span / alone if alone and abs(alone) > solution.effort_error else None,
         "allowable_stress": solution.spec.mechanism.allowable_stress,
     }
 
@@ -161,12 +164,11 @@ def _bought(solution: Solution) -> dict[str, Quantity]:
     springs = solution.spec.mechanism.springs
     if springs is None:
         return {}
-    wound = None if springs.wound is None else springs.wound.wound(springs.kind)
     fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
     used = []
     for push in solution.pushes:
         least, most = (springs.load(float(place) + push.preload) for place in (push.travel[0], push.travel[-1]))
-        used.append(SpringInUse(wound, least, most, fatigue, springs.life))
+        used.append(SpringInUse(springs.coil, least, most, fatigue, springs.life))
     farthest = max(float(push.travel[-1]) + push.preload for push in solution.pushes)
     return {"spring_deflection_max": _quantity("spring_deflection_max", max(farthest, 0.0))} | wire_quantities(used)
 
@@ -195,6 +197,17 @@ def _adjustment(solution: Solution) -> dict[str, float | None]:
     return {"force_change_max": change, "force_per_preload": change / preload}
 
 
+def _at_ends(solution: Solution) -> dict[str, float | None]:
+    """Return the means and the ripple of all preloads together; None where one of them has no force in the window."""
+    names = "adjusted_force_min", "adjusted_force_max", "adjusted_ripple_max"
+    curves = [forces(solution, push) for push in solution.pushes]
+    if not all(np.isfinite(force).all() and force.max() > 0.0 for force in curves):
+        return dict.fromkeys(names)
+    means = [float(force.mean()) for force in curves]
+    worst = max(1.0 - float(force.min() / force.max()) for force in curves)
+    return dict(zip(names, (min(means), max(means), worst), strict=True))
+
+
 _GROUPS: Mapping[tuple[str, ...], Callable[[Solution], dict[str, float | None]]] = {
     (
         "positive_stiffness",
@@ -212,6 +225,7 @@ _GROUPS: Mapping[tuple[str, ...], Callable[[Solution], dict[str, float | None]]]
     ("stiffness_mismatch", "allowable_stress"): _mismatch,
     ("spring_stress_max", "bistable_stress_max", "travel_stress_max", "travel_safety_factor"): _stresses,
     ("force_change_max", "force_per_preload"): _adjustment,
+    ("adjusted_force_min", "adjusted_force_max", "adjusted_ripple_max"): _at_ends,
 }
 """Values that are computed together, in the order of the page."""
 

@@ -59,6 +59,10 @@ class PartSampler(Protocol):
         """Why a part could not be followed to the end; empty if all could."""
 
     @property
+    def accuracy(self) -> float:
+        """Error of the force, in parts of what leaves and spring bear."""
+
+    @property
     def character(self) -> Characteristics:
         """Stiffnesses and linear range."""
 
@@ -124,6 +128,25 @@ class Solution(ShortRepr):
     def nominal(self) -> Push:
         """The curve of the first preload."""
         return self.pushes[0]
+
+    @property
+    def effort_error(self) -> float:
+        """Rounding of the sum of the forces of leaves and spring, or what the path of each is solved to [N]."""
+        push = self.nominal
+        return self.sampler.accuracy * float((np.abs(push.leaves.force) + np.abs(push.spring_force)).max())
+
+    def part_efforts(self, _branch: str, travel: FloatArray, /) -> FloatArray:
+        """Return the largest force of one leaf, or of one spring, at some travels and the nominal preload [N]."""
+        places = np.ravel(travel)
+        leaf = self.sampler.leaf_force(places) / self.parts.half_beams
+        spring = self.sampler.spring(places + self.nominal.preload)[0] / self.springs
+        return np.asarray(np.maximum(np.abs(leaf), np.abs(spring)).reshape(np.shape(travel)))
+
+    @property
+    def springs(self) -> int:
+        """Number of springs side by side: of those that are bought; a flexure spring is one."""
+        bought = self.spec.mechanism.springs
+        return 1 if bought is None else bought.count
 
     @cached_property
     def constant_force(self) -> float | None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
+from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
+from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import (
     Analysis,
@@ -23,7 +24,7 @@ from cfmkit.specs.spec import (
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
-from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire, settle_rate
+from cfmkit.stock.springs.spec import Catalogue, Life
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -81,49 +82,6 @@ class Positive(Model):
         if self.structure == "u-shape" and self.radius is None:
             raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
         return self
-
-
-class BoughtSprings(Model):
-    """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
-
-    Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
-    shorter (longer) than relaxed, and all are relaxed as made.
-    """
-
-    kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")
-    stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
-    count: int = Field(1, ge=1, le=1000, description="how many in parallel")
-    initial_tension: Annotated[Force, Field(ge=0)] = Field(
-        0.0, description="force at which an extension spring begins to open"
-    )
-    max_elongation: PositiveLength | None = Field(
-        None, description="largest elongation (or compression) allowed for a spring"
-    )
-    free_length: PositiveLength | None = Field(
-        None, description="relaxed length, for drawings and for the space required"
-    )
-    outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
-    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
-    wound: SpringWire | None = Field(
-        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
-    )
-    life: Life | None = None
-
-    @model_validator(mode="after")
-    def _rate_is_known(self) -> Self:
-        settle_rate(self, self.kind)
-        if self.initial_tension and self.kind == "compression":
-            raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
-        return self
-
-    @property
-    def rate(self) -> float:
-        """Stiffness of one [N/m]."""
-        return self.stiffness or 0.0
-
-    def load(self, deflection: float) -> float:
-        """Return the load of one at a deflection [N]: none where it is relaxed, whatever its initial tension."""
-        return self.initial_tension * (deflection > 0) + self.rate * max(deflection, 0.0)
 
 
 class Bistable(Model):
@@ -185,7 +143,7 @@ class Frame(Model):
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
 
-class Mechanism(Model):
+class Mechanism(CutLeaves, Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
     material: Annotated[LeafMaterial, material_input(LeafMaterial)] = Field(
@@ -336,6 +294,14 @@ class Measured(Model):
     positive_stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="K_p of the spring")
 
 
+class VcfmSolid(SolidAnalysis):
+    """How the part is solved as planar solids."""
+
+    poses: int = Field(
+        41, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
+    )
+
+
 class VcfmAnalysis(Analysis):
     """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
 
@@ -351,7 +317,7 @@ class VcfmAnalysis(Analysis):
         description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
         "spring as drawn, as planar solids; for hybrid leaves the default is exact",
     )
-    solid: SolidAnalysis = Field(SolidAnalysis(poses=41), description="settings of fidelity 'solid'; default: 41 poses")
+    solid: VcfmSolid = Field(VcfmSolid(), description="settings of fidelity 'solid'")
     branch: Literal["stable", "primary"] = Field(
         "stable",
         description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",

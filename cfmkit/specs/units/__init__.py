@@ -45,7 +45,14 @@ from cfmkit.specs.units.fields import (
     Volume,
     quantity,
 )
-from cfmkit.specs.units.quantities import decimal_text, format_quantity, format_short, read_one_of, read_quantity
+from cfmkit.specs.units.quantities import (
+    decimal_text,
+    format_quantity,
+    format_short,
+    meant_as_percent,
+    read_one_of,
+    read_quantity,
+)
 from cfmkit.specs.units.strict_decimal_number import read_number
 from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
 from cfmkit.specs.units.unit_size import unit_table
@@ -102,6 +109,7 @@ __all__ = [
     "format_quantity",
     "format_short",
     "from_border",
+    "meant_as_percent",
     "place_of",
     "quantity",
     "read_number",

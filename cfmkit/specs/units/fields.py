@@ -16,7 +16,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.errors import QuantityError
-from cfmkit.specs.units.quantities import check_quantity, decimal_text, example, format_quantity, needed, read_one_of
+from cfmkit.specs.units.quantities import (
+    check_quantity,
+    decimal_text,
+    example,
+    format_quantity,
+    meant_as_percent,
+    needed,
+    read_one_of,
+)
 from cfmkit.specs.units.strict_decimal_number import shown
 from cfmkit.specs.units.table import DIMENSIONS, UNITLESS, dimension_of
 
@@ -106,7 +114,14 @@ class UnitField:
         if all(_BOUNDS[name][1](value, bound) for name, bound in bounds.items()):
             return value
         reported = given.strip() if isinstance(given, str) else self.reported(value)
-        raise QuantityError(f"{reported} is not allowed: must be {self.limits(bounds)}")
+        raise QuantityError(f"{reported} is not allowed: must be {self.allowed(bounds, reported)}")
+
+    def allowed(self, bounds: Mapping[str, float], given: str) -> str:
+        """Return bounds in words, with the percentage that was meant by a number above 1, if it keeps them."""
+        meant = meant_as_percent(given) if self.dimensions == ("ratio",) else ""
+        share = read_one_of(meant, self.dimensions)[0] if meant else 0.0
+        fits = meant and all(_BOUNDS[name][1](share, bound) for name, bound in bounds.items())
+        return f"{self.limits(bounds)}; did you mean {meant}?" if fits else self.limits(bounds)
 
     def limits(self, bounds: Mapping[str, float]) -> str:
         """Return bounds in words with units: ``> 0 and <= 500 mm``."""

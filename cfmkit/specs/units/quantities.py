@@ -79,6 +79,18 @@ def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
     raise QuantityError(f"{found}; {needed(dimensions)} is needed, e.g. {example(dimensions, number)}")
 
 
+def meant_as_percent(text: str) -> str:
+    """Return the percentage that a number without a unit above 1 was probably meant as; empty where it is none.
+
+    Examples
+    --------
+    >>> meant_as_percent("5"), meant_as_percent("0.05"), meant_as_percent("150 %")
+    ('5 %', '', '')
+    """
+    number, unit = _split(text, ("ratio",))
+    return f"{number} %" if not unit and read_number(number) > 1 else ""
+
+
 def check_quantity(text: str) -> str:
     """Return text that is a number, with or without some known unit, tidied; the dimension is left open.
 

@@ -137,6 +137,9 @@ def _unknown_key(found: Trace) -> str:
     fields = [one for slot in found.parents if slot.model is not None for one in slot.model.model_fields.items()]
     names = [field.alias or name for name, field in fields]
     key = str(found.path[-1]) if found.path else ""
+    removed = (getattr(slot.model, "removed_keys", {}).get(key) for slot in found.parents)
+    if instead := next(filter(None, removed), ""):
+        return f"the key {shown(key)} was removed; {instead}"
     hint = did_you_mean(key, names) or listed("allowed are", names)
     return f"unknown key {shown(key)}" + (f"; {hint}" if hint else "")
 
@@ -235,7 +238,7 @@ def _out_of_bounds(line: _Error) -> str:
     given = line.trace.node
     if slot is not None and slot.quantity is not None:
         reported = given.strip() if isinstance(given, str) else slot.quantity.reported(float(given))
-        return f"{reported} is not allowed: must be {slot.quantity.limits(slot.bounds)}"
+        return f"{reported} is not allowed: must be {slot.quantity.allowed(slot.bounds, reported)}"
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
     limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())
@@ -248,8 +251,8 @@ def _too_few_or_many(line: _Error) -> str:
     value = line.trace.node
     if isinstance(value, str):
         return f"the text has {len(value)} characters; {limit}" if value else "the text is empty"
-    if isinstance(value, dict) and not value:
-        return f"the block is empty; {limit}"
+    if isinstance(value, dict):
+        return f"the block has {len(value)} entries; {limit}" if value else f"the block is empty; {limit}"
     return f"the list has {len(value)} items; {limit}" if isinstance(value, tuple) else _needs(line)
 
 

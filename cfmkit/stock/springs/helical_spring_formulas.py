@@ -1,66 +1,73 @@
-"""Helical springs of round wire: rate, lengths and stress from wire diameter, coil diameter and turns.
+"""Helical springs of round wire: rate, lengths, stress and buckling from wire diameter, coil diameter and turns.
 
 With d the wire, D the mean coil diameter, n the active turns and c = D/d:
 
     extension, compression   k = G d^4 / (8 D^3 n),    tau = K_W 8 F D / (pi d^3),  K_W = (4c-1)/(4c-4) + 0.615/c
     torsion                  k = E d^4 / (64 D n),     sigma = K_i 32 M / (pi d^3), K_i = (4c^2-c-1)/(4c(c-1))
 
-K_W is Wahl's factor of curvature and direct shear, K_i that of the inner side of a bent bar.
+K_W is Wahl's factor of curvature and direct shear, K_i that of the inner side of a bent bar. The rate of torsion
+springs is that of beam theory, as in EN 13906-3; [Sh, eq. 10-51] has 10.8 for 64/(2 pi) = 10.2 in the rate per turn, a
+spring that rubs on its pin and is 6 % softer.
 
-Assumes: round wire, small pitch, no friction between turns; the legs of torsion springs do not bend.
+A compression spring of free length L buckles at the deflection [Sh, eq. 10-10; the same in EN 13906-1]
+
+    y = L C1 (1 - sqrt(1 - C2 (D/(alpha L))^2)),   C1 = E/(2(E - G)),   C2 = 2 pi^2 (E - G)/(2G + E),
+
+alpha by how its ends are held; never if the root has no value. A torsion spring that is wound up by the angle theta has
+the mean diameter D n/(n + theta/(2 pi)) and as much more length in turns [Sh, eq. 10-53].
+
+Assumes: round wire, small pitch, no friction between turns; the legs of torsion springs do not bend, or are counted in
+n with (l1 + l2)/(3 pi D) [Sh, eq. 10-48].
 
 Reference
 ---------
 [W] A. M. Wahl, Mechanical Springs, 2nd ed., McGraw-Hill (1963).
+[Sh] R. G. Budynas, J. K. Nisbett, Shigley's Mechanical Engineering Design, 9th ed., McGraw-Hill (2011), chapter 10.
+[N] R. L. Norton, Machine Design, Prentice Hall, chapter on springs: clearance of a spring in a hole or on a rod.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WireName
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 Kind = Literal["extension", "compression", "torsion"]
 
-SHEAR_MODULUS, YOUNGS_MODULUS = 72e9, 190e9
-"""Of music wire, ASTM A228 [Pa]: makeitfrom.com, 'ASTM A228 (SWP-A, K08500) Music Wire'. A list may state others."""
+SHEAR_MODULUS, YOUNGS_MODULUS = MUSIC_WIRE.shear_modulus, MUSIC_WIRE.youngs_modulus
+"""Of music wire [Pa]. A list may state others."""
 
+tensile_strength = MUSIC_WIRE.tensile_strength
+"""Smallest tensile strength of music wire of a diameter [m] in [Pa]; refuses diameters that its table does not list."""
 
-def tensile_strength(wire: float) -> float:
-    """Return the smallest tensile strength of music wire, 2060 MPa / d^0.163 with d in mm [Pa].
+Seats = Literal["fixed-fixed", "fixed-pivoted", "pivoted-pivoted", "fixed-free"]
 
-    As engineeringprep.com, problem 141, uses it (A and m for music wire of the handbook of the FE exam).
+END_CONDITION: Mapping[Seats, float] = MappingProxyType(
+    {"fixed-fixed": 0.5, "fixed-pivoted": 0.707, "pivoted-pivoted": 1.0, "fixed-free": 2.0}
+)
+"""alpha of the buckling of a compression spring [Sh, Table 10-2]; fixed is an end that stands flat on a plate."""
 
-    Examples
-    --------
-    >>> round(tensile_strength(7.25e-3) / 1e6)
-    1492
-    """
-    return float(2060e6 / (wire * 1e3) ** 0.163)
+SMALL_HOLE, SMALL_HOLE_CLEARANCE, CLEARANCE = 0.013, 0.10, 0.05
+"""Clearance of a spring on a rod, in diameters of its inside: below 13 mm, and above [N]."""
 
 
 @dataclass(frozen=True)
 class Wound:
-    """A helical spring of round wire.
+    """Helical spring of round wire."""
 
-    Attributes
-    ----------
-    kind : {"extension", "compression", "torsion"}
-        What it is loaded by.
-    wire, coil : float
-        Wire diameter, and mean diameter of the coil [m].
-    turns : float
-        Active turns.
-    shear_modulus, youngs_modulus : float
-        Of the wire [Pa].
-    """
-
-    kind: Kind
-    wire: float
-    coil: float
-    turns: float
-    shear_modulus: float = SHEAR_MODULUS
-    youngs_modulus: float = YOUNGS_MODULUS
+    kind: Kind  # what it is loaded by
+    wire: float  # diameter [m]
+    coil: float  # mean diameter [m]
+    turns: float  # active ones
+    shear_modulus: float = SHEAR_MODULUS  # of the wire [Pa]
+    youngs_modulus: float = YOUNGS_MODULUS  # of the wire [Pa]
+    material: WireName = MUSIC_WIRE.name  # class of the wire, which its moduli may differ from
 
     @property
     def index(self) -> float:
@@ -93,6 +100,83 @@ class Wound:
         """Coil and wire [m]."""
         return self.coil + self.wire
 
+    @property
+    def inner_diameter(self) -> float:
+        """Coil without wire [m]."""
+        return self.coil - self.wire
+
     def deflection_at(self, stress: float) -> float:
         """Return the deflection [m] or angle [rad] at a stress in the wire [Pa]."""
         return stress / (self.stress(1.0) * self.rate)
+
+    def inner_diameter_wound_up(self, angle: float) -> float:
+        """Return the inner diameter of a torsion spring that is wound up by an angle [rad], in [m].
+
+        Examples
+        --------
+        >>> spring = Wound("torsion", 1e-3, 10e-3, 5.0)
+        >>> round(1e3 * spring.inner_diameter_wound_up(math.pi), 4)
+        8.0909
+        """
+        return self.coil * self.turns / (self.turns + abs(angle) / (2.0 * math.pi)) - self.wire
+
+    def body_length_wound_up(self, angle: float) -> float:
+        """Return the length of a close-wound torsion spring that is wound up by an angle [rad], in [m]."""
+        return self.body_length + self.wire * abs(angle) / (2.0 * math.pi)
+
+    def buckling_deflection(self, free_length: float, seats: Seats = "fixed-fixed") -> float:
+        """Return the deflection at which a compression spring of a free length [m] buckles [m]; infinite if never.
+
+        Examples
+        --------
+        >>> slender, squat = (Wound("compression", 1e-3, coil, 20.0) for coil in (8e-3, 16e-3))
+        >>> round(1e3 * slender.buckling_deflection(60e-3), 2), squat.buckling_deflection(60e-3)
+        (13.62, inf)
+        """
+        return buckling_deflection(free_length, self.coil, seats, (self.youngs_modulus, self.shear_modulus))
+
+    @property
+    def usual_initial_tension(self) -> tuple[float, float]:
+        """Range of initial tension that extension springs of this index are easily wound with [N] [Sh, eq. 10-41].
+
+        Examples
+        --------
+        >>> low, high = Wound("extension", 1e-3, 10e-3, 20.0).usual_initial_tension
+        >>> round(low, 2), round(high, 2)
+        (2.38, 3.97)
+        """
+        stress = 231e6 / math.exp(0.105 * self.index)
+        spread = max(6.9e6 * (4.0 - (self.index - 3.0) / 6.5), 0.0)
+        load = math.pi * self.wire**3 / (8.0 * self.coil)
+        return load * max(stress - spread, 0.0), load * (stress + spread)
+
+    @property
+    def fitting_rod(self) -> float:
+        """Diameter of the thickest rod that guides the spring with clearance [m]."""
+        inner = self.inner_diameter
+        return inner * (1.0 - (SMALL_HOLE_CLEARANCE if inner < SMALL_HOLE else CLEARANCE))
+
+
+def buckling_deflection(
+    free_length: float,
+    coil: float,
+    seats: Seats = "fixed-fixed",
+    moduli: tuple[float, float] = (YOUNGS_MODULUS, SHEAR_MODULUS),
+) -> float:
+    """Return the deflection at which a compression spring buckles [m]; infinite if it is stable [Sh, eq. 10-10].
+
+    Parameters
+    ----------
+    free_length, coil : float
+        Relaxed length, and mean diameter of the coil [m].
+    seats : str
+        How its ends are held, a key of `END_CONDITION`.
+    moduli : (float, float)
+        E and G of the wire [Pa].
+    """
+    young, shear = moduli
+    slenderness = END_CONDITION[seats] * free_length / coil
+    inside = 1.0 - 2.0 * math.pi**2 * (young - shear) / (2.0 * shear + young) / slenderness**2
+    if inside < 0.0:
+        return math.inf
+    return free_length * young / (2.0 * (young - shear)) * (1.0 - math.sqrt(inside))

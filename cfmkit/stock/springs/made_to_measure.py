@@ -1,19 +1,20 @@
 """Springs wound to measure: the slimmest one of a rate that can be stretched, or turned, so far, where no list has it.
 
-The formulas and the wire are those of `cfmkit.stock.springs.helical_spring_formulas`, the share of the strength is that
-of the generic series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are
-close-wound, loops are as high as the inside of the coil.
+The formulas are those of `cfmkit.stock.springs.helical_spring_formulas`, the wire is music wire of the diameters in its
+table, the share of the strength is that of the generic series. Bodies are close-wound, loops are as high as the inside
+of the coil.
 """
 
 from __future__ import annotations
 
-from math import log2
+from math import log2, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -26,6 +27,9 @@ THINNEST = 0.2e-3
 
 FEWEST = 3.0
 """Turns below which the loops decide the rate."""
+
+PIN_SHARE = 0.9
+"""Diameter of a pin over the inside of a torsion spring that is wound up: what spring makers leave as clearance."""
 
 HALVINGS = 16
 """Of the wire's diameter, where the length decides it."""
@@ -40,37 +44,39 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     --------
     >>> spring = extension_spring(690.0, 0.132, 0.136)
     >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (690.0, 1.71, 15.3, 43)
+    (690.0, 1.68, 15.1, 48)
     """
-    found = [_wound("extension", index, rate, stretch) for index in INDICES]
-    fitting = [one for one in found if loaded_length(one) <= room]
-    return min(fitting, key=lambda one: one.outer_diameter, default=None)
+    fitting = [spring for spring in _candidates("extension", rate, stretch) if loaded_length(spring) <= room]
+    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def torsion_spring(rate: float, turn: float, room: float) -> Wound | None:
+def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> Wound | None:
     """Return the slimmest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so long [m].
 
-    None if there is none: the body would be longer.
+    None if there is none: the body, which is longest when it is wound up, would be longer, or the inside, which is
+    narrowest then, too narrow for a pin of that diameter [m].
 
     Examples
     --------
     >>> spring = torsion_spring(0.05, 1.0, 0.05)
     >>> round(spring.rate, 9), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
-    (0.05, 0.77, 4.6, 6)
+    (0.05, 0.76, 4.5, 6)
     >>> torsion_spring(0.05, 1.0, 0.002) is None
     True
     """
-    found = [_wound("torsion", index, rate, turn) for index in INDICES]
-    return min((one for one in found if one.body_length <= room), key=lambda one: one.outer_diameter, default=None)
+    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
+    fitting = [spring for spring in springs if spring.body_length_wound_up(turn) <= room]
+    return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
 
 
-def shortest_torsion_spring(rate: float, turn: float, widest: float) -> Wound | None:
+def shortest_torsion_spring(rate: float, turn: float, widest: float, pin: float = 0.0) -> Wound | None:
     """Return the shortest torsion spring of a rate [N m/rad] that can be turned so far [rad], at most so wide [m].
 
-    None if there is none: the coil would be wider.
+    None if there is none: the coil would be wider, or too narrow for a pin of that diameter [m].
     """
-    found = [_wound("torsion", index, rate, turn) for index in INDICES]
-    return min((one for one in found if one.outer_diameter <= widest), key=lambda one: one.body_length, default=None)
+    springs = _on_pin(_candidates("torsion", rate, turn), turn, pin)
+    fitting = [spring for spring in springs if spring.outer_diameter <= widest]
+    return min(fitting, key=lambda spring: spring.body_length, default=None)
 
 
 def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, room: float | FloatArray) -> FloatArray:
@@ -95,7 +101,8 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
     rate, stress = (np.array(one)[:, None] for one in zip(*((one.rate, one.stress(1.0)) for one in units), strict=True))
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     index = np.array(INDICES)[:, None]
-    ends = 1.0 + (0.0 if kind == "torsion" else 2.0 * (index - 1.0))
+    # in wires: one more than the turns, and what winds up, or both loops
+    ends = 1.0 + (deflection / (2.0 * pi) if kind == "torsion" else 2.0 * (index - 1.0))
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     each = rate * stress * np.maximum(deflection, 1e-12) / (share * tensile_strength(1e-3))
 
@@ -103,7 +110,8 @@ def stiffest(kind: Kind, deflection: FloatArray, widest: float | FloatArray, roo
         return np.asarray(np.maximum(each * wire ** (power - max(power, 2.0) + falls), FEWEST))
 
     # the thicker the wire, the stiffer, and the longer
-    low, thickest = np.full(each.shape, THINNEST / 1e-3), 1e3 * widest / (index + 1.0) + np.zeros(each.shape)
+    thickest = np.minimum(1e3 * widest / (index + 1.0), 1e3 * MUSIC_WIRE.thickest) + np.zeros(each.shape)
+    low = np.full(each.shape, THINNEST / 1e-3)
     high = np.maximum(thickest, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -118,11 +126,22 @@ def loaded_length(spring: Wound) -> float:
     return spring.body_length + 2.0 * (spring.coil - spring.wire)
 
 
+def _candidates(kind: Kind, rate: float, deflection: float) -> list[Wound]:
+    """Return the spring of each index whose wire is drawn so thick."""
+    springs = [_wound(kind, index, rate, deflection) for index in INDICES]
+    return [spring for spring in springs if spring.wire <= MUSIC_WIRE.thickest]
+
+
+def _on_pin(springs: list[Wound], turn: float, pin: float) -> list[Wound]:
+    """Return the torsion springs that fit over a pin [m] when they are wound up by an angle [rad]."""
+    return [spring for spring in springs if PIN_SHARE * spring.inner_diameter_wound_up(turn) >= pin]
+
+
 def _wound(kind: Kind, index: float, rate: float, deflection: float) -> Wound:
     """Return the spring of an index whose wire is at its allowed stress when deflected, or with the fewest turns."""
     unit = Wound(kind, 1e-3, index * 1e-3, FEWEST)
     # the rate of wire of an index is as a power of its diameter, and so is its stress but for the strength, which falls
-    # with the 0.163rd power: with 1 mm as the unit of the wire
+    # with the 0.145th power: with 1 mm as the unit of the wire
     power, share = (3.0, BENDING_SHARE) if kind == "torsion" else (1.0, SHEAR_SHARE)
     falls = log2(tensile_strength(1e-3) / tensile_strength(2e-3))
     exponent = (3.0 if kind == "torsion" else 2.0) - falls

@@ -3,19 +3,27 @@
 The generic series is no maker's list: it is computed (`cfmkit.stock.springs.helical_spring_formulas`) from preferred
 numbers of wire diameters, spring indices and turns. It says what can be had; the spring itself is then bought by its
 dimensions.
-Its limits are assumed: extension and compression springs up to 40 % of the tensile strength of music wire in shear,
+Its limits are assumed: extension and compression springs up to 38 % of the tensile strength of music wire in shear,
 torsion springs up to 60 % in bending, both below what the wire holds under a load at rest, because the springs of a
 constant-force mechanism move. Extension springs are taken as wound without initial tension, with full loops at both
-ends.
+ends. Compression springs stand with closed ends on flat plates; those that would buckle before their largest deflection
+come with the rod that guides them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
+from cfmkit.stock.springs.helical_spring_formulas import (
+    Kind,
+    Seats,
+    Wound,
+    buckling_deflection,
+    tensile_strength,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,8 +40,9 @@ TORSION_TURNS = (3, 4, 5, 6, 8, 10, 12)
 COUNTS = (1, 2, 4)
 """The generic series: wires [mm] and numbers of turns are preferred numbers (ISO 3, R10)."""
 
-SHEAR_SHARE, BENDING_SHARE = 0.40, 0.60
-"""Shares of the tensile strength that the generic series allows: assumed."""
+SHEAR_SHARE, BENDING_SHARE = 0.38, 0.60
+"""Shares of the tensile strength that the generic series allows: assumed. At 38 % in the turns the loops of an
+extension spring bear up to 74 % in bending; Shigley, Table 10-7, allows 75 % there."""
 
 SOLID_RESERVE = 1.15
 """A compression spring of the series touches its turns at so many times its largest deflection: assumed."""
@@ -41,49 +50,29 @@ SOLID_RESERVE = 1.15
 
 @dataclass(frozen=True)
 class Offer:
-    """A spring on offer; SI, deflections are angles and loads couples where it is a torsion spring.
+    """A spring on offer; SI, deflections are angles and loads couples where it is a torsion spring."""
 
-    Attributes
-    ----------
-    name : str
-        By which it is bought.
-    kind : {"extension", "compression", "torsion"}
-        What it is loaded by.
-    rate : float
-        [N/m or N m/rad].
-    largest : float or None
-        Largest deflection from the relaxed state [m or rad]; None: not stated.
-    free_length, body_length : float or None
-        Relaxed length between the hooks, or over the ends; length of the coil [m].
-    initial_tension : float
-        Load at which it begins to open [N or N m].
-    outer_diameter : float or None
-        Of the coil [m].
-    wound : Wound or None
-        Its wire, coil and turns, where they are known.
-    counts : tuple of int
-        Numbers in parallel to try.
-    max_stress : float or None
-        Largest stress allowed in the wire [Pa]; None: not stated.
-    fatigue : FatigueLaw or None
-        Of the wire.
-    life : float or None
-        Cycles that its maker states.
-    """
+    name: str  # by which it is bought
+    kind: Kind  # what it is loaded by
+    rate: float  # [N/m or N m/rad]
+    largest: float | None = None  # largest deflection from the relaxed state [m or rad]; None if not stated
+    free_length: float | None = None  # relaxed, between the hooks or over the ends [m]
+    body_length: float | None = None  # of the coil [m]
+    initial_tension: float = 0.0  # load at which it begins to open [N or N m]
+    outer_diameter: float | None = None  # of the coil [m]
+    wound: Wound | None = None  # its wire, coil and turns, if they are known
+    counts: tuple[int, ...] = (1,)  # numbers in parallel to try
+    max_stress: float | None = None  # largest stress allowed in the wire [Pa]; None if not stated
+    fatigue: FatigueLaw | None = None  # of the wire
+    life: float | None = None  # cycles that its maker states
+    seats: Seats = "fixed-fixed"  # how the ends of a compression spring are held
+    guide_rod: float | None = None  # diameter of the rod in a compression spring, which keeps it from buckling [m]
+    guide_tube: float | None = None  # or of the tube around it [m]
 
-    name: str
-    kind: Kind
-    rate: float
-    largest: float | None = None
-    free_length: float | None = None
-    body_length: float | None = None
-    initial_tension: float = 0.0
-    outer_diameter: float | None = None
-    wound: Wound | None = None
-    counts: tuple[int, ...] = (1,)
-    max_stress: float | None = None
-    fatigue: FatigueLaw | None = None
-    life: float | None = None
+    @property
+    def unguided(self) -> float:
+        """Deflection up to which it does not buckle without a guide [m or rad]; infinite if it never does."""
+        return unguided_deflection(self.kind, self.free_length, self.wound, self.outer_diameter, self.seats)
 
     def stress(self, deflection: float) -> float | None:
         """Return the stress in the wire at a deflection [Pa]; None where the wire is not known."""
@@ -111,24 +100,45 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
 def _generic(wound: Wound) -> Offer:
     share = BENDING_SHARE if wound.kind == "torsion" else SHEAR_SHARE
     largest = wound.deflection_at(share * tensile_strength(wound.wire))
-    lengths = {
+    free_length = {
         "extension": wound.body_length + 2.0 * (wound.coil - wound.wire),
         "compression": wound.body_length + SOLID_RESERVE * largest,
         "torsion": wound.body_length,
-    }
+    }[wound.kind]
     name = f"generic-{wound.kind}-d{wound.wire * 1e3:g}-D{wound.coil * 1e3:g}-n{wound.turns:g}"
-    return Offer(
+    offer = Offer(
         name,
         wound.kind,
         wound.rate,
         largest,
-        lengths[wound.kind],
+        free_length,
         wound.body_length,
-        0.0,
-        wound.outer_diameter,
-        wound,
-        COUNTS,
+        outer_diameter=wound.outer_diameter,
+        wound=wound,
+        counts=COUNTS,
     )
+    # a rod in the spring is part of the offer where the whole of its deflection needs one
+    return offer if offer.unguided >= largest else replace(offer, guide_rod=guide_rod_for(wound))
+
+
+def guide_rod_for(wound: Wound) -> float:
+    """Return the diameter of a rod that guides a compression spring, in whole hundredths of a mm [m]."""
+    return math.floor(1e5 * wound.fitting_rod * (1 + 1e-9)) / 1e5
+
+
+def unguided_deflection(
+    kind: Kind, free_length: float | None, wound: Wound | None, outer_diameter: float | None, seats: Seats
+) -> float:
+    """Return the deflection [m] up to which a spring does not buckle; infinite if never, or if that is not known.
+
+    A compression spring whose wire is not known is judged as one of music wire with its outer diameter for the mean
+    one: it buckles no later than that.
+    """
+    if kind != "compression" or free_length is None:
+        return math.inf
+    if wound is not None:
+        return wound.buckling_deflection(free_length, seats)
+    return math.inf if outer_diameter is None else buckling_deflection(free_length, outer_diameter, seats)
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
 
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, reason_of
 from cfmkit.specs.data_file_paths import DataSource
-from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
+from cfmkit.specs.spec import AS_MADE, Model, refuse
+from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
+from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.material_and_part_spec import Fatigue
-from cfmkit.stock.springs.helical_spring_formulas import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
+from cfmkit.stock.springs.helical_spring_formulas import Seats, Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
+from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireName, WireOutOfRange
+from cfmkit.tables.lab_columns import split_header
+from cfmkit.tables.lab_file import decoded, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,9 +32,25 @@ AGREE = 0.1
 """A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
 
 
-class WireLimits(Model):
-    """What is known of the strength of a spring's wire; nothing of it is assumed."""
+TIGHTEST = 3.0
+"""Largest initial tension over the upper end of what is easily wound: springs that are wound on a bench have more, but
+none has more than this."""
 
+MIDDLE_OF_WIRE = 0.5
+"""Wire diameters by which a stated outer diameter may differ from that of coil and wire: half of what tells it from the
+mean diameter."""
+
+
+class WireLimits(Model):
+    """Wire of a spring: what it is, and what is known of its strength; nothing of the latter is assumed."""
+
+    material: WireName = Field(MUSIC_WIRE.name, description="class of the wire, which has its moduli and diameters")
+    shear_modulus: Annotated[Stress, Positive] | None = Field(
+        None, description="of the wire; default: that of 'material'"
+    )
+    youngs_modulus: Annotated[Stress, Positive] | None = Field(
+        None, description="of a torsion spring's wire; default: that of 'material'"
+    )
     max_stress: Annotated[Stress, Positive] | None = Field(
         None,
         description="allowable stress in the wire, Wahl's curvature factor included; needs wire, coil and turns",
@@ -38,15 +60,72 @@ class WireLimits(Model):
         description="S-N points or Basquin's line of the wire, in terms of that stress, for the life; needs the same",
     )
 
+    @model_validator(mode="after")
+    def _moduli_are_known(self) -> Self:
+        for key in ("shear_modulus", "youngs_modulus"):
+            if getattr(self, key) is None:
+                # past the frozen model, and not counted as set: another material then has others
+                object.__setattr__(self, key, getattr(WIRES[self.material], key))
+        return self
+
+    def wound_of(self, kind: Kind, wire: float, coil: float, turns: float) -> Wound:
+        """Return a spring of this wire."""
+        return Wound(kind, wire, coil, turns, self.shear_modulus or 0.0, self.youngs_modulus or 0.0, self.material)
+
+    def check_wire(self, wire: float | None, coil: float | None) -> None:
+        """Raise `ValueError` for a coil that does not wind, or a wire thinner or thicker than its class is drawn.
+
+        A wire of own moduli is of no class unless that is stated.
+        """
+        if wire and coil and coil < 2.0 * wire:
+            raise ValueError("'coil' is the mean diameter: at least twice the wire's")
+        own = self.model_fields_set & {"shear_modulus", "youngs_modulus"}
+        if wire is None or (own and "material" not in self.model_fields_set):
+            return
+        try:
+            WIRES[self.material].check_diameter(wire)
+        except WireOutOfRange as error:
+            other = ", ".join(one.name for one in WIRES.values() if one.thinnest <= wire <= one.thickest < float("inf"))
+            others = f"'material' {other}, or " if other else ""
+            raise ValueError(f"{error}; state {others}the wire's own moduli") from None
+
+
+class SpringSupport(Model):
+    """How a compression spring is kept from buckling."""
+
+    seats: Seats = Field(
+        "fixed-fixed",
+        description="how the ends of a compression spring are held: fixed is flat on a plate, against buckling",
+    )
+    guide_rod: Annotated[Length, Positive] | None = Field(
+        None, description="diameter of the rod in a compression spring: guided, it does not buckle"
+    )
+    guide_tube: Annotated[Length, Positive] | None = Field(None, description="or inner diameter of the tube around it")
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether a rod or a tube keeps the spring from buckling."""
+        return self.guide_rod is not None or self.guide_tube is not None
+
+    def check_guide(self, kind: Kind, wound: Wound | None, outer: float | None) -> None:
+        """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
+        own = ["seats"] if self.seats != "fixed-fixed" else []
+        own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
+        if own and kind != "compression":
+            raise ValueError(f"{own[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
+        inside = wound.inner_diameter if wound is not None else outer
+        if self.guide_rod is not None and inside is not None and self.guide_rod >= inside:
+            inner = format_short(inside, "length")
+            raise ValueError(f"'guide_rod' must be thinner than the inside of the spring, which is below {inner}")
+        around = wound.outer_diameter if outer is None and wound is not None else outer
+        if self.guide_tube is not None and around is not None and self.guide_tube <= around:
+            reported = format_short(around, "length")
+            raise ValueError(f"'guide_tube' must be wider than the spring, which is {reported} outside")
+
 
 Life = Annotated[
     float, Field(gt=0, description="life in cycles up to the largest deflection, as stated by the manufacturer")
 ]
-
-
-def _is_a_coil(wire: float | None, coil: float | None) -> None:
-    if wire and coil and coil < 2.0 * wire:
-        raise ValueError("'coil' is the mean diameter: at least twice the wire's")
 
 
 class SpringWire(WireLimits):
@@ -55,46 +134,71 @@ class SpringWire(WireLimits):
     wire: Annotated[Length, Positive] = Field(description="diameter of the wire")
     coil: Annotated[Length, Positive] = Field(description="mean diameter of the coil")
     turns: Annotated[Ratio, Positive] = Field(description="active turns")
-    shear_modulus: Annotated[Stress, Positive] = Field(SHEAR_MODULUS, description="of the wire; default: music wire")
-    youngs_modulus: Annotated[Stress, Positive] = Field(
-        YOUNGS_MODULUS, description="of a torsion spring's wire; default: music wire"
-    )
 
     @model_validator(mode="after")
     def _winds_around(self) -> Self:
-        _is_a_coil(self.wire, self.coil)
+        self.check_wire(self.wire, self.coil)
         return self
 
     def wound(self, kind: Kind) -> Wound:
         """Return the wire, loaded as a kind of spring."""
-        return Wound(kind, self.wire, self.coil, self.turns, self.shear_modulus, self.youngs_modulus)
+        return self.wound_of(kind, self.wire, self.coil, self.turns)
 
     def check_rate(self, kind: Kind, stated: float | None) -> None:
         """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
         if stated is not None and abs(stated / self.wound(kind).rate - 1.0) > AGREE:
-            raise ValueError(_disagree(self.wound(kind).rate / stated))
+            raise ValueError(_disagree(self.wound(kind), stated))
 
 
-def _disagree(times: float) -> str:
+def _disagree(wound: Wound, stated: float) -> str:
+    """Return what is wrong with a rate that is not that of wire, coil and turns."""
+    alike = [
+        one.name
+        for one in WIRES.values()
+        if abs(stated / replace(wound, shear_modulus=one.shear_modulus, youngs_modulus=one.youngs_modulus).rate - 1.0)
+        <= AGREE
+    ]
+    other = f" (that of {', '.join(alike)} agrees)" if alike else ""
     return (
-        f"wire, coil and turns give {times:.3g} times the rate that is stated: leave one of them out, or give the "
-        "wire's modulus"
+        f"wire, coil and turns give {wound.rate / stated:.3g} times the rate that is stated: leave one of them out, or "
+        f"give the wire's 'material'{other} or modulus"
     )
 
 
-def settle_rate(springs: Any, kind: Kind) -> None:
-    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated."""
+def is_made(info: ValidationInfo) -> bool:
+    """Return True if the values are those of one manufactured part."""
+    return bool(info.context) and bool(info.context.get(AS_MADE))  # type: ignore[union-attr]
+
+
+def check_initial_tension(wound: Wound | None, tension: float) -> None:
+    """Raise `ValueError` for an initial tension [N] that cannot be wound into a spring of this wire."""
+    if wound is None or not tension:
+        return
+    low, high = (format_short(one, "force") for one in wound.usual_initial_tension)
+    if tension > TIGHTEST * wound.usual_initial_tension[1]:
+        stated = format_short(tension, "force")
+        raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
+
+
+def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:
+    """Check the `stiffness` of springs against their wire `wound`, or compute it where none is stated.
+
+    Their initial tension must be one that such a wire is wound with. The rate of a manufactured spring is not checked:
+    its tolerance comes on top of what stated values differ by.
+    """
+    if springs.wound is not None:
+        check_initial_tension(springs.wound.wound(kind), springs.initial_tension)
     if springs.stiffness is None:
         if springs.wound is None:
             refuse(type(springs).__name__, {("stiffness",): "missing: give it, or 'wound' from which it follows"})
         # past the frozen model, and not counted as set: another wire then has another rate
         object.__setattr__(springs, "stiffness", springs.wound.wound(kind).rate)
-    elif springs.wound is not None:
+    elif springs.wound is not None and not is_made(info):
         for one in springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,):
             springs.wound.check_rate(kind, one)
 
 
-class CatalogueSpring(WireLimits):
+class CatalogueSpring(WireLimits, SpringSupport):
     """A spring that can be bought."""
 
     name: str = Field(min_length=1, description="part number")
@@ -108,10 +212,6 @@ class CatalogueSpring(WireLimits):
     wire: Annotated[Length, Positive] | None = Field(None, description="diameter of the wire")
     coil: Annotated[Length, Positive] | None = Field(None, description="mean diameter of the coil")
     turns: Annotated[Ratio, Positive] | None = Field(None, description="active turns")
-    shear_modulus: Annotated[Stress, Positive] = Field(SHEAR_MODULUS, description="of the wire; default: music wire")
-    youngs_modulus: Annotated[Stress, Positive] = Field(
-        YOUNGS_MODULUS, description="of a torsion spring's wire; default: music wire"
-    )
     free_length: Annotated[Length, Positive] | None = Field(
         None, description="relaxed, between the hooks; a spring longer than the space for it is not chosen"
     )
@@ -127,6 +227,9 @@ class CatalogueSpring(WireLimits):
     max_elongation: Annotated[Length, Positive] | None = Field(
         None, description="largest elongation (or compression) allowed"
     )
+    max_load: Annotated[Force, Positive] | None = Field(
+        None, description="or the largest force allowed, initial tension included"
+    )
     max_angle: Annotated[Angle, Positive] | None = Field(None, description="largest angle of a torsion spring")
     max_torque: Annotated[Torque, Positive] | None = Field(None, description="or its largest torque")
     life: Life | None = None
@@ -141,7 +244,7 @@ class CatalogueSpring(WireLimits):
         given = [self.wire, self.coil, self.turns]
         if any(item is not None for item in given) and None in given:
             raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
-        _is_a_coil(self.wire, self.coil)
+        self.check_wire(self.wire, self.coil)
         if (self.max_stress or self.fatigue) and self.wound is None:
             raise ValueError(
                 "'max_stress' and 'fatigue' refer to the stress in the wire: give 'wire', 'coil' and 'turns'"
@@ -149,14 +252,37 @@ class CatalogueSpring(WireLimits):
         if stated is None and self.wound is None:
             word = "rate" if self.kind == "torsion" else "stiffness"
             raise ValueError(f"needs {word!r}, or 'wire', 'coil' and 'turns', from which it follows")
+        self._check_sizes()
+        self.check_guide(self.kind, self.wound, self.outer_diameter)
         body = self.body_length or (self.wound.body_length if self.wound else None)
         if self.kind == "compression" and body and self.free_length is not None and self.free_length <= body:
             raise ValueError(
                 "'free_length' of a compression spring must be larger than its 'body_length' with the turns closed"
             )
         if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
-            raise ValueError(_disagree(self.wound.rate / stated))
+            raise ValueError(_disagree(self.wound, stated))
         return self
+
+    def _check_sizes(self) -> None:
+        """Raise `ValueError` for sizes that no coil of this wire has."""
+        wound = self.wound
+        if self.initial_tension and self.kind != "extension":
+            raise ValueError(f"'initial_tension' is of extension springs; this is of kind {self.kind!r}")
+        if wound is None:
+            return
+        check_initial_tension(wound, self.initial_tension)
+        outer = self.outer_diameter
+        if outer is not None and abs(outer - wound.outer_diameter) > MIDDLE_OF_WIRE * wound.wire:
+            reported = format_short(wound.outer_diameter, "length")
+            raise ValueError(f"'outer_diameter' must be 'coil', the mean diameter, and one wire: {reported}")
+        least = wound.turns * wound.wire
+        if self.body_length is not None and self.body_length < least * (1 - AGREE):
+            raise ValueError(f"'body_length' is less than the turns on each other: {format_short(least, 'length')}")
+        room = None if self.free_length is None else self.free_length - (self.body_length or least * (1 - AGREE))
+        if self.kind == "compression" and self.max_elongation and room and self.max_elongation > room * (1 + 1e-9):
+            raise ValueError(f"'max_elongation' is more than 'free_length' leaves: {format_short(room, 'length')}")
+        if self.kind == "extension" and self.free_length is not None and self.free_length < least * (1 - AGREE):
+            raise ValueError(f"'free_length' is less than the turns on each other: {format_short(least, 'length')}")
 
     @classmethod
     def of(cls, offer: Offer) -> Self:
@@ -174,7 +300,7 @@ class CatalogueSpring(WireLimits):
             "max_angle" if angular else "max_elongation": offer.largest,
             "life": offer.life,
             "counts": offer.counts,
-        }
+        } | support_of(offer)
         known = {key: value for key, value in about.items() if value is not None}
         return cls.model_validate((wire.model_dump(exclude_unset=True) if wire else {}) | known)
 
@@ -183,7 +309,7 @@ class CatalogueSpring(WireLimits):
         """Its wire, coil and turns; None where they are not stated."""
         if self.wire is None or self.coil is None or self.turns is None:
             return None
-        return Wound(self.kind, self.wire, self.coil, self.turns, self.shear_modulus, self.youngs_modulus)
+        return self.wound_of(self.kind, self.wire, self.coil, self.turns)
 
     @property
     def offer(self) -> Offer:
@@ -192,6 +318,8 @@ class CatalogueSpring(WireLimits):
         stated = self.rate if self.kind == "torsion" else self.stiffness
         rate = stated if stated is not None else wound.rate if wound is not None else 0.0
         ends = [self.max_elongation]
+        if self.max_load is not None:
+            ends.append(max(self.max_load - self.initial_tension, 0.0) / rate)
         if self.kind == "torsion":
             ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
         body = self.body_length or (wound.body_length if wound else None)
@@ -213,6 +341,9 @@ class CatalogueSpring(WireLimits):
             max_stress=self.max_stress,
             fatigue=None if self.fatigue is None else self.fatigue.law,
             life=self.life,
+            seats=self.seats,
+            guide_rod=self.guide_rod,
+            guide_tube=self.guide_tube,
         )
 
 
@@ -241,15 +372,26 @@ def wire_of(offer: Offer) -> SpringWire | None:
     wound = offer.wound
     if wound is None:
         return None
-    return SpringWire(
-        wire=wound.wire,
-        coil=wound.coil,
-        turns=wound.turns,
-        shear_modulus=wound.shear_modulus,
-        youngs_modulus=wound.youngs_modulus,
-        max_stress=offer.max_stress,
-        fatigue=None if offer.fatigue is None else Fatigue.of(offer.fatigue),
-    )
+    known = WIRES[wound.material]
+    about = {
+        "wire": wound.wire,
+        "coil": wound.coil,
+        "turns": wound.turns,
+        "material": None if wound.material == MUSIC_WIRE.name else wound.material,
+        "shear_modulus": None if wound.shear_modulus == known.shear_modulus else wound.shear_modulus,
+        "youngs_modulus": None if wound.youngs_modulus == known.youngs_modulus else wound.youngs_modulus,
+        "max_stress": offer.max_stress,
+        "fatigue": None if offer.fatigue is None else Fatigue.of(offer.fatigue),
+    }
+    return SpringWire.model_validate({key: value for key, value in about.items() if value is not None})
+
+
+def support_of(offer: Offer) -> dict[str, Any]:
+    """Return how a compression spring on offer is held, by key; what is not stated is None."""
+    if offer.kind != "compression":
+        return {}
+    seats = None if offer.seats == "fixed-fixed" else offer.seats
+    return {"seats": seats, "guide_rod": offer.guide_rod, "guide_tube": offer.guide_tube}
 
 
 Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_named)]
@@ -279,12 +421,14 @@ def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[
 
 
 _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*(?:\[(?P<unit>[^\[\]]+)\])?\s*")
+_COMMA = re.compile(r"([+-]?[0-9]*),([0-9]+)")
 
 
 def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
     """Yield the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
-    rows = csv.reader(_lines(source), strict=True)
+    lines = _lines(source)
+    separator = max(";\t|,", key=lines[0].count) if lines else ","
+    rows = csv.reader(lines, delimiter=separator, strict=True)
     try:
         heads = _heads(next(rows, []), source)
         found: list[CatalogueSpring] = []
@@ -294,9 +438,9 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
             if len(cells) != len(heads):
                 raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
             block = {
-                name: _cell(name, cell.strip(), unit)
-                for (name, unit), cell in zip(heads, cells, strict=True)
-                if cell.strip()
+                head[0]: _cell(head[0], cell.strip(), head[1], separator)
+                for head, cell in zip(heads, cells, strict=True)
+                if head and cell.strip()
             }
             try:
                 found.append(CatalogueSpring.model_validate(block))
@@ -316,37 +460,38 @@ def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
 
 
 def _lines(source: DataSource) -> list[str]:
-    """Return the lines of a file."""
+    """Return the lines of a file, without the empty ones before the header."""
     try:
-        text = source.path.read_bytes().decode("utf-8-sig")
+        text, _ = decoded(source.path.read_bytes(), str(source))
     except OSError as error:
-        raise DataError(f"{source}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except UnicodeDecodeError as error:
-        raise DataError(f"{source}: byte {error.start + 1} is not UTF-8") from None
-    return text.splitlines(keepends=True)
+        raise DataError(f"{source}: cannot be read: {reason_of(error)}") from None
+    return "\n".join(lines_of(text)).lstrip("\n ;,|\t\ufeff").splitlines(keepends=True)
 
 
-def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None]]:
-    """Return name and unit of each column."""
+def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None] | None]:
+    """Return name and unit of each column; None for a remark, such as a price, which is not read."""
     allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
-    found: list[tuple[str, str | None]] = []
+    found: list[tuple[str, str | None] | None] = []
     for cell in cells:
-        head = _HEADER.fullmatch(cell)
-        name = head["name"] if head else cell.strip()
-        if name not in allowed:
-            hint = "; cells are separated by commas" if ";" in name else ""
+        title, unit = split_header(cell)
+        name = title.strip().lower().replace(" ", "_")
+        if name in [head[0] for head in found if head]:
+            raise DataError(f"{source}:1: the column {name!r} appears twice")
+        near = get_close_matches(name, allowed, n=1, cutoff=0.75)
+        if name not in allowed and (near or (unit and is_unit(unit)) or not found or name == "fatigue"):
+            hint = f"; did you mean {near[0]!r}?" if near else ""
             listed = ", ".join(allowed)
             raise DataError(f"{source}:1: {name!r} is not a column of a list of springs{hint}; columns are {listed}")
-        if name in dict(found):
-            raise DataError(f"{source}:1: the column {name!r} appears twice")
-        found.append((name, head["unit"] if head else None))
+        found.append((name, unit) if name in allowed else None)
     return found
 
 
-def _cell(name: str, cell: str, unit: str | None) -> object:
+def _cell(name: str, cell: str, unit: str | None, separator: str) -> object:
     """Return a cell as a specification would say it."""
     if name == "counts":
         return tuple(int(one) if one.isdigit() else one for one in cell.split())
+    if separator != "," and name not in ("name", "kind"):
+        cell = _COMMA.sub(r"\1.\2", cell) if _COMMA.fullmatch(cell.split(" ")[0]) else cell
     if name in ("turns", "life") and _NUMBER.fullmatch(cell):
         return float(cell)
     return cell if unit is None else f"{cell} {unit}"

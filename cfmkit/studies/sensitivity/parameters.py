@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
-from cfmkit.specs.units import read_number, read_quantity
+from cfmkit.specs.units import meant_as_percent, read_number, read_quantity
 from cfmkit.studies.sensitivity.distributions import Incompatible, ParameterSpread, correlation_matrix
 from cfmkit.studies.variable_paths import CannotVary, Leaf, leaf
 
@@ -197,11 +197,17 @@ def _tolerance(found: Leaf, stated: Tolerance, nominal: float) -> ParameterSprea
 def _width(found: Leaf, key: str, text: str, nominal: float) -> float:
     """Return the size of a tolerance [SI]; a percentage is of the nominal value."""
     if text.endswith("%"):
-        width = _percent(key, text) * abs(nominal)
+        share = _percent(key, text)
+        if share > 1:
+            raise CannotVary(f"{key}: {text} is more than the value itself: at most 100 %, or give it in its unit")
+        width = share * abs(nominal)
         if not nominal:
             raise CannotVary(f"{key}: {text} of zero is zero; give it in the unit of the value")
     else:
         width = _read(found, text, key)
+        share = found.quantity is not None and found.quantity.dimensions == ("ratio",) and abs(nominal) <= 1
+        if share and (meant := meant_as_percent(text)):
+            raise CannotVary(f"{key}: {text} is more than the value itself; did you mean {meant}?")
     if not width > 0:
         raise CannotVary(f"{key}: {text} is not allowed: must be > 0")
     return width

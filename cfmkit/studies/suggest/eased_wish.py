@@ -112,7 +112,7 @@ def _met(wish: Wish, name: str, eased_by: tuple[Easing, float], seed: int, clock
             for candidate in _offered(asked, name, seed)[:TRIED]:
                 if clock.late():
                     return None
-                if made(ProposalJob(name, candidate, asked, seed, clock.deadline)).good:
+                if made(ProposalJob(name, candidate, asked, seed, clock.deadline)).passes:
                     return reported
     return None
 

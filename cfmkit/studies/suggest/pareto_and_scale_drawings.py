@@ -10,6 +10,7 @@ from cfmkit.families import family
 from cfmkit.families.base import function_named
 from cfmkit.families.run_control import Run
 from cfmkit.plots.style import BAND, GREY, INK, LINES, NORMAL, SMALL, axes_mm, new_figure, styled
+from cfmkit.studies.suggest.proposal_making_and_judging import by_own_model
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,8 +35,8 @@ LETTER = 1.4
 
 
 def named(number: int, proposal: Proposal) -> str:
-    """Return what a proposal is called in tables and pictures."""
-    return f"{number} {proposal.family}, {proposal.variant}"
+    """Return what a proposal is called in pictures, and whether something of it was not judged."""
+    return f"{number} {proposal.family}, {proposal.variant}" + (" (not judged in full)" if proposal.open else "")
 
 
 @styled
@@ -136,7 +137,7 @@ def _scale_reported(wish: Wish) -> str:
 def _drawn(proposal: Proposal) -> Any:
     """Return what draws a proposal, and its own room."""
     record = family(proposal.family)
-    result = record.analyze(proposal.spec, Run())
+    result = record.analyze(by_own_model(proposal), Run())
     return import_module(str(record.draw)).moving(result), function_named(str(record.room))(result)
 
 

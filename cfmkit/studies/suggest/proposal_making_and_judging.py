@@ -1,4 +1,9 @@
-"""From a candidate to a proposal: designed, written down, read again, analysed with its exact model, and judged."""
+"""From a candidate to a proposal: designed, written down, read again, analysed and judged, last by the finest model.
+
+A candidate is first judged by the model that its family designs with. What passes is corrected by the finest model of
+the family (networks of beams, leaves and strips: the part as drawn, as a planar solid) and judged again by that model,
+on all requirements. Until then it was not judged, whatever its beams say.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +16,15 @@ import numpy as np
 from cfmkit.designing.run_many_starts import NEVER, Clock
 from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.families.base import function_named
+from cfmkit.families.base import ENVELOPE, function_named, sized
 from cfmkit.families.run_control import Run
+from cfmkit.families.stiffening_of_wide_beams import stiffening
 from cfmkit.metrics import check, evaluate, values_of_family
 from cfmkit.results import Status
-from cfmkit.specs.units import format_short
 from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.stock.processes import PROCESSES
+from cfmkit.studies.suggest.misses_in_words import largest_force, outside, raised_out, too_short
+from cfmkit.studies.suggest.requirements_of_wish import LIVES, demanded, unjudged, windows_of
 from cfmkit.studies.suggest.yield_of_proposal import (
     GoodParts,
     MovedForYield,
@@ -39,24 +47,22 @@ LONGEST = 15.0
 OUT_OF_TIME = "the time budget ended before it was designed and evaluated"
 ENDED_EARLY = f"its design was not finished after {LONGEST:g} s"
 
-LIVES = ("fatigue_life", "spring_life")
-"""Metrics that say how many cycles the material, and bought springs, last."""
-
 TRIES = 3
 """How often more is requested than what drawn parts did not have."""
 
 MOST_ASKED = 0.9975
 """For a larger share the drawn parts of the search are too few."""
 
-SLACK = 1e-9
-"""On lengths that are compared: what writing a number down does to its last digit."""
+CORRECTIONS = 2
+"""How often a part is corrected by its finest model: what is still missed then is missed."""
 
 
 @dataclass(frozen=True)
 class ProposalJob:
     """A candidate of a family that is to be made and judged against a wish before a deadline, in `time.time` [s].
 
-    `near`: what came of it, to be designed again with margins for the yield that is all it misses.
+    `near`: what came of it, to be designed again with margins for the yield that is all it misses, or, where a finer
+    model is `pending`, to be corrected and judged by that one.
     """
 
     family: str
@@ -83,12 +89,24 @@ class Proposal:
         Why nothing came of it.
     numbers : mapping of str to float or None
         In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
-        ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished),
-        ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
+        ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished), ``stiffening``
+        (by what share wide beams raise the mean that a planar solid has).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
     movable : bool
         Whether all that it misses is the yield, and a design with margins might have it.
+    unjudged : tuple of str
+        What is wished and could not be judged, each with the reason.
+    model : str
+        The model that judged it.
+    pending : str
+        The finest model of its family that can run it and did not yet; empty if it did.
+    warnings : tuple of str
+        Names of what its analysis warns of, with the number that counts.
+    seconds : float
+        That its analysis took.
+    own : str
+        The model that its family designs with, where another one judged it: its yield is by that one.
     """
 
     family: str
@@ -99,11 +117,33 @@ class Proposal:
     numbers: Mapping[str, float | None] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     movable: bool = False
+    unjudged: tuple[str, ...] = ()
+    model: str = ""
+    pending: str = ""
+    warnings: tuple[str, ...] = ()
+    seconds: float = 0.0
+    own: str = ""
+
+    @property
+    def passes(self) -> bool:
+        """Whether it misses nothing that was judged."""
+        return bool(self.text) and not self.missed
+
+    @property
+    def settled(self) -> bool:
+        """Whether it misses nothing, and the finest model says so."""
+        return self.passes and not self.pending
 
     @property
     def good(self) -> bool:
-        """Whether it does all that is wished."""
-        return bool(self.text) and not self.missed
+        """Whether it does all that is wished, and all of it was judged by the finest model."""
+        return self.settled and not self.unjudged
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """What was not judged, each in a few words; empty if all was."""
+        not_run = (f"{self.model} model; {self.pending} not run",) if self.pending else ()
+        return (*not_run, *self.unjudged)
 
     @property
     def near(self) -> bool:
@@ -120,12 +160,14 @@ class Proposal:
         return {
             "family": self.family, "variant": self.variant, "text": self.text, "missed": list(self.missed),
             "message": self.message, "numbers": dict(self.numbers), "notes": list(self.notes), "movable": self.movable,
+            "unjudged": list(self.unjudged), "model": self.model, "pending": self.pending,
+            "warnings": list(self.warnings), "seconds": self.seconds, "own": self.own,
         }  # fmt: skip
 
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> Proposal:
         """Return what a record says."""
-        lists = {name: tuple(record[name]) for name in ("missed", "notes")}
+        lists = {name: tuple(record[name]) for name in ("missed", "notes", "unjudged", "warnings")}
         return cls(**{**record, **lists})
 
 
@@ -138,6 +180,8 @@ def made(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; what its design or model refuses is its message, a bug is raised."""
     candidate, clock = job.candidate, Clock(job.deadline)
     try:
+        if job.near is not None and job.near.pending and job.near.passes:
+            return _by_finest(job, job.near, clock)
         if job.near is not None:
             return _with_margins(job, job.near, clock)
         spec, reported = _designed(job, clock)
@@ -163,8 +207,49 @@ def _designed(job: ProposalJob, clock: Clock) -> tuple[Spec | None, str]:
     if clock.late():
         return None, OUT_OF_TIME
     if job.candidate.finish:
-        spec = function_named(job.candidate.finish)(spec, job.wish)
+        wish = replace(job.wish, reserve=job.candidate.reserve)
+        spec = function_named(job.candidate.finish)(spec, wish)
     return spec, ""
+
+
+def finest_of(name: str, spec: Spec) -> str:
+    """Return the finest model of a family that can run a specification; its own where there is no finer one."""
+    models = list(family(name).models)
+    own = spec.fidelity if spec.fidelity in models else models[0]
+    for finer in reversed(models[models.index(own) + 1 :]):
+        try:
+            spec.replace({FIDELITY: finer})
+        except CfmError:  # what that model needs is not there: other parts, a motion in time
+            continue
+        return finer
+    return own
+
+
+FIDELITY = "analysis.fidelity"
+
+
+def by_own_model(proposal: Proposal) -> Spec:
+    """Return a proposal's specification with the model of its design: faster, and enough for pictures."""
+    spec = proposal.spec
+    return spec if proposal.own in ("", proposal.model) else spec.replace({FIDELITY: proposal.own})
+
+
+def _by_finest(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
+    """Return a proposal corrected and judged by the finest model of its family; the last of those that miss least."""
+    spec, best, correct = near.spec, None, job.candidate.correct
+    for _ in range(CORRECTIONS if correct else 1):
+        if clock.late():
+            break
+        made = function_named(correct)(spec, job.wish) if correct else spec.replace({FIDELITY: near.pending})
+        if clock.late():
+            break
+        found = judged(job.family, near.variant, made, job.wish, job.seed, clock, near)
+        if best is None or (found.text and len(found.missed) <= len(best.missed)):
+            best = found
+        if found.passes or not found.text:
+            break
+        spec = by_own_model(found)
+    return Proposal(job.family, near.variant, message=OUT_OF_TIME) if best is None else best
 
 
 def _with_margins(job: ProposalJob, near: Proposal, clock: Clock) -> Proposal:
@@ -239,140 +324,105 @@ def _seconds(clock: Clock) -> float:
     return LONGEST if left is None else min(LONGEST, max(left, 0.1))
 
 
-def judged(name: str, variant: str, spec: Spec, wish: Wish, seed: int = 0, clock: Clock = NEVER) -> Proposal:
+def judged(
+    name: str,
+    variant: str,
+    spec: Spec,
+    wish: Wish,
+    seed: int = 0,
+    clock: Clock = NEVER,
+    near: Proposal | None = None,
+) -> Proposal:
     """Return a specification as a proposal: it is written with the wish as its requirements, read, analysed, judged.
 
     Where a share of good parts is wished, the file says in its block `sensitivity` how they are made, and parts are
     drawn of what misses nothing else.
+
+    Parameters
+    ----------
+    name, variant : str
+        The family, and which of its mechanisms.
+    spec : Spec
+        With the model that is to judge it.
+    wish : Wish
+    seed : int
+        Of random parts.
+    clock : Clock
+        Late, no more parts are drawn.
+    near : Proposal, optional
+        What its family's own model made of it, where another one is to judge it. Its share of good parts is kept: a
+        solid takes too long to be solved a hundred times.
     """
     record = family(name)
     called = variant.replace(" ", "-").replace(",", "")
-    # read back from its text: what is judged is what stands in the file, whose requirements change no analysis
-    plain = spec_of(name, dump(spec.replace({"requirements": (), "design": None, "name": called})))
-    result = record.analyze(plain, Run())
+    # read back from its text: what is judged is what stands in the file
+    plain = spec_of(name, dump(made_as_wished(spec, wish).replace({"design": None, "name": called})))
+    begun = time.perf_counter()
+    result = record.analyze(spec_of(name, dump(plain.replace({"requirements": windows_of(plain, wish)}))), Run())
+    seconds = time.perf_counter() - begun
     if result.status is not Status.COMPLETE:
         return Proposal(name, variant, message=result.message)
-    wished = plain.replace({"requirements": tuple(demanded(wish, result, values_of_family(record.values)))})
+    space: Room | None = record.envelope(result)
+    result, values = sized(result, space), values_of_family(record.values)
+    wished = plain.replace({"requirements": demanded(wish, result, space, values)})
     text = dump(with_made_parts(wished, wish, seed))
-    space: Room | None = function_named(record.room)(result) if record.room else None
     written = spec_of(name, text)
-    outcomes = check(written.requirements, result, values_of_family(record.values))
-    missed = [one.sentence for one in outcomes if not one.ok]
-    missed += _outside(wish, space)
-    missed += _too_short(wish, result)
-    missed += _badly_adjusted(wish, result)
+    outcomes = check(written.part_requirements, result, values)
+    missed = [one.sentence for one in outcomes if not one.ok and one.metric not in ENVELOPE]
+    missed += outside(wish, space)
+    missed += too_short(wish, result)
+    pending = finest_of(name, written)
+    pending = "" if pending == model_of(name, written) else pending
     numbers, movable = numbers_of(result, space, wish), False
-    if wish.good_parts is not None and len(missed) <= 1:
+    warnings = [one.name for one in result.warnings]
+    if "wide_beam" in warnings and not missed:
+        coarser = written if near is None else written.replace({FIDELITY: near.model})
+        numbers["stiffening"] = raised = stiffening(coarser, record.analyze)
+        warnings = [f"wide_beam {100.0 * raised:+.2g} %" if one == "wide_beam" else one for one in warnings]
+        # what its finest model is still to correct may come down to the lower end of the band
+        missed += raised_out(wish, wish.low if pending else largest_force(wish, result), raised)
+    if near is not None:
+        numbers["yield"] = near.numbers.get("yield")
+        warnings += [f"yield by the {near.model} model"] if wish.good_parts is not None else []
+    elif wish.good_parts is not None and len(missed) <= 1:
         parts: GoodParts = good_parts(replace(result, spec=written), wish, clock, draw=not missed)
         if parts.late:
             return Proposal(name, variant, message=OUT_OF_TIME)
         movable = parts.movable and not missed
         missed += [parts.missed] if parts.missed else []
         numbers["yield"] = parts.share
-    return Proposal(name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable)
+    return Proposal(
+        name, variant, text, tuple(missed), "", numbers, tuple(_notes(space, result)), movable,
+        tuple(unjudged(wish, result)), model_of(name, written), pending, tuple(dict.fromkeys(warnings)),
+        seconds, near.model if near else "",
+    )  # fmt: skip
 
 
-def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]]:
-    """Yield the requirements that say what is wished of the curve of a result, over the window of its analysis."""
-    dimension = wish.kind
-    yield {"metric": f"{wish.kind}_ripple", "max": f"{100 * wish.ripple:.12g} %"}
-    low, high = (format_short(value, dimension, 12) for value in (wish.low, wish.high))
-    if wish.banded:
-        yield {"metric": f"{wish.kind}_min", "min": low}
-        yield {"metric": f"{wish.kind}_max", "max": high}
-    else:
-        yield {"metric": f"{wish.kind}_mean", "min": low, "max": high}
-    found = evaluate(result, None, None, values)
-    if (factor := found.get("safety_factor")) is not None and factor.value is not None:
-        yield {"metric": "safety_factor", "min": "1", "over": _pressed(wish, result)}
-    if wish.hysteresis is not None and "unload" in result.curve.branches:
-        lost = wish.hysteresis * wish.target * wish.travel
-        yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
-    for name in LIVES:
-        life = found.get(name)
-        if wish.cycles is not None and life is not None and life.value is not None:
-            yield {"metric": name, "min": f"{wish.cycles}"}
-    if wish.adjustable is not None and "force_change_max" in found:
-        most = max(abs(end - wish.target) for end in wish.adjustable)
-        yield {"metric": "force_change_max", "min": format_short(0.99 * most, "force", 12)}
+def model_of(name: str, spec: Spec) -> str:
+    """Return the model that a specification picks, or else the only one of its family."""
+    return spec.fidelity or next(iter(family(name).models))
 
 
-def _pressed(wish: Wish, result: Result) -> tuple[str, str]:
-    """Return over what a mechanism has to bear its stress: all it does; of made parts from half of the run-in on.
+def made_as_wished(spec: Spec, wish: Wish) -> Spec:
+    """Return a specification whose part says by which process it is made, if one is wished.
 
-    A made part begins and ends a little before or after the perfect one: a metric over all that this does has no value.
+    Its inside corners are as round as before, or as round as the process makes them: a smaller radius has more stress.
     """
-    window: Any = result.spec.at("analysis.window")
-    if wish.good_parts is None or window is None or wish.kind == "torque":
-        return "0 %", "100 %"
-    return format_short(0.5 * float(window[0]), "length", 12), format_short(float(window[1]), "length", 12)
-
-
-def _outside(wish: Wish, space: Room | None) -> Iterator[str]:
-    """Yield by which sides a mechanism does not stay in the room; one that turns may lie either way in the plane."""
-    if space is None:
-        yield "the room that it needs is not known"
-        return
-    sides = [space.across, space.along]
-    given = list(wish.room[:2])
-    if wish.kind == "torque":
-        sides, given = sorted(sides), sorted(given)
-    for name, need, have in zip(("across the travel", "along the travel"), sides, given, strict=True):
-        if need > have * (1.0 + SLACK):
-            needed, given_side = _apart(need, have)
-            yield f"needs {needed} {name}: {given_side} given"
-    if wish.depth is not None and space.depth is None:
-        yield f"its depth is not known: {space.assumed}"
-    elif wish.depth is not None and space.depth is not None and space.depth > wish.depth * (1.0 + SLACK):
-        needed, given_depth = _apart(space.depth, wish.depth)
-        yield f"needs a depth of {needed}: {given_depth} given"
-
-
-def _apart(one: float, other: float) -> tuple[str, str]:
-    """Return two lengths that differ with as many digits as it takes to see that they do.
-
-    Examples
-    --------
-    >>> _apart(0.012, 0.010), _apart(0.01000004, 0.010)
-    (('12 mm', '10 mm'), ('10.00004 mm', '10 mm'))
-    """
-    for digits in range(4, 17):
-        texts = format_short(one, "length", digits), format_short(other, "length", digits)
-        if texts[0] != texts[1]:
-            break
-    return texts
-
-
-def _too_short(wish: Wish, result: Result) -> Iterator[str]:
-    """Yield whether the window that was judged is shorter than the travel that is wished."""
-    window: Any = result.spec.at("analysis.window")
-    length = 0.0 if window is None else float(window[1]) - float(window[0])
-    if length < wish.travel * (1.0 - SLACK):
-        dimension = "length" if wish.kind == "force" else "angle"
-        reported = format_short(length, dimension), format_short(wish.travel, dimension)
-        yield f"is constant over {reported[0]}: {reported[1]} wished"
-
-
-def _badly_adjusted(wish: Wish, result: Result) -> Iterator[str]:
-    """Yield what is wrong with the curves at the ends of the adjustment."""
-    if wish.adjustable is None:
-        return
-    window: Any = result.spec.at("analysis.window")
-    means = []
-    for curve in result.curves:
-        inside = (curve.motion >= float(window[0])) & (curve.motion <= float(window[1]))
-        efforts = [curve.effort[inside & (curve.branch == name)] for name in curve.branches]
-        if not efforts or not all(len(effort) and np.isfinite(effort).all() for effort in efforts):
-            yield "has no force at one end of the adjustment"
-            return
-        means.append(float(np.mean([effort.mean() for effort in efforts])))
-        if (ripple := max(1.0 - float(effort.min() / effort.max()) for effort in efforts)) > wish.ripple:
-            at = format_short(means[-1], "force")
-            yield f"changes by {100 * ripple:.3g} % at {at}: {100 * wish.ripple:.3g} % wished"
-    low, high = wish.adjustable
-    if min(means) > low * (1.0 + 0.025) or max(means) < high * (1.0 - 0.025):
-        ends = [format_short(end, "force") for end in (min(means), max(means), low, high)]
-        yield f"is adjustable from {ends[0]} to {ends[1]}: {ends[2]} to {ends[3]} wished"
+    if wish.process is None:
+        return spec
+    radius = PROCESSES[wish.process].least_radius
+    fillet = getattr(spec.at("mechanism"), "fillet", 0.0)
+    changes: tuple[dict[str, Any], ...] = (
+        {"mechanism.part.process": wish.process, "mechanism.part.fillet": max(radius, fillet)},
+        {"mechanism.part.process": wish.process},
+        {"mechanism.plate.process": wish.process},
+    )
+    for one in changes:
+        try:
+            return spec.replace(one)
+        except CfmError:  # another kind of part
+            continue
+    return spec
 
 
 def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, float | None]:
@@ -385,7 +435,6 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         return max(values) if values else None
 
     lost = worst("hysteresis_area")
-    factor = found.get("safety_factor")
     means = [
         one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean" and one.value is not None
     ]
@@ -394,15 +443,21 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),
         "hysteresis": None if lost is None or not mean else lost / (mean * wish.travel),
-        "safety_factor": None if factor is None else factor.value,
+        "safety_factor": _least_factor(found),
         "across": None if space is None else space.across,
         "along": None if space is None else space.along,
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
         "life": _life(found),
         "yield": None,
-        "finer_deviation": None,
+        "stiffening": None,
     }
+
+
+def _least_factor(found: Mapping[str, Any]) -> float | None:
+    """Return the smallest safety factor: of the part that bends, or of links."""
+    known = [found[name].value for name in ("safety_factor", "link_safety_factor") if name in found]
+    return min((value for value in known if value is not None), default=None)
 
 
 def _life(found: Mapping[str, Any]) -> float | None:
@@ -415,7 +470,18 @@ def _life(found: Mapping[str, Any]) -> float | None:
 
 
 def _notes(space: Room | None, result: Result) -> Iterator[str]:
+    """Yield what a reader has to know: what was assumed, what rubs, what the analysis warns of."""
     if space is not None and space.assumed:
         yield space.assumed
+    mechanism = result.spec.at("mechanism")
+    rubs = [f"{name} {value:g}" for name in ("pins", "guide") if (value := _friction(mechanism, name))]
+    if rubs:
+        yield f"friction assumed: {', '.join(rubs)}"
+    elif getattr(mechanism, "pins", None) is not None:
+        yield "friction of pins and guide is not counted: wish for 'hysteresis' to have it judged"
     for finding in result.warnings:
         yield f"{finding.name}: {finding.message}"
+
+
+def _friction(mechanism: Any, name: str) -> float:
+    return float(getattr(getattr(mechanism, name, None), "friction", 0.0) or 0.0)

@@ -12,7 +12,7 @@ from cfmkit.families.wishes import Wish
 from cfmkit.specs.spec import Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.units import Angle, Ratio, Torque, format_short
 from cfmkit.stock.material_and_part_spec import MaterialField, MaterialSpec  # noqa: TC001 - read by pydantic
-from cfmkit.stock.processes import PROCESSES, ProcessName
+from cfmkit.stock.processes import PROCESSES, ProcessName, why_not_made
 
 PositiveTorque = Annotated[Torque, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
@@ -110,6 +110,22 @@ class WishBlock(Model):
             low, high = self.ends
             if not self.adjustable[0] <= high or not low <= self.adjustable[1]:
                 refuse("Wish", {("adjustable",): "the force wished is not in this range"})
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_made(self) -> Self:
+        if self.process is None:
+            return self
+        reasons = [why_not_made(self.process, one.name, one.modulus) for one in self._materials]
+        if reported := "; ".join(dict.fromkeys(filter(None, reasons))):
+            refuse("Wish", {("process",): reported})
+        least = PROCESSES[self.process].least_feature
+        for number, side in enumerate(self.room):
+            if side < least * (1.0 - 1e-9):
+                name = ("first side", "second side", "depth")[number]
+                sizes = format_short(side, "length"), format_short(least, "length")
+                reported = f"the {name}, {sizes[0]}, is below the thinnest wall of {self.process}, {sizes[1]}"
+                refuse("Wish", {("room", number): reported})
         return self
 
     @model_validator(mode="after")

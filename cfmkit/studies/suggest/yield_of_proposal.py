@@ -103,7 +103,7 @@ def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
     if not stated:
         return spec
     parameters: dict[str, Any] = {
-        path: {"normal": one.normal} if hasattr(one, "normal") else one for path, one in stated.items()
+        path: one if isinstance(one, tuple) else one.model_dump(exclude_none=True) for path, one in stated.items()
     }
     block = {
         "method": "tolerance", "parameters": parameters, "samples": PARTS, "seed": seed,

@@ -240,7 +240,7 @@ def multibody_history(
         spin=np.array([right.spin, left.spin]),
         brace=np.abs([right.roller_pin, left.roller_pin]),
         pin=np.abs([right.slider_pin, left.slider_pin]),
-        elongation=np.abs(center[0] + center[1].conj()) - machine.rest_length,
+        elongation=np.abs(center[0] + center[1].conj()) - machine.rest_length - machine.tension_stretch,
         center=center,
         on_corner=np.zeros(len(found.times), dtype=bool),
     )

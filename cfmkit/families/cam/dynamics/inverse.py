@@ -124,7 +124,7 @@ class MotionResponse:
     def elongation(self) -> FloatArray:
         """Elongation of the springs, (n,) [m]."""
         distance: FloatArray = np.abs(self.at.center[0] + self.at.center[1].conj())
-        return distance - self.machine.rest_length
+        return distance - self.machine.rest_length - self.machine.tension_stretch
 
     @cached_property
     def mass(self) -> FloatArray:
@@ -142,7 +142,7 @@ class MotionResponse:
         center = self.at.center.imag
         lifted = parts.roller_mass * center + parts.brace_mass * (center + position) / 2.0
         height = machine.slider_mass * position + lifted.sum(axis=0)
-        stretch = np.maximum(self.elongation, 0.0)
+        stretch = np.maximum(self.elongation + self.machine.tension_stretch, 0.0)
         potential = machine.gravity * height + machine.stiffness * stretch**2 / 2.0
         if machine.sideways:
             outward = (parts.roller_mass + 0.5 * parts.brace_mass) * self.at.center.real

@@ -63,6 +63,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
         slider_mass=masses.slider if masses else 0.0,
         stiffness=mechanism.springs.total,
         rest_length=2.0 * mechanism.springs_rest,
+        tension_stretch=mechanism.springs.tension_stretch,
         gravity=GRAVITY * along if spec.gravity else 0.0,
         friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
         sideways=GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,

@@ -61,13 +61,15 @@ class Machine:
     slider_mass : float
         [kg].
     stiffness, rest_length : float
-        Of all springs together, between the axes of the rollers [N/m, m].
+        Of all springs together, between the axes of the rollers [N/m, m]; at that distance they would pull no more.
     gravity : float
         Acceleration against the slider's travel up; 0 switches weight off [m/s^2].
     friction : float
         Rolling resistance over roller radius.
     sideways : float
         Acceleration across the slider's travel, to the right, with which weight acts [m/s^2].
+    tension_stretch : float
+        How much farther apart than `rest_length` the axes are when springs with initial tension begin to open [m].
     """
 
     right: Side
@@ -78,6 +80,7 @@ class Machine:
     gravity: float
     friction: float = 0.0
     sideways: float = 0.0
+    tension_stretch: float = 0.0
 
     @cached_property
     def constants(self) -> Constants:

@@ -67,7 +67,9 @@ class Profile(Model):
     rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
     roller_radius: PositiveLength | None = Field(None, description="radius of the roller that the profile is cut for")
     preload: NonNegativeLength | None = Field(
-        None, description="elongation of the springs at the start that the profile is cut for"
+        None,
+        description="elongation of the springs at the start that the profile is cut for, their initial tension "
+        "over their stiffness included",
     )
     offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
     file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")

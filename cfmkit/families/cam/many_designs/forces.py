@@ -43,6 +43,7 @@ class Designs:
     constant: FloatArray
     stroke: FloatArray
     target: FloatArray
+    strongest: FloatArray  # spring of each design [N/m]
 
     def __len__(self) -> int:
         """Return the number of designs."""

@@ -72,7 +72,7 @@ class CutWindows(ManyWindows):
 
     def __init__(self, sampled: SampledBranch, window: Places) -> None:
         """Cut the window of each cam out."""
-        self.count = len(sampled.values)
+        self.count, self.error = len(sampled.values), 0.0
         ways = _ways(sampled, window)
         _, first, which = np.unique(ways, axis=0, return_index=True, return_inverse=True)
         if len(first) == 1 and ways[0, 1]:

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families.cam.geometry.slope_law import brace_tangent
 from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval, usable_stroke
-from cfmkit.metrics.spread import metric_of, metrics_of
+from cfmkit.metrics.spread import STATIC_BALANCE, metric_of, metrics_of, static_balance
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -40,6 +40,8 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     if measure.name in METRICS:
         target = cams.designs.target
         return {one: metric_of(measure.name, cams.inside(one, measure.window), target) for one in BRANCHES}
+    if measure.name == STATIC_BALANCE:
+        return {branch: _static_balance(cams, branch, measure.window) for branch in BRANCHES}
     if measure.name == RMS:
         return {branch: _rms(cams, branch, measure.window) for branch in BRANCHES}
     both = RANGES[measure.name](_everywhere(cams, measure.window))
@@ -56,6 +58,13 @@ def _rms(cams: Slab, branch: str, window: Window) -> FloatArray:
     # Where a sample has no force, nothing inside the window is measured.
     known = np.isfinite(cams.inside(branch, window).mean)
     return np.where(known, rms_to_target(many, cams.designs.target), np.nan)
+
+
+def _static_balance(cams: Slab, branch: str, window: Window) -> FloatArray:
+    """Return the largest force over that of the strongest spring: without weights its share of all of them."""
+    inside = cams.inside(branch, window)
+    largest = np.maximum(np.abs(inside.extremes[0]), np.abs(inside.extremes[1]))
+    return np.asarray(static_balance(inside.spread, largest * cams.designs.strongest / cams.designs.stiffness))
 
 
 def _everywhere(cams: Slab, window: Window) -> ManyBranches:
@@ -166,7 +175,7 @@ SCALARS: dict[str, Callable[[Slab], FloatArray]] = {
 ABSENT = frozenset(DEFINITIONS) - frozenset(SCALARS)
 """Values of motions, contacts, measured and tolerated cams: a cam without these has none."""
 
-WINDOWED = frozenset((*METRICS, *CYCLES, *RANGES, RMS))
+WINDOWED = frozenset((*METRICS, *CYCLES, *RANGES, RMS, STATIC_BALANCE))
 """What is measured over a window, or against its ends."""
 
 KNOWN = WINDOWED | frozenset(DEFINITIONS)

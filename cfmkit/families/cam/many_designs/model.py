@@ -32,6 +32,7 @@ from cfmkit.families.cam.many_designs.same_cam_other_parts import Around, BuiltS
 from cfmkit.families.cam.many_designs.undercut_forces import CornerSlab, shapes
 from cfmkit.families.cam.mechanism_from_spec import assemble, weights
 from cfmkit.families.no_mechanism import CannotBuild
+from cfmkit.metrics.spread import STATIC_BALANCE
 from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:
@@ -76,6 +77,8 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
         return None
     names = {measure.name for measure in block.measures}
     settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
+    if spec.gravity and STATIC_BALANCE in names:
+        return None  # with weights the force is not that of the springs
     if _one_cam(spec, block) and names <= (KNOWN_OF_BUILT if spec.mechanism.contact else KNOWN):
         values = _values_around(spec, block)
         built = _designs_around(spec, values)
@@ -140,7 +143,7 @@ def _symmetric_closed(spec: CamSpec) -> bool:
         and not (mechanism.stops or mechanism.envelope)
         and not (mechanism.pins or mechanism.bearings or mechanism.guide)
         and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
-        and not (mechanism.preload or profile.preload)
+        and not (mechanism.effective_preload or profile.preload)
         and profile.friction == 0
         and profile.slope_factor == 1
         and profile.offset == 0
@@ -181,7 +184,7 @@ def _designs(spec: CamSpec, block: Block) -> Designs:
     full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in base.items()} | given
     # Whole numbers above 1000 are no valid count; such a design is not sound.
     count = np.where((full["count"] >= 1) & (full["count"] <= 1000), full["count"], -1.0)
-    full["stiffness"] = full["stiffness"] * count
+    full["strongest"], full["stiffness"] = full["stiffness"], full["stiffness"] * count
     del full["count"]
     cut_for = ((profile.brace_length, "brace"), (profile.rest_half_width, "x0"), (profile.roller_radius, "radius"))
     for fixed, name in cut_for:
@@ -218,6 +221,8 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
         return False
     if profile.preload is None and mechanism.preload:  # the cam follows what its springs have at the start
         return False
+    if mechanism.springs.initial_tension:  # how much elongation that is depends on the stiffness
+        return False
     if spec.fidelity != "quasi-static" or analysis.manufacturing or analysis.path_method != "quadrature":
         return False
     listed = isinstance(mechanism.springs.each, tuple)
@@ -250,11 +255,12 @@ def _values_around(spec: CamSpec, block: Block) -> dict[str, FloatArray]:
     given = {_AROUND[path]: np.asarray(found, float) for path, found in block.values.items() if path in _AROUND}
     full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in values.items()} | given
     springs = mechanism.springs.each
-    total = np.zeros(block.size)
+    total, strongest = np.zeros(block.size), np.zeros(block.size)
     for index, stated in enumerate(springs if isinstance(springs, tuple) else (springs,)):
         one = block.values.get(f"mechanism.springs.stiffness.{index}", given.get("stiffness", stated))
         total = total + np.where(np.asarray(one, float) > 0, one, np.nan)
-    count = full.pop("count")
+        strongest = np.maximum(strongest, np.asarray(one, float))
+    full["strongest"], count = strongest, full.pop("count")
     full["stiffness"] = total * np.where((count >= 1) & (count <= 1000) & (count == np.rint(count)), count, np.nan)
     return full
 
@@ -262,7 +268,7 @@ def _values_around(spec: CamSpec, block: Block) -> dict[str, FloatArray]:
 def _designs_around(spec: CamSpec, values: dict[str, FloatArray]) -> Designs:
     """Return the parts around a cam; `x0` is where their springs are at rest."""
     profile, size = spec.mechanism.profile, len(values["brace"])
-    names = ("brace", "x0", "radius", "friction", "stiffness")
+    names = ("brace", "x0", "radius", "friction", "stiffness", "strongest")
     values = values | {"x0": _at_rest(spec, values["x0"])}
     constant = np.full(size, profile.force_constant)
     if spec.design is not None:

@@ -12,7 +12,6 @@ import numpy as np
 from cfmkit.families.fem_results import FilletRow, with_nominal
 from cfmkit.families.nominal_stress_beside_fillets import TOLERANCE, nominal_stresses, with_steps
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import FLEXURES
-from cfmkit.stock.material_and_part_spec import PaddedPart
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
@@ -31,7 +30,7 @@ def fillets(
 
     pads = {place.name: place.shapes for place in solved.part.places}
     rows = []
-    for one in stressed_fillets(solved, (spec.mechanism.part or PaddedPart()).fillet):
+    for one in stressed_fillets(solved, spec.mechanism.fillet):
         nearest = FLEXURES[int(np.hypot(*(chain.pins - one.arc.middle).T).argmin())]
         names = [] if spec.piece == "beam" else [nearest]
         names += one.arc.touched(pads) or ([] if names else ["strip"])

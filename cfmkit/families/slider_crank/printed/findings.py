@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
-from cfmkit.families.findings import mm, mpa, newton, too_soft
+from cfmkit.families.findings import at_most, mm, mpa, newton, too_soft
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
@@ -71,7 +71,7 @@ def _strength(solution: Solution) -> Iterator[Finding]:
         f"beyond {mm(place)} of travel the stress exceeds the allowable {mpa(limit)}; it reaches "
         f"{mpa(float(solution.stress[worst]))} at {mm(float(solution.travel[worst]))}, "
         f"{mm(float(solution.place[worst]))} along the part from its clamped end",
-        f"analysis.travel=[{mm(float(solution.travel[0]))}, {place * 1e3:.4g} mm]",
+        f"analysis.travel=[{mm(float(solution.travel[0]))}, {at_most(place)}]",
     )
 
 

@@ -119,6 +119,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
+        effort_error=solution.effort_error,
         closed=solution.course
         or between_points(pressed.path, float(solution.legs), allowed=solution.material.allowable_stress),
         state=solution,

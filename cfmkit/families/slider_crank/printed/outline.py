@@ -14,7 +14,6 @@ import numpy as np
 
 from cfmkit.export.arc_outlines import check_simple
 from cfmkit.export.contours import (
-    TOLERANCE,
     Contour,
     Curve2D,
     Drawing,
@@ -179,19 +178,23 @@ def _ends(spec: SliderCrankSpec) -> tuple[float, float, float]:
 
 def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     """Return a drawing with its inside corners rounded, its fixing holes, and the frame around it."""
-    from cfmkit.export.union import merged
+    from cfmkit.export.union import SAGITTA, OutlinePiece, merged
 
     part = spec.mechanism.part or PaddedPart()
     outline, *others = drawn.contours
-    rounded, sharp = filleted(outline, part.fillet)
+    rounded, sharp = filleted(outline, spec.mechanism.fillet)
     frame = _frame(spec, drawn)
-    if frame:  # the union with a frame would hide it
-        check_simple(rounded.points(0.2 * TOLERANCE), "the outline of the leg")
-    made = merged([rounded.points(0.2 * TOLERANCE), *frame], part.fillet) if frame else (rounded,)
+    made: tuple[Contour, ...] = (rounded,)
+    if frame:
+        thinnest = float(drawn.tables[0].columns["thickness"][0].min())
+        check_simple(rounded.points(SAGITTA * thinnest), "the outline of the leg")  # the union would hide it
+        made = merged(
+            [OutlinePiece.within(rounded), *map(OutlinePiece.polygon, frame)], thinnest, spec.mechanism.fillet
+        )
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     marks = [mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True)]
     marks += [mark(one, driven=False) for one in frame]
-    return replace(drawn, contours=(*made, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
+    return replace(drawn, contours=(*made, *holes, *others, *marks), notes=sharp_notes(sharp, spec.mechanism.fillet))
 
 
 def _frame(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, ...]:

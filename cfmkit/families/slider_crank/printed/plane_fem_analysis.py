@@ -33,7 +33,7 @@ from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
-from cfmkit.stock.material_and_part_spec import PaddedPart
+from cfmkit.stock.material_and_part_spec import usual_fillet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.printed.equilibrium_path import Chain
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
+    from cfmkit.solid.adaptive_solution import AdaptiveSolution, DrivenPart, MeshError
     from cfmkit.solid.meshed_part import MeshSolution, Part
-    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
 
 GATHERED = 3.0
 """Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
@@ -57,13 +57,13 @@ ELSEWHERE = "the model of the part as a solid does not compute it"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolidSolution(ShortRepr):
-    """A part that was solved on two meshes.
+    """A part that was solved.
 
     Attributes
     ----------
     spec : SliderCrankSpec
         With every default written out.
-    meshes : TwoMeshes
+    solved : AdaptiveSolution
     travel : (n,) array
         Of the slider, at the points of the curve [m].
     chain : Chain
@@ -71,7 +71,7 @@ class SolidSolution(ShortRepr):
     """
 
     spec: SliderCrankSpec
-    meshes: TwoMeshes
+    solved: AdaptiveSolution
     travel: FloatArray
     chain: Chain
 
@@ -90,13 +90,13 @@ class SolidSolution(ShortRepr):
 
     @property
     def fine(self) -> MeshSolution:
-        """The finer mesh, whose values are reported."""
-        return self.meshes.fine
+        """The part on its mesh."""
+        return self.solved.solution
 
     @cached_property
     def error(self) -> MeshError:
-        """What the two meshes differ by."""
-        return self.meshes.error
+        """How closely force and stress are known."""
+        return self.solved.error
 
     @cached_property
     def fillets(self) -> tuple[FilletRow, ...]:
@@ -129,21 +129,21 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         linkage = linkage_of(spec.mechanism)
         unloaded = unloaded_angle(spec.mechanism, linkage)
         spec = as_run(spec, linkage, unloaded)
-        meshes = driven_part(spec).solved(run.progress)
+        solved = driven_part(spec).solved(run.progress)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except GeometryError as error:
-        message = f"the part cannot be meshed: {error}; check analysis.solid.mesh and mechanism.part"
+        message = f"the part cannot be meshed: {error}; check mechanism.part"
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except InputError as problem:
         return Result(spec, Status.INVALID, str(problem))
     low, high = spec.analysis.travel or (0.0, 0.0)
-    if why := meshes.no_curve(3):
-        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; check analysis.solid.mesh")
+    if why := solved.no_curve(3):
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}")
     asked = np.linspace(low, high, spec.analysis.points)
-    course = meshes.fine.course
+    course = solved.solution.course
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
-    solution = SolidSolution(spec, meshes, reached, chain_of(spec, linkage, unloaded))
+    solution = SolidSolution(spec, solved, reached, chain_of(spec, linkage, unloaded))
     complete = course.ending is PathEnd.COMPLETE
     found = (*_findings(solution), *friction_left_out(spec))
     return Result(
@@ -178,17 +178,15 @@ def part_of(spec: SliderCrankSpec) -> Part:
     assert material is not None  # or `elasticity` had refused
     law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
     regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
-    rings = rings_of((piece.contour, *piece.holes))
+    rings = rings_of((piece.contour, *piece.holes), piece.thinnest)
     return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST, piece.frame)
 
 
 def driven_part(spec: SliderCrankSpec) -> DrivenPart:
     """Return one leg with the travels that it is solved for."""
-    from cfmkit.solid.meshed_part import ACROSS
-    from cfmkit.solid.two_meshes import DrivenPart
+    from cfmkit.solid.adaptive_solution import DrivenPart
 
-    part = part_of(spec)
-    return DrivenPart("slider-crank", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+    return DrivenPart("slider-crank", part_of(spec), spec.analysis.solid.error, tuple(_stops(spec)))
 
 
 def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
@@ -267,8 +265,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
     piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
-    if reported := sharp_inside((solution.spec.mechanism.part or PaddedPart()).fillet, piece.sharp):
-        yield finding("sharp_corners", reported, "mechanism.part.fillet=0.5 mm")
+    if reported := sharp_inside(solution.spec.mechanism.fillet, piece.sharp):
+        yield finding("sharp_corners", reported, usual_fillet(solution.spec.mechanism.thinnest))
     for name, reported in solution.error.too_large():
         yield finding(name, reported)
     wide = made_of.wide

@@ -28,7 +28,7 @@ DEFINITIONS = {
     "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`"),
     "stress_place": ("length", "position of the largest stress along the centre line from the clamped end"),
     "stress_stroke": ("length", "travel at which the allowable stress is reached"),
-    "width_ratio": ("ratio", "smallest width over thickness"),
+    "width_ratio": ("factor", "smallest width over thickness"),
     "recheck_force": ("ratio", "largest relative difference between the force and that of corotational elements"),
     **OF_SOLIDS,
     "recheck_stress": ("ratio", "largest relative difference between the stress and that of corotational elements"),

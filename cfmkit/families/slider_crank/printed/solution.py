@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
+from cfmkit.elastica.outcome.member_efforts import effort_error
 from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
@@ -214,6 +215,11 @@ class Solution(ShortRepr):
         """Force against the travel, of all legs [N]."""
         force: FloatArray = self.legs * self.pressed.force
         return force
+
+    @property
+    def effort_error(self) -> float:
+        """Numerical error of the force of all legs [N]."""
+        return self.legs * effort_error(self.pressed.path, self.accuracy)
 
     @cached_property
     def stable(self) -> Any:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import Analysis, Model, PositiveLength
 from cfmkit.specs.units import Length, Ratio
-from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, SafetyFactor
+from cfmkit.stock.material_and_part_spec import MaterialField, PaddedPart, RoundedCorners, SafetyFactor
 from cfmkit.stock.processes import PROCESSES
 
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
@@ -109,11 +109,11 @@ class Process(Model):
     thinnest: PositiveLength | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
 
 
-class Printed(Model):
+class Printed(RoundedCorners, Model):
     """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
 
     material: MaterialField | None = Field(
-        None, description="of 'flexures' or 'beam': a name from `show materials`, or {youngs_modulus, ...}"
+        None, description="of 'flexures', 'beam' or links: a name from `show materials`, or {youngs_modulus, ...}"
     )
     safety_factor: SafetyFactor = 1.0
     flexures: Flexures | None = Field(
@@ -127,6 +127,12 @@ class Printed(Model):
     )
     process: Process | None = Field(None, description="deprecated: 'position' and 'least_feature' of 'part.process'")
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
+
+    @property
+    def thinnest(self) -> float:
+        """Smallest thickness of the strip, or of the flexures [m]; 0 if there are neither."""
+        drawn = self.beam.values if self.beam else [one.thickness for one in self.flexures.all] if self.flexures else ()
+        return min(drawn, default=0.0)
 
     @property
     def resolved(self) -> tuple[float | None, float | None]:

@@ -24,8 +24,9 @@ from cfmkit.families.slider_crank.springs.largest_turns_and_forces import Motion
 from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
-from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, nearest
-from cfmkit.stock.springs.spec import offers, wire_of
+from cfmkit.stock.springs.made_to_measure import PIN_SHARE
+from cfmkit.stock.springs.offer_type_and_generic_series import Miss, Offer, guide_rod_for, nearest
+from cfmkit.stock.springs.spec import offers, support_of, wire_of
 from cfmkit.stock.springs.stress_and_life import SpringInUse, in_the_sense_of_the_larger
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import CrankDesign
     from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
+    from cfmkit.stock.material_and_part_spec import Pins
 
 
 PLACES = 41
@@ -83,16 +85,25 @@ class SpringOption:
         The spring.
     count : int
         How many in parallel, in one leg.
+    deflection : float
+        Largest one over the travel [rad or m].
     """
 
     joint: int
     offer: Offer
     count: int
+    deflection: float = 0.0
 
     @property
     def written(self) -> Bought:
-        """The same as a specification has it."""
-        about = {"wound": wire_of(self.offer), "life": self.offer.life}
+        """The same as a specification has it, with a rod where a compression spring would buckle."""
+        offer = self.offer
+        about = {"wound": wire_of(offer), "life": offer.life}
+        if offer.kind == "compression":
+            about |= {"loaded": offer.kind, "free_length": offer.free_length} | support_of(offer)
+            if offer.guide_tube is None and offer.wound is not None:
+                needed = self.deflection > offer.unguided
+                about["guide_rod"] = (offer.guide_rod or guide_rod_for(offer.wound)) if needed else None
         return Bought.model_validate(
             {"at": JOINTS[self.joint], "name": self.offer.name, "count": self.count}
             | {key: value for key, value in about.items() if value is not None}
@@ -200,11 +211,12 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         for offer in offers(wanted.catalogue or (), *kinds):
             label = f"{offer.name} at the {name.replace('_', ' ')}"
-            reason = _why_not(offer, in_the_sense_of_the_larger(float(high[joint]), float(low[joint])), wanted)
+            ends = in_the_sense_of_the_larger(float(high[joint]), float(low[joint]))
+            reason = _why_not(offer, ends, wanted) or _binds(offer, max(map(abs, ends)), task.spec.mechanism.pins)
             if reason is not None:
                 refused.append(Miss(label, *reason))
                 continue
-            own = [SpringOption(joint, offer, count) for count in offer.counts]
+            own = [SpringOption(joint, offer, count, max(map(abs, ends))) for count in offer.counts]
             soft = [one for one in own if cap is None or one.rate <= cap * (1 + 1e-9)]
             if not soft and cap is not None:
                 least = min(one.rate for one in own)
@@ -230,6 +242,17 @@ def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tu
         allowed, needed = format_short(offer.largest, kind), format_short(moved, kind)
         return moved / offer.largest - 1.0, f"deflected by {needed}, it allows {allowed}"
     return SpringInUse.of(offer, *ends).misses_life(wanted.spring_life) if wanted.spring_life is not None else None
+
+
+def _binds(offer: Offer, turned: float, pins: Pins | None) -> tuple[float, str] | None:
+    """Return by what share a torsion spring that is turned so far [rad] is too narrow for its pin; None if it fits."""
+    if offer.kind != "torsion" or offer.wound is None or pins is None:
+        return None
+    inside, needed = offer.wound.inner_diameter_wound_up(turned), pins.diameter / PIN_SHARE
+    if inside >= needed:
+        return None
+    reported, pin = format_short(max(inside, 0.0), "length"), format_short(pins.diameter, "length")
+    return needed / max(inside, 1e-9) - 1.0, f"wound up it is {reported} wide inside, too narrow for a pin of {pin}"
 
 
 @dataclass

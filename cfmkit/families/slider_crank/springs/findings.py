@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.families.findings import deg, mm, newton
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.bistability_class import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
+from cfmkit.families.slider_crank.springs.bought_spring_limits import bought_spring_faults
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
@@ -191,6 +192,8 @@ def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
 
 
 def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
+    for fault, message, cures in bought_spring_faults(spec, solution.extremes.largest_turns):
+        yield finding(fault, message, *cures)
     limits = spec.mechanism.limits
     if limits is None:
         return

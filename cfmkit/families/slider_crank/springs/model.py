@@ -25,6 +25,7 @@ from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
 from cfmkit.families.slider_crank.springs.findings import findings_of
+from cfmkit.families.slider_crank.springs.link_strength import values_of_links
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS, values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
@@ -34,16 +35,17 @@ from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.parts_list import BoughtPart, listed
+from cfmkit.stock.springs.guides import guide_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
-    from cfmkit.results import Finding
+    from cfmkit.results import Finding, Quantity
 
 
 Ends = tuple[float, float]
@@ -76,9 +78,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         return no_result(spec, problem.finding)
     said, stuck = {item.name for item in shortfalls}, _held(solution)
     found = findings_of(spec, solution) if run.wanted is None else ()
-    values = (
-        {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution)} if run.wants(DEFINITIONS) else {}
-    )
+    values = dict(_values(spec, solution)) if run.wants(DEFINITIONS) else {}
     status = Status.PARTIAL if shortfalls or stuck else Status.COMPLETE
     return Result(
         spec=_as_run(spec, assembly),
@@ -91,9 +91,17 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=target_of(spec),
         reference=solution.reference,
         closed=ClosedFormEffort(solution.character),
+        effort_error=solution.effort_error,
+        part_efforts=solution.part_efforts,
         tables=listed(parts_of(spec)),
         state=solution,
     )
+
+
+def _values(spec: SliderCrankSpec, solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name: of the mechanism, of the springs' wires, and of the links."""
+    links = values_of_links(spec, solution.assembly, solution.character.grid)
+    return {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution), **links}
 
 
 def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
@@ -102,9 +110,9 @@ def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
     for one in mechanism.springs.bought:
         value = getattr(mechanism.springs, one.at)
         rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
-        kind = "spring" if one.at == "slider" else "torsion spring"
-        place = one.at.replace("_", " ")
-        found.append(BoughtPart(place, one.name, one.count * mechanism.sets, f"{kind}, {rate} of all in one leg"))
+        kind = f"{one.loaded or ''} spring".strip() if one.at == "slider" else "torsion spring"
+        data = ", ".join([kind, f"{rate} of all in one leg", *guide_words(one)])
+        found.append(BoughtPart(one.at.replace("_", " "), one.name, one.count * mechanism.sets, data))
     if mechanism.pins:
         found.append(BoughtPart("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
     return tuple(found)

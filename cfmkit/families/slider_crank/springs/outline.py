@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.export.contours import Arc, Contour, Drawing, DrawnDimension, Line, Sheet, circle
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -21,16 +22,23 @@ EYE_SHARE, HOLE_SHARE = 0.08, 0.04
 """Radii of eyes, which are half as wide as links, and of pin holes in lengths of the shorter link, where no pins are
 stated."""
 
+PIN_IN_COIL = 0.8
+"""Diameter of a pin that is not stated over the inside of the relaxed spring around it: wound up that is narrower."""
+
 EYE_OF_HOLE = 2.0
 """Least radius of an eye in those of its hole: a wall as thick as the hole's radius."""
 
 
 def eye_and_hole(spec: SliderCrankSpec) -> tuple[float, float]:
-    """Return the radii of the links' eyes and of their pin holes [m]."""
+    """Return the radii of the links' eyes, half their width, and of their pin holes [m]."""
     linkage = linkage_of(spec.mechanism)
     short = min(linkage.crank, linkage.coupler)
-    pins = spec.mechanism.pins
-    hole = HOLE_SHARE * short if pins is None else 0.5 * pins.diameter
+    pins, links = spec.mechanism.pins, spec.mechanism.links
+    coils = [coil for name in JOINTS[:3] for coil in spec.mechanism.springs.coils_at(name)]
+    around = min((0.5 * PIN_IN_COIL * coil.inner_diameter for coil in coils), default=short)
+    hole = min(HOLE_SHARE * short, around) if pins is None else 0.5 * pins.diameter
+    if links is not None:
+        return 0.5 * links.width, min(hole, 0.25 * links.width) if pins is None else hole
     return max(EYE_SHARE * short, EYE_OF_HOLE * hole), hole
 
 
@@ -55,7 +63,9 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         DrawnDimension("crank", (0.0, 0.0), (linkage.crank, 0.0)),
         DrawnDimension("coupler", (0.0, y), (linkage.coupler, y)),
     )
-    facts = [("material", "not stated"), ("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
+    material = spec.mechanism.material
+    facts = [("material", "not stated" if material is None else material.words)]
+    facts += [("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
     facts += [("links", f"{format_short(2.0 * eye, 'length')} wide, ends round")]
     facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
     sheet = Sheet(part.sheet if part else None, (), KEY)

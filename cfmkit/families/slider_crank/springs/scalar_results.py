@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
@@ -97,6 +98,7 @@ DEFINITIONS = {
     "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
     "guide_force_max": ("force", "largest transverse force of the slider of one leg on its guide"),
     **WIRE_DEFINITIONS,
+    **LINK_DEFINITIONS,
 }
 
 
@@ -179,6 +181,7 @@ _WHY = {
     "second_stable_travel": "there is no second stable equilibrium in the motion",
     "constant_angle": "the reference is outside the motion, or the torque there is zero",
     "constant_travel": "the reference is outside the motion, or the force there is zero",
+    "stiffness_drop": "the effort is zero within its numerical error",
     "bistable_factor": "it needs torsion springs and a spring at the slider",
     "positive_factor": "it needs torsion springs and a spring at the slider",
     "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
@@ -196,7 +199,7 @@ def _positions(solution: Solution) -> Pairs:
     found, place = solution.character, solution.assembly.motion_name
     unstable, stable = solution.nearest(False), solution.nearest(True)
     return (
-        ("stiffness_drop", found.drop),
+        ("stiffness_drop", found.drop if float(np.abs(solution.effort).max()) > solution.effort_error else None),
         ("stable_positions", float(found.classified.stable[0])),
         ("unstable_positions", float(found.classified.unstable[0])),
         (f"snap_through_{place}", None if unstable is None else unstable.motion),

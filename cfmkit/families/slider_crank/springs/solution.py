@@ -24,6 +24,7 @@ from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone
 from cfmkit.numerics.roots import bracketed_root
+from cfmkit.results import round_off
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -264,6 +265,16 @@ class Solution(ShortRepr):
     def shares(self) -> FloatArray:
         """Effort of each spring, (4, n) [N m or N]."""
         return _weighed(self.assembly.rates, self.units.effort)
+
+    @property
+    def effort_error(self) -> float:
+        """Rounding of the sum of the springs' efforts [N m or N]."""
+        return round_off(self.shares)
+
+    def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest effort of one spring of one leg at some places of the motion [N m or N]."""
+        shares = _weighed(self.assembly.rates, self.assembly.forces(np.ravel(places)))
+        return np.asarray(np.abs(shares).max(axis=0).reshape(np.shape(places)) / self.legs)
 
     @cached_property
     def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
-from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
+from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
+from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringSupport, SpringWire, is_made
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -23,12 +24,16 @@ ExtensionRate = Annotated[Stiffness, Field(ge=0)]
 JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
 
 
-class Bought(Model):
+class Bought(SpringSupport):
     """A spring of one leg that is bought."""
 
     at: JointName = Field(description="the joint that it acts at")
     name: str = Field(min_length=1, description="part number")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
+    loaded: Literal["extension", "compression"] | None = Field(
+        None, description="how a spring at the slider is loaded; default: extension"
+    )
+    free_length: PositiveLength | None = Field(None, description="relaxed, of one that is compressed: it may buckle")
     wound: SpringWire | None = Field(
         None,
         description="wire, coil and turns of one spring, for the stress in its wire, and for the rate if "
@@ -36,15 +41,32 @@ class Bought(Model):
     )
     life: Life | None = None
 
+    @model_validator(mode="after")
+    def _is_held(self) -> Self:
+        if self.loaded is not None and self.at != "slider":
+            raise ValueError("'loaded' is for the spring at the slider; those at pins are torsion springs")
+        self.check_guide(self.kind, self.coil, None)
+        return self
+
     @property
     def kind(self) -> Kind:
         """What it is loaded by."""
-        return "extension" if self.at == "slider" else "torsion"
+        return self.loaded or "extension" if self.at == "slider" else "torsion"
+
+    @property
+    def coil(self) -> Wound | None:
+        """Its wire, coil and turns; None if they are not stated."""
+        return None if self.wound is None else self.wound.wound(self.kind)
+
+    @property
+    def unguided(self) -> float:
+        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
+        return unguided_deflection(self.kind, self.free_length, self.coil, None, self.seats)
 
     @property
     def rate(self) -> float | None:
-        """Of all of them, from their wire [N m/rad or N/m]; None where that is not known."""
-        return None if self.wound is None else self.count * self.wound.wound(self.kind).rate
+        """Of all of them, from their wire [N m/rad or N/m]; None if that is not known."""
+        return None if self.coil is None else self.count * self.coil.rate
 
 
 class Springs(Model):
@@ -63,7 +85,7 @@ class Springs(Model):
     bought: tuple[Bought, ...] = Field((), description="the bought springs, for the parts list")
 
     @model_validator(mode="after")
-    def _rates_are_those_of_the_wires(self) -> Self:
+    def _rates_are_those_of_the_wires(self, info: ValidationInfo) -> Self:
         """Take rates from the wires where none are stated, and refuse stated ones that contradict them."""
         for joint in dict.fromkeys(one.at for one in self.bought):
             parts = [one.rate for one in self.bought if one.at == joint]
@@ -75,7 +97,7 @@ class Springs(Model):
             if joint not in self.model_fields_set:
                 # past the frozen model, and not counted as set: another wire then has another rate
                 object.__setattr__(self, joint, total)
-            elif abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
+            elif not is_made(info) and abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
                 refuse(
                     "Springs",
                     {
@@ -93,7 +115,7 @@ class Springs(Model):
 
     def coils_at(self, joint: str) -> list[Wound]:
         """Return the springs at a joint whose wire is known."""
-        return [one.wound.wound(one.kind) for one in self.bought if one.at == joint and one.wound is not None]
+        return [one.coil for one in self.bought if one.at == joint and one.coil is not None]
 
     def pulled_outwards(self, high: float, low: float) -> bool:
         """Return whether the slider's spring has a known wire and is stretched by a slider that leaves the pivot.
@@ -106,6 +128,12 @@ class Springs(Model):
     def rates(self) -> tuple[float, float, float, float]:
         """Rates at pivot, crank pin, slider pin and slider [N m/rad, the last N/m]."""
         return self.pivot, self.crank_pin, self.slider_pin, self.slider
+
+
+class Links(Model):
+    """Crank and coupler as bars with round ends, cut from the sheet of `part`."""
+
+    width: PositiveLength = Field(description="across their length, at the eyes, too")
 
 
 class Limits(Model):

@@ -22,17 +22,14 @@ from cfmkit.families.slider_crank.springs.bistability_class import (
     small_angle_number,
 )
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
+from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
+from cfmkit.families.slider_crank.springs.link_strength import link_of
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
-from cfmkit.families.slider_crank.springs.model import (
-    efforts_inside,
-    reference_motion,
-    target_of,
-    window_of,
-)
+from cfmkit.families.slider_crank.springs.model import efforts_inside, reference_motion, target_of, window_of
 from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
-from cfmkit.metrics.branch_views import MeasuringFrame
+from cfmkit.metrics.branch_views import ZERO, MeasuringFrame
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.metrics.continuous_means_and_extremes import extremes, mean
 from cfmkit.metrics.ranges_many import (
@@ -44,8 +41,9 @@ from cfmkit.metrics.ranges_many import (
     usable_interval,
     usable_stroke,
 )
-from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
+from cfmkit.metrics.spread import STATIC_BALANCE, ManyWindows, metric_of, metrics_of, static_balance
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone, sharpened
+from cfmkit.results import ROUND_OFF
 from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS
 
 if TYPE_CHECKING:
@@ -58,10 +56,6 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
-
-
-BALANCED = 1e-12
-"""A mean so small, as a share of the largest effort, is rounding: such a design is left to the model of one."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +138,7 @@ class Base:
             return self.bounded
         if name.startswith("usable_") and self.spec.target_curve is not None:
             return False  # the band lies about the curve: the model of one mechanism knows it
-        known = self.spreads(name) or name in BAND_RANGES or name == RMS or (name in PLACES and self.bounded)
+        known = self.spreads(name) or name in (*BAND_RANGES, RMS) or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def spreads(self, name: str) -> bool:
@@ -154,6 +148,8 @@ class Base:
     def lacks(self, name: str) -> bool:
         """Return whether a mechanism with this drive has no such value: its cells are empty."""
         others = OTHER_DRIVE[self.assembly.drive]
+        if name in LINK_DEFINITIONS and link_of(self.spec) is None:
+            return True
         if name in WIRE_DEFINITIONS and not self.spec.mechanism.springs.bought:
             return True
         if name == "force_per_anchor":
@@ -232,7 +228,7 @@ class Slab:
     def level(self) -> FloatArray:
         """Efforts at the reference; NaN where they are zero but for rounding."""
         level = self.rates @ self.base.assembly.units(np.array([self.base.reference])).effort[:, 0]
-        return np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
+        return np.where(np.abs(level) > np.maximum(self.error, ZERO * np.abs(self.sharp).max(axis=1)), level, np.nan)
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
@@ -270,13 +266,29 @@ class Slab:
             return high - low
         return metric_of(name, self.inside(measure.window), target_of(self.base.spec))
 
+    @cached_property
+    def error(self) -> FloatArray:
+        """Rounding of the sums of springs' efforts, (m,): as `results.round_off` has it."""
+        return np.asarray(ROUND_OFF * (self.rates @ np.abs(self.base.units.effort)).max(axis=1))
+
+    def static_balance(self, window: tuple[float, float] | None) -> FloatArray:
+        """Return the largest effort in a window over that of one spring of one leg, (m,)."""
+        places, units = self.base.samples_and_grid(window)
+
+        def largest(at: FloatArray) -> FloatArray:
+            unit = self.base.assembly.forces(at.ravel()).reshape(4, *at.shape).swapaxes(0, 1)
+            return np.asarray(np.abs(self.rates[:, :, None] * unit).max(axis=1))
+
+        part, _ = extremes(largest, places[None, :], np.abs(self.rates[:, :, None] * units).max(axis=1))
+        return np.asarray(static_balance(self.inside(window).spread, part / self.legs))
+
     def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the efforts in a window."""
         if window not in self.cut:
             motion = self.base.motion_inside(window)
             effort = self.effort if window is None else self.rates @ self.base.inside(window)
-            self.cut[window] = ManyWindows(motion[None, :], effort, partial(self._extremes, window))
-            self.balance(self.cut[window].mean, effort)
+            self.cut[window] = ManyWindows(motion[None, :], effort, partial(self._extremes, window), self.error)
+            self.balance(self.cut[window].mean)
         return self.cut[window]
 
     def _extremes(
@@ -292,10 +304,9 @@ class Slab:
         """Which designs have a mean effort of rounding in some window that was looked at: its sign decides metrics."""
         return np.zeros(len(self.rates), dtype=bool)
 
-    def balance(self, mean: FloatArray, effort: FloatArray) -> None:
-        """Note which means, (m,), are rounding beside the efforts they are of, (m, n)."""
-        nothing = np.abs(mean) <= BALANCED * np.abs(effort).max(axis=1)
-        np.logical_or(self.balanced, nothing, out=self.balanced)
+    def balance(self, mean: FloatArray) -> None:
+        """Note which means, (m,), are rounding: such designs are left to the model of one."""
+        np.logical_or(self.balanced, np.abs(mean) <= self.error, out=self.balanced)
 
     @cached_property
     def cut(self) -> dict[tuple[float, float] | None, ManyWindows]:
@@ -353,7 +364,7 @@ class Slab:
             count, ends = len(self.rates), window or (self.base.low, self.base.high)
             low, high, pose = (np.full(count, end) for end in (*ends, self.base.reference))
             place, value = self.curves.place, self.curves.value
-            self.known[window] = ManyBranches(place, value, low, high, self.somewhere, pose=pose)
+            self.known[window] = ManyBranches(place, value, low, high, self.somewhere, pose=pose, error=self.error)
         return self.known[window]
 
     def usable(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
@@ -367,7 +378,7 @@ class Slab:
             valid = np.full(len(self.rates), base.low)
             start, end = usable_interval([many], level, base.band, valid)
             self.usables[window] = start, end
-            self.balance(level, self.curves.value)
+            self.balance(level)
         return self.usables[window]
 
     def _unit(self, joint: int) -> Callable[[FloatArray], FloatArray]:
@@ -415,15 +426,15 @@ EACH: dict[str, Callable[[Solution], float | None]] = {
 }
 """Values that are found design by design, on the curves that are known of all."""
 
-
 PLACES: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
+    STATIC_BALANCE: lambda slab, window: slab.static_balance(window),
     "range_95": lambda slab, window: range_95(slab.everywhere(window)),
     "range_95_fraction": lambda slab, window: range_95_fraction(slab.everywhere(window)),
     "usable_stroke": lambda slab, window: usable_stroke(*slab.usable(window)),
     "usable_start": lambda slab, window: slab.usable(window)[0],
     "usable_end": lambda slab, window: slab.usable(window)[1],
 }
-"""Metrics that are places, on curves that are known at every place."""
+"""Metrics that are places, and a balance, on curves that are known at every place."""
 
 
 def _rms_to_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
@@ -455,7 +466,7 @@ OTHER_DRIVE: dict[str, tuple[str, ...]] = {
 
 VALUES: dict[str, Callable[[Slab], Any]] = {
     "stiffness_class": lambda slab: slab.classified.kind.astype(np.float64),
-    "stiffness_drop": lambda slab: slab.classified.drop,
+    "stiffness_drop": lambda s: np.where(np.abs(s.effort).max(axis=1) > s.error, s.classified.drop, np.nan),
     "stable_positions": lambda slab: slab.classified.stable.astype(np.float64),
     "unstable_positions": lambda slab: slab.classified.unstable.astype(np.float64),
     "constant_angle": _width,

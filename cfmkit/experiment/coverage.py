@@ -1,0 +1,156 @@
+"""Which part of a window a recording covers: holes in it, and the weight of each sample.
+
+A recording's samples stand where machine and clock put them. A mean over them is a mean over the displacement only if
+each counts for the way that it stands for. Where the way to the next sample is far longer than is usual there, nothing
+is known of what the force did: a hole. What holds over a window with a large hole in it cannot be told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import QuantityError, UsageError
+from cfmkit.metrics.branch_views import span_text
+from cfmkit.metrics.metric_definitions import split_name
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, STEPS, holes_between
+from cfmkit.results import Finding, Quantity
+from cfmkit.specs.units import read_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cfmkit.curves import Curve, Kind
+    from cfmkit.metrics import Window
+
+
+@dataclass(frozen=True)
+class UnrecordedInterval:
+    """A part of the travel without samples [m or rad]."""
+
+    low: float
+    high: float
+    branch: str = ""
+    cycle: int | None = None  # None where there is one only
+
+    @property
+    def width(self) -> float:
+        """Its length [m or rad]."""
+        return self.high - self.low
+
+    def text(self, kind: Kind) -> str:
+        """Return where it is, for messages: ``9 ... 18 mm on 'load'``."""
+        cycle = "" if self.cycle is None else f" of cycle {self.cycle}"
+        return span_text(self.low, self.high, kind) + (f" on {self.branch!r}{cycle}" if self.branch else "")
+
+
+def holes_of(curves: Sequence[Curve], window: Window) -> tuple[UnrecordedInterval, ...]:
+    """Return the holes of all branches of all cycles in a window, in their order."""
+    found = []
+    for curve in curves:
+        cycle = int(curve.label["cycle"][0]) if len(curves) > 1 else None
+        for branch in curve.branches:
+            places = np.sort(curve.on(branch).motion)
+            found += [
+                UnrecordedInterval(low, high, branch, cycle)
+                for low, high in holes_between(places, window.lo, window.hi)
+            ]
+    return tuple(found)
+
+
+def share_covered(holes: Sequence[UnrecordedInterval], window: Window) -> float:
+    """Return which part of a window one branch of one cycle covers."""
+    return 1.0 - sum(hole.width for hole in holes) / (window.hi - window.lo)
+
+
+def number_of(curve: Curve) -> int | None:
+    """Return the number of a curve's cycle; None where there is one only."""
+    return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
+
+
+def of_cycle(holes: Sequence[UnrecordedInterval], curve: Curve) -> list[UnrecordedInterval]:
+    """Return the holes of the cycle that is a curve."""
+    return [hole for hole in holes if hole.cycle in (None, number_of(curve))]
+
+
+UNKNOWN = "not recorded"
+"""Begins the reason why a metric over a hole has no value."""
+
+
+def large_holes(
+    holes: Sequence[UnrecordedInterval], window: Window, largest: float = LARGEST_HOLE
+) -> tuple[UnrecordedInterval, ...]:
+    """Return the holes that are larger than a part of a window."""
+    return tuple(hole for hole in holes if hole.width > largest * (window.hi - window.lo))
+
+
+def hole_finding(large: Sequence[UnrecordedInterval], window: Window, kind: Kind, cure: str = "") -> Finding:
+    """Return what is said of large holes in a window."""
+    spans: dict[str, list[UnrecordedInterval]] = {}
+    for hole in large:
+        spans.setdefault(span_text(hole.low, hole.high, kind), []).append(hole)
+    named = [span + _whose(holes) for span, holes in spans.items()]
+    listed = ", ".join(named[:4]) + (f" and {len(named) - 4} more" if len(named) > 4 else "")
+    share = max(hole.width for hole in large) / (window.hi - window.lo)
+    reported = (
+        f"{UNKNOWN}: {listed} (up to {100 * share:.0f} % of the window): numbers over the window "
+        f"{span_text(window.lo, window.hi, kind)} cannot be known there and have no value{cure}"
+    )
+    return Finding("holes", reported)
+
+
+def _whose(holes: Sequence[UnrecordedInterval]) -> str:
+    """Return on which branch and in which cycle holes at one place are; nothing where it is not one."""
+    branches, cycles = {hole.branch for hole in holes}, {hole.cycle for hole in holes}
+    branch = f" on {holes[0].branch!r}" if len(branches) == 1 else ""
+    return branch + (f" of cycle {holes[0].cycle}" if len(cycles) == 1 and holes[0].cycle is not None else "")
+
+
+def emptied(metrics: Mapping[str, Quantity], large: Sequence[UnrecordedInterval], kind: Kind) -> dict[str, Quantity]:
+    """Return metrics, without a value for branches with a large hole and for what needs all branches."""
+    branches = {hole.branch: hole for hole in reversed(large)}
+    found = dict(metrics)
+    for name, item in metrics.items():
+        branch = split_name(name)[1]
+        hole = branches.get(branch) if branch is not None else next(iter(large), None)
+        if hole is not None and item.value is not None:
+            found[name] = replace(item, value=None, reason=f"{UNKNOWN}: {hole.text(kind)}")
+    return found
+
+
+_COVERAGE = "part of the window that was recorded, from steps of more than {} usual ones; of several cycles the least"
+
+
+def coverage(curve: Curve, holes: Sequence[UnrecordedInterval], window: Window) -> dict[str, Quantity]:
+    """Return which part of the window each branch of a curve covers, and the least of them."""
+    definition = _COVERAGE.format(f"{STEPS:g}")
+    shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
+    named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
+    found = {"coverage": min(shares.values()), **named}
+    return {name: Quantity(value, "ratio", definition) for name, value in found.items()}
+
+
+def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+    """Return the least value of each quantity."""
+    return {name: min((item[name] for item in each), key=lambda one: one.value or 0.0) for name in each[0]}
+
+
+def read_largest_hole(text: str | float | None) -> float:
+    """Return which part of a window a hole may take, from text such as ``5 %``; by default `LARGEST_HOLE`.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is no share.
+    """
+    if text is None:
+        return LARGEST_HOLE
+    try:
+        share = read_quantity(text, "ratio") if isinstance(text, str) else float(text)
+    except QuantityError as error:
+        raise UsageError(f"--max-hole: {error}") from None
+    if not 0 < share <= 1:
+        raise UsageError(f"--max-hole: {text} is not allowed: must be above 0 and at most 100 %")
+    return share

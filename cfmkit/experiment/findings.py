@@ -1,0 +1,100 @@
+"""What the user must know of a recording, by name, and the sentences that say it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.experiment.branches import WHOLE, covered
+from cfmkit.metrics.branch_views import span_text
+from cfmkit.results import Finding
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from cfmkit.experiment.branches import Stroke, Strokes
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.reversal_transitions import Settled
+
+FINDINGS = {
+    "one_branch": "the recording has no return branch: there is no loop",
+    "unfinished_cycle": "strokes that belong to no complete cycle are left out",
+    "seating_cycles": "first cycles that cover less of the travel than the others are left out: they seat the parts",
+    "short_cycles": "cycles that cover less of the travel than others are left out",
+    "window_cut": "one branch of one cycle covers less than the others: the numbers hold over what all of them cover",
+    "holes": "a part of the travel was not recorded: what holds over a window with a large hole in it is not known",
+    "pauses": "points at which the machine stood are left out",
+    "spikes": "points far off their neighbours are left out",
+    "reversals": "points next to reversals, where the force passes from one branch to the other, are left out",
+    "window_at_reversal": "the window reaches into points that are left out next to reversals: it was shortened",
+    "not_filtered": "there are too few points for the filter",
+    "negative_force": "the mean force is negative: the sign of the sensor may be reversed",
+    "negative_loop": "the mechanism would deliver energy in every cycle: a sign may be reversed",
+}
+
+
+def warnings_of(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
+    """Return what is said of strokes and of the sign of a recording."""
+    found = []
+    cycles = strokes.cycles
+    if not cycles:
+        only = strokes.measured[0][0].branch
+        found.append(Finding("one_branch", f"there is only the branch {only!r}: no loop, and no hysteresis"))
+    left = len(strokes.strokes) - (2 * len(strokes.complete) or 1)
+    if cycles and covered(cycles[0]) < WHOLE:
+        reported = f"the shorter stroke covers only {100 * covered(cycles[0]):.0f} % of the longer one"
+        found.append(Finding("unfinished_cycle", f"{reported}: the loop is not closed"))
+    if left:
+        found.append(
+            Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
+        )
+    if strokes.shorter:
+        found.append(_shorter(recording, strokes))
+    if strokes.pauses:
+        reported = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
+        found.append(Finding("pauses", reported))
+    if float(recording.effort.mean()) < 0:
+        reported = f"the mean {recording.kind} is negative: is the sensor's sign reversed?"
+        found.append(Finding("negative_force", reported))
+    return tuple(found)
+
+
+def _shorter(recording: Recording, strokes: Strokes) -> Finding:
+    """Return what is said of cycles that cover less than others."""
+    first = strokes.cycles[0][0].cycle
+    numbers = [cycle[0].cycle for cycle in strokes.shorter]
+    seating = max(numbers) < first
+
+    def span(cycle: tuple[Stroke, Stroke]) -> str:
+        ends = recording.motion[int(cycle[0].points[0]) : int(cycle[1].points[-1]) + 1]
+        return span_text(float(ends.min()), float(ends.max()), recording.kind)
+
+    each = ", ".join(f"{cycle[0].cycle} ({span(cycle)})" for cycle in strokes.shorter[:4])
+    more = f" and {len(numbers) - 4} more" if len(numbers) > 4 else ""
+    there = [cycle[0].cycle for cycle in strokes.complete]
+    cycles, verb = ("cycles", "are") if len(numbers) > 1 else ("cycle", "is")
+    what = "seating " if seating else ""
+    reported = (
+        f"{what}{cycles} {each}{more} {verb} left out, as others cover {span(strokes.cycles[0])}; "
+        f"--cycles {there[0]}:{there[-1]} keeps all"
+    )
+    return Finding("seating_cycles" if seating else "short_cycles", reported)
+
+
+def spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Finding, ...]:
+    """Return what is said of spikes."""
+    count = int(spiky.sum())
+    if not count:
+        return ()
+    return (Finding("spikes", f"{count} of {len(recording)} points are far from their neighbours and are omitted"),)
+
+
+def passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:
+    """Return what is said of the points next to reversals."""
+    if not found.length:
+        return ()
+    length = format_short(found.length, recording.motion_dimension, 3)
+    points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
+    reported = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
+    return (Finding("reversals", reported),)

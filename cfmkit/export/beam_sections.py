@@ -1,0 +1,152 @@
+"""Sections of beams as specified, and how thick a drawn or meshed part is there: is the part what was specified?
+
+Across the middle of every smooth piece of a beam the part must have the beam's thickness. Joints are left out: sections
+at which the part runs on into another beam or a block, and short pieces beside a step, which a fillet may thicken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import GeometryError
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+
+ALLOWED = 1e-3
+"""Largest relative error of an area and of a section modulus, b t^2 / 6."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamSection:
+    """A section of a beam as specified.
+
+    Attributes
+    ----------
+    beam : str
+        Its name, for messages.
+    at, across : (2,) arrays
+        Its middle [m], and the unit vector along it.
+    thickness, length : float
+        Of the beam there, and of its piece that is smooth [m].
+    """
+
+    beam: str
+    at: FloatArray
+    across: FloatArray
+    thickness: float
+    length: float
+
+    def cut(self, starts: FloatArray, ends: FloatArray) -> tuple[float, float]:
+        """Return how far the material goes to both sides, as bounded by lines (n, 2) [m]; infinite without a bound."""
+        along = np.array([self.across[1], -self.across[0]])
+        one, other = ((points - self.at) @ along for points in (starts, ends))
+        met = (one > 0) != (other > 0)
+        share = one[met] / (one[met] - other[met])
+        away = ((starts[met] + share[:, None] * (ends[met] - starts[met])) - self.at) @ self.across
+        return (
+            float(-away[away < 0].max(initial=-np.inf)),
+            float(away[away > 0].min(initial=np.inf)),
+        )
+
+    def line(self, cut: tuple[float, float]) -> FloatArray:
+        """Return the ends of the section that reaches so far to both sides (2, 2) [m]."""
+        return np.array([self.at - cut[0] * self.across, self.at + cut[1] * self.across])
+
+    def check(self, measured: float, what: str, remedy: str) -> None:
+        """Refuse a thickness [m] whose section modulus is not that of the specification.
+
+        Raises
+        ------
+        cfmkit.errors.GeometryError
+            With the beam, the place, both values and a remedy.
+        """
+        if abs((measured / self.thickness) ** 2 - 1.0) <= ALLOWED:
+            return
+        x, y = (format_short(float(one), "length") for one in self.at)
+        found = f"{format_short(measured, 'length')} thick" if np.isfinite(measured) else "endless"
+        raise GeometryError(
+            f"beam {self.beam!r} is {found} in the {what} at ({x}, {y}), but "
+            f"{format_short(self.thickness, 'length')} in the specification: {remedy}"
+        )
+
+
+def lines_of(rings: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return starts and ends (n, 2) of the lines of closed rings (k, 2) of points [m]."""
+    return np.concatenate(list(rings)), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+
+
+def free_sections(
+    sections: Sequence[BeamSection],
+    rings: Sequence[FloatArray],
+    areas: Sequence[FloatArray],
+    own: Sequence[Sequence[int]],
+    fillet: float,
+) -> tuple[BeamSection, ...]:
+    """Return those of some sections that are free of joints, once the outline is as thick as each of them.
+
+    Parameters
+    ----------
+    sections : sequence of BeamSection
+    rings : sequence of (k, 2) arrays
+        The outline [m].
+    areas : sequence of (n, 2) arrays
+        Polygons of everything that was united [m].
+    own : sequence, as long as `sections`, of sequences of int
+        Which of these are of the beam there.
+    fillet : float
+        Radius of inside corners [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        Where the outline differs from the specification.
+    """
+    from shapely import LineString, STRtree, polygons
+
+    starts, ends = lines_of(rings)
+    tree = STRtree([polygons(area) for area in areas])
+    found = []
+    for section, mine in zip(sections, own, strict=True):
+        cut = section.cut(starts, ends)
+        if np.isfinite(cut).all():
+            met = tree.query(LineString(section.line(cut)), "intersects")
+            if not {*met.tolist()} <= {*mine}:
+                continue
+        smaller = format_short(min(0.5 * section.thickness, 0.125 * section.length, 0.5 * fillet), "length", 2)
+        remedy = f"--set 'mechanism.part.fillet={smaller}'" if fillet > 0 else "move its neighbours away"
+        section.check(sum(cut), "outline", remedy)
+        found.append(section)
+    return tuple(found)
+
+
+def check_area(measured: float, least: float, largest: float) -> None:
+    """Refuse an outline that encloses another area than its pieces do, fillets between them included [m2].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        With the areas.
+    """
+    if least * (1.0 - ALLOWED) <= measured <= largest * (1.0 + ALLOWED):
+        return
+    raise GeometryError(
+        f"the outline encloses {1e6 * measured:.6g} mm2, but its beams and blocks {1e6 * least:.6g} to "
+        f"{1e6 * largest:.6g} mm2: beams may lie on each other; move them apart, or use another 'mechanism.part.fillet'"
+    )
+
+
+def areas_of(pieces: Sequence[Any], holes: Sequence[Any], size: float, fillet: float) -> tuple[float, float]:
+    """Return the area of the union of pieces less holes [m2]: without fillets, and with all that they may fill."""
+    from shapely import Polygon, union_all
+
+    whole = union_all([Polygon(area).buffer(0.0) for piece in pieces for area in piece.covered(size)])
+    cut = union_all([Polygon(area).buffer(0.0) for hole in holes for area in hole.covered(size)])
+    filled = whole.buffer(fillet, quad_segs=32).buffer(-fillet, quad_segs=32) if fillet > 0 else whole
+    return float(whole.difference(cut).area), float(filled.difference(cut).area)

@@ -1,0 +1,326 @@
+"""What the part of a beam mechanism is united from: strips, what closes them at nodes, and the blocks at their ends.
+
+One rule: the part is the union of the strips as specified. Where beams meet, the smallest piece closes them that leaves
+the section as thick as the beams; pads, bars and arms lie behind all beams that end at them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.strips_joined_away_from_nodes import DrawnBlock
+from cfmkit.export.union import OutlinePiece
+from cfmkit.families.beam.network_from_spec import mirror_axis, moving_nodes, on_axis
+from cfmkit.families.beam.strips_and_gaps import BeamStrip, mirrored
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.beam.network_from_spec import Assembly
+
+PAD = 4.0
+"""Depth of a pad behind the end of a beam, in thicknesses."""
+
+EYE, HOLE = 2.5, 1.2
+"""Radii of the eye and of the hole at a pinned support, in thicknesses."""
+
+STANDS = 1e-4
+"""A beam that ends nearer to its node than this stands on it, in thicknesses, as places do that differ by rounding."""
+
+ON = 1e-6
+"""A beam that turns by less than this continues another one [rad]."""
+
+LEAST = 0.1
+"""Pads of which less than this share is behind all beams are none."""
+
+_CORNERS = 64
+"""A polygon with so many lies within its circle by at most 0.12 % of the radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamEnd:
+    """Where a beam begins or ends, seen from there.
+
+    Attributes
+    ----------
+    beam : str
+    strip : BeamStrip
+        Its outermost piece.
+    last : bool
+        Whether it is the end of the piece, not its start.
+    """
+
+    beam: str
+    strip: BeamStrip
+    last: bool
+
+    @property
+    def at(self) -> FloatArray:
+        """Its middle (2,) [m]."""
+        return np.asarray(self.strip.points[-1 if self.last else 0])
+
+    @property
+    def thickness(self) -> float:
+        """Of the beam there [m]."""
+        return float(self.strip.thickness[-1 if self.last else 0])
+
+    @property
+    def angle(self) -> float:
+        """Direction in which the beam goes from there [rad]."""
+        return float(self.strip.angle[-1] + math.pi) if self.last else float(self.strip.angle[0])
+
+    @property
+    def along(self) -> FloatArray:
+        """The same as a unit vector (2,)."""
+        return np.array([math.cos(self.angle), math.sin(self.angle)])
+
+    @property
+    def cap(self) -> FloatArray:
+        """The line across it, from the left of the beam to the right (2, 2) [m]."""
+        aside = 0.5 * self.thickness * np.array([-self.along[1], self.along[0]])
+        return np.array([self.at + aside, self.at - aside])
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnParts:
+    """What a part is united from.
+
+    Attributes
+    ----------
+    pieces, holes : list of OutlinePiece
+        All that is united, and what is then cut out of eyes.
+    blocks : list of DrawnBlock
+        Pads, eyes and bars among the pieces: of the described half, and between both.
+    """
+
+    pieces: list[OutlinePiece]
+    holes: list[OutlinePiece]
+    blocks: list[DrawnBlock]
+
+
+def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[str, list[BeamStrip]]:
+    """Return beams by name, those of a mirrored half with a prime."""
+    if (axis := mirror_axis(assembly)) is None:
+        return beams
+    return {**beams, **{f"{name}'": [strip.mirrored(*axis) for strip in found] for name, found in beams.items()}}
+
+
+def drawn_parts(assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float) -> DrawnParts:
+    """Return strips, what closes them where they meet, and the blocks at their ends.
+
+    Nothing else is added: pieces that continue each other share their end, however thick each is there.
+    """
+    halves, axis = both_halves(assembly, beams), mirror_axis(assembly)
+    pieces = [strip.piece for found in halves.values() for strip in found]
+    for name, found in halves.items():
+        for one, two in itertools.pairwise(found):
+            pieces += _closed([BeamEnd(name, one, True), BeamEnd(name, two, False)])
+    for ends in meeting_ends(assembly, halves).values():
+        pieces += _closed(ends)
+    blocks = list(_blocks(assembly, beams))
+    solid = [block.shape for block in blocks]
+    eyes = [end for node, ends in meeting_ends(assembly, halves).items() if _pinned(assembly, node) for end in ends]
+    blocks += [
+        DrawnBlock(f"the eye of {end.beam} at {node}", (node,), disc(end.at, EYE * end.thickness, bulge))
+        for node, ends in meeting_ends(assembly, beams).items()
+        if _pinned(assembly, node)
+        for end in ends
+    ]
+    if axis is not None:
+        bars = bars_between_halves(assembly, beams, *axis)
+        solid += [mirrored(shape, *axis) for shape in solid] + list(bars.values())
+        blocks += [DrawnBlock(f"the bar of {node}", (node, f"{node}'"), bar) for node, bar in bars.items()]
+    pieces += [OutlinePiece.polygon(shape) for shape in solid] + [_round(end, EYE) for end in eyes]
+    return DrawnParts(pieces, [_round(end, HOLE) for end in eyes], blocks)
+
+
+def _round(end: BeamEnd, size: float) -> OutlinePiece:
+    """Return a disc about the end of a beam, of a radius in its thicknesses."""
+    return OutlinePiece.disc((float(end.at[0]), float(end.at[1])), size * end.thickness)
+
+
+def _pinned(assembly: Assembly, node: str) -> bool:
+    """Tell whether the beams at a node of either half end in eyes."""
+    support = assembly.network.nodes[node.rstrip("'")].support
+    return support.across and not support.rotation and not is_padded(assembly, node.rstrip("'"))
+
+
+def meeting_ends(assembly: Assembly, halves: dict[str, list[BeamStrip]]) -> dict[str, list[BeamEnd]]:
+    """Return the ends of beams by node; nodes of a mirrored half have a prime, unless they are on the axis."""
+    found: dict[str, list[BeamEnd]] = {}
+    for name, own in halves.items():
+        beam, image = assembly.network.beams[name.rstrip("'")], name.endswith("'")
+        for node, end in ((beam.start, BeamEnd(name, own[0], False)), (beam.end, BeamEnd(name, own[-1], True))):
+            found.setdefault(f"{node}'" if image and not on_axis(assembly, node) else node, []).append(end)
+    return found
+
+
+def _closed(ends: list[BeamEnd]) -> Iterator[OutlinePiece]:
+    """Yield what closes the ends of beams at a node.
+
+    Where all beams leave to one side, more than half a turn between two of them is open: there the corners of these two
+    and the node are joined, which leaves the section through the corner as thick as the beams. Ends that are a little
+    apart, as where two halves do not quite meet, are joined by the smallest convex piece.
+    """
+    away = [float(np.hypot(*(end.at - ends[0].at))) for end in ends]
+    if max(away) > STANDS * ends[0].thickness:
+        near = [end.cap for end, apart in zip(ends, away, strict=True) if apart < end.thickness]
+        yield from OutlinePiece.around(np.concatenate(near)) if len(near) > 1 else ()
+        return
+    ordered = sorted(ends, key=lambda end: end.angle % math.tau)
+    for one, other in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
+        gap = (other.angle - one.angle) % math.tau
+        if math.pi + ON < gap < math.tau - ON:
+            yield OutlinePiece.polygon(np.array([one.at, one.cap[0], other.cap[1]]))
+
+
+def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[DrawnBlock]:
+    """Yield pads, arms and bars of the described half, all behind the beams that end there."""
+    network, ends = assembly.network, meeting_ends(assembly, beams)
+    for node, own in ends.items():
+        for pad, end in pads_behind(assembly, node, own) if is_padded(assembly, node) else ():
+            yield DrawnBlock(f"the pad of {end.beam} at {node}", (node,), pad)
+        place = np.array([network.nodes[node].x, network.nodes[node].y])
+        for end in own:
+            breadth = PAD * end.thickness
+            if np.hypot(*(end.at - place)) > STANDS * breadth:
+                arm = _bar(place, end.at, breadth, own)
+                yield DrawnBlock(f"the arm of {end.beam} at {node}", (node,), arm)
+    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
+    for link in network.links:
+        a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
+        if np.hypot(*(b - a)) > 0:
+            bar = _bar(a, b, PAD * thick, [*ends.get(link.master, []), *ends.get(link.node, [])])
+            yield DrawnBlock(f"the bar from {link.master} to {link.node}", (link.master, link.node), bar)
+
+
+def is_padded(assembly: Assembly, node: str) -> bool:
+    """Tell whether the beams at a node end in a pad: at a clamp, at a guide, at what moves as one with another node.
+
+    Not on the mirror axis: there the beams of the two halves meet.
+    """
+    if on_axis(assembly, node):
+        return False
+    found = assembly.network.nodes[node]
+    linked = {link.node for link in assembly.network.links}
+    return (found.support.rotation and found.support.across) or node in linked
+
+
+def moves(assembly: Assembly, node: str) -> bool:
+    """Tell whether a pad at a node moves: it is driven, guided or linked."""
+    about = assembly.network.nodes[node].support
+    return node in moving_nodes(assembly) or not (about.along and about.across and about.rotation)
+
+
+def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
+    """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
+    ends = ends_at(assembly, beams, node)
+    if is_padded(assembly, node):
+        for pad, _ in pads_behind(assembly, node, ends):
+            middle: FloatArray = pad.mean(axis=0)
+            return middle
+    found = assembly.network.nodes[node]
+    return np.array([found.x, found.y])
+
+
+def ends_at(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[BeamEnd]:
+    """Return the ends of beams at a node, first those that begin there."""
+    return sorted(meeting_ends(assembly, beams).get(node, []), key=lambda end: end.last)
+
+
+def disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
+    """Return a polygon whose sides are no farther than `bulge` [m] within the circle."""
+    step = 2.0 * math.acos(max(1.0 - bulge / radius, 0.0))
+    turn = np.linspace(0.0, 2 * math.pi, max(_CORNERS, math.ceil(2 * math.pi / step)), endpoint=False)
+    return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def pads_behind(assembly: Assembly, node: str, ends: list[BeamEnd]) -> Iterator[tuple[FloatArray, BeamEnd]]:
+    """Yield the pads behind the ends of the beams at a node, square to them: all beams keep their free length.
+
+    Of beams that leave to opposite sides nothing is behind both: they have no pad.
+    """
+    part, moving = assembly.spec.mechanism.part, moves(assembly, node)
+    for end in ends:
+        depth, half = PAD * end.thickness, 0.5 * PAD * end.thickness
+        if part is not None and part.pad is not None:
+            depth, half = part.pad[0], 0.5 * part.pad[1]
+        if part is not None and part.frame is not None:
+            depth = (part.frame.shuttle if moving else part.frame.wall) or depth
+        side, out = half * np.array([end.along[1], -end.along[0]]), -depth * end.along
+        pad = np.array([end.at + side, end.at - side, end.at - side + out, end.at + side + out])
+        for other in ends:
+            pad = _behind(pad, other) if other is not end else pad
+        if len(pad) > 2 and area_of(pad) > LEAST * depth * half:
+            yield pad, end
+
+
+def _behind(shape: FloatArray, end: BeamEnd) -> FloatArray:
+    """Return what of a convex polygon (n, 2) lies behind the end of a beam [m]; nothing may be left."""
+    ahead = (shape - end.at) @ end.along
+    ahead = np.where(np.abs(ahead) <= STANDS * end.thickness, 0.0, ahead)
+    found = []
+    for a, b, one, other in zip(shape, np.roll(shape, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
+        if one <= 0:
+            found.append(a)
+        if one * other < 0:
+            found.append(a + one / (one - other) * (b - a))
+    return np.array(found).reshape(-1, 2)
+
+
+def area_of(shape: FloatArray) -> float:
+    """Return the area of a polygon (n, 2) [m2]."""
+    x, y = (shape - shape[0]).T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def _bar(a: FloatArray, b: FloatArray, width: float, ends: Sequence[BeamEnd] = ()) -> FloatArray:
+    """Return a bar around the line between two places, with square ends half a width beyond them.
+
+    It does not lie over beams that end at it, but for those that run along it.
+    """
+    along = (b - a) / np.hypot(*(b - a))
+    side, over = 0.5 * width * np.array([-along[1], along[0]]), 0.25 * width * along
+    bar = np.array([a - over - side, b + over - side, b + over + side, a - over + side])
+    for end in ends:
+        if max(float((place - end.at) @ end.along) for place in (a, b)) <= STANDS * width:
+            bar = _behind(bar, end)
+    return bar
+
+
+def bars_between_halves(
+    assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float
+) -> dict[str, FloatArray]:
+    """Return the bars that join the moving parts of two halves, behind the pads, by their nodes."""
+    halves = both_halves(assembly, beams)
+    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
+    found: dict[str, FloatArray] = {}
+    for node in sorted(moving_nodes(assembly)):
+        ends = ends_at(assembly, halves, node)
+        if not ends or on_axis(assembly, node):
+            continue
+        pads = list(pads_behind(assembly, node, ends)) if is_padded(assembly, node) else []
+        middle = _far_side(pads[0][0], pads[0][1]) if pads else _anchor(assembly, beams, node)
+        other = mirrored(middle[None], at, direction)[0]
+        if np.hypot(*(other - middle)) > 0:
+            images = ends_at(assembly, halves, f"{node}'")
+            found[node] = _bar(middle, other, _shuttle(assembly) or PAD * thick, [*ends, *images])
+    return found
+
+
+def _far_side(pad: FloatArray, end: BeamEnd) -> FloatArray:
+    """Return the middle of the side of a pad that is farthest behind its beam [m]."""
+    ahead = (pad - end.at) @ end.along
+    middle: FloatArray = pad[ahead <= ahead.min() + STANDS * end.thickness].mean(axis=0)
+    return middle
+
+
+def _shuttle(assembly: Assembly) -> float | None:
+    part = assembly.spec.mechanism.part
+    return part.frame.shuttle if part is not None and part.frame is not None else None

@@ -1,0 +1,109 @@
+"""What a specification may say about the springs of a cam mechanism."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
+from cfmkit.specs.units import Force, Stiffness
+from cfmkit.stock.springs.spec import Life, SpringWire, settle_rate, wire_of
+
+if TYPE_CHECKING:
+    from cfmkit.stock.springs.offer_type_and_generic_series import Offer
+
+PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
+
+
+class Springs(Model):
+    """Springs in parallel between the two roller axes."""
+
+    stiffness: PositiveStiffness | tuple[PositiveStiffness, ...] | None = Field(
+        None, description="of one spring, or a list with the measured value of each; default: from 'wound'"
+    )
+    count: int | None = Field(
+        None, ge=1, le=1000, description="number of equal springs; default 1, or the list's length"
+    )
+    preload: NonNegativeLength | None = Field(
+        None, description="elongation of the springs at the start, with the rollers at `rest_half_width`; default 0"
+    )
+    rest_length: PositiveLength | None = Field(
+        None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
+    )
+    initial_tension: Annotated[Force, Field(ge=0)] = Field(
+        0.0, description="force at which one spring begins to open: it pulls with so much more than its elongation says"
+    )
+    max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed for a spring")
+    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
+    wound: SpringWire | None = Field(
+        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
+    )
+    life: Life | None = None
+
+    @model_validator(mode="after")
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, "extension", info)
+        return self
+
+    @model_validator(mode="after")
+    def _one_way_to_say_preload(self) -> Self:
+        if self.preload is not None and self.rest_length is not None:
+            raise ValueError("'preload' and 'rest_length' say the same: give one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _count_fits_the_list(self) -> Self:
+        if isinstance(self.stiffness, tuple):
+            if not self.stiffness:
+                raise ValueError("'stiffness' needs at least one value")
+            if self.count not in (None, len(self.stiffness)):
+                raise ValueError(f"'count' is {self.count} but 'stiffness' lists {len(self.stiffness)} springs")
+        return self
+
+    @classmethod
+    def of(cls, offer: Offer, count: int) -> Self:
+        """Return some springs of one that is on offer."""
+        about = {
+            "stiffness": offer.rate,
+            "count": count,
+            "initial_tension": offer.initial_tension or None,
+            "max_elongation": offer.largest,
+            "name": offer.name,
+            "wound": wire_of(offer),
+            "life": offer.life,
+        }
+        return cls.model_validate({key: value for key, value in about.items() if value is not None})
+
+    @property
+    def each(self) -> float | tuple[float, ...]:
+        """Stiffness of one spring, or of each, [N/m]."""
+        return 0.0 if self.stiffness is None else self.stiffness
+
+    @property
+    def total(self) -> float:
+        """K, the sum of all parallel springs [N/m]."""
+        if isinstance(self.each, tuple):
+            return sum(self.each)
+        return self.each * (self.count or 1)
+
+    @property
+    def tension_stretch(self) -> float:
+        """Elongation at which springs without initial tension would pull as hard as these when they open [m]."""
+        if not self.initial_tension:
+            return 0.0
+        count = len(self.each) if isinstance(self.each, tuple) else self.count or 1
+        return count * self.initial_tension / self.total
+
+    def scaled_to(self, total: float) -> Springs:
+        """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any.
+
+        Their initial tension is in proportion, if they have any.
+        """
+        made: dict[str, Any] = {} if self.wound is None else {"wound": None, "name": None, "life": None}
+        if self.initial_tension:
+            made["initial_tension"] = self.initial_tension * total / self.total
+        if isinstance(self.stiffness, tuple):
+            values = tuple(value * total / self.total for value in self.stiffness)
+            return self.model_copy(update={"stiffness": values} | made)
+        return self.model_copy(update={"stiffness": total / (self.count or 1)} | made)

@@ -1,0 +1,54 @@
+"""The window in which a cam as it was built is judged, and which part of it was measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE
+from cfmkit.specs.units import between
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.families.cam.solution import Built
+
+
+def travel_window(built: Built) -> tuple[float, float]:
+    """Return the window in travels, by default all of them [m]."""
+    window = built.assembly.spec.analysis.window
+    if window is None:
+        return float(built.travel[0]), float(built.travel[-1])
+    low, high = between(window, requested_travel(built))
+    return low - built.origin, high - built.origin
+
+
+def large_holes(built: Built) -> tuple[tuple[float, float], ...]:
+    """Return the travels in the window at which the force is not known [m]."""
+    start, stop = travel_window(built)
+    inside = ((max(low, start), min(high, stop)) for low, high in built.unmeasured)
+    return tuple((low, high) for low, high in inside if high - low > LARGEST_HOLE * (stop - start))
+
+
+def profile_coverage(built: Built) -> float:
+    """Return which part of the window is known."""
+    start, stop = travel_window(built)
+    missing = sum(max(min(high, stop) - max(low, start), 0.0) for low, high in built.unmeasured)
+    return 1.0 - missing / (stop - start)
+
+
+def window_mask(built: Built) -> NDArray[np.bool_]:
+    """Return which travels lie in ``analysis.window``."""
+    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
+    if window is None:
+        return np.ones(len(place), dtype=bool)
+    low, high = between(window, requested_travel(built))
+    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
+    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
+
+
+def requested_travel(built: Built) -> tuple[float, float]:
+    """Return where the displacement starts and where it was to end [m]."""
+    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
+    return start + built.origin, end + built.origin

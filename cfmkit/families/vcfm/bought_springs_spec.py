@@ -1,0 +1,72 @@
+"""What a specification may say about springs that are bought in place of a structure of leaves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from cfmkit.specs.spec import PositiveLength
+from cfmkit.specs.units import Force, Stiffness
+from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
+from cfmkit.stock.springs.spec import Life, SpringSupport, SpringWire, settle_rate
+
+if TYPE_CHECKING:
+    from cfmkit.stock.springs.helical_spring_formulas import Wound
+
+
+class BoughtSprings(SpringSupport):
+    """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
+
+    Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
+    shorter (longer) than relaxed, and all are relaxed as made.
+    """
+
+    kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
+    count: int = Field(1, ge=1, le=1000, description="how many in parallel")
+    initial_tension: Annotated[Force, Field(ge=0)] = Field(
+        0.0, description="force at which an extension spring begins to open"
+    )
+    max_elongation: PositiveLength | None = Field(
+        None, description="largest elongation (or compression) allowed for a spring"
+    )
+    free_length: PositiveLength | None = Field(
+        None, description="relaxed length, for drawings and for the space required"
+    )
+    body_length: PositiveLength | None = Field(
+        None, description="with the turns touching; default: of closed ends, from 'wound'"
+    )
+    outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
+    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
+    wound: SpringWire | None = Field(
+        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
+    )
+    life: Life | None = None
+
+    @model_validator(mode="after")
+    def _rate_is_known(self, info: ValidationInfo) -> Self:
+        settle_rate(self, self.kind, info)
+        if self.initial_tension and self.kind == "compression":
+            raise ValueError("'initial_tension' applies to extension springs only: compression springs have none")
+        self.check_guide(self.kind, self.coil, self.outer_diameter)
+        return self
+
+    @property
+    def coil(self) -> Wound | None:
+        """Its wire, coil and turns; None if they are not stated."""
+        return None if self.wound is None else self.wound.wound(self.kind)
+
+    @property
+    def unguided(self) -> float:
+        """Deflection up to which it does not buckle without a guide [m]; infinite if it never does."""
+        return unguided_deflection(self.kind, self.free_length, self.coil, self.outer_diameter, self.seats)
+
+    @property
+    def rate(self) -> float:
+        """Stiffness of one [N/m]."""
+        return self.stiffness or 0.0
+
+    def load(self, deflection: float) -> float:
+        """Return the load of one at a deflection [N]: none where it is relaxed, whatever its initial tension."""
+        return self.initial_tension * (deflection > 0) + self.rate * max(deflection, 0.0)

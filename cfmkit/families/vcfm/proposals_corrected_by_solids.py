@@ -1,0 +1,68 @@
+"""A proposed mechanism of V-beams and a spring, with the sizes that its leaves and its spring need as planar solids."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.flattest_window import INSIDE
+from cfmkit.families.run_control import Run
+from cfmkit.families.stiffening_of_wide_beams import aim_below_stiffening
+from cfmkit.families.vcfm.exact_model import analyze
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.plane_fem_analysis import SolidSampler
+from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
+from cfmkit.specs.units import Place
+
+if TYPE_CHECKING:
+    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.wishes import Wish
+
+NEARBY = np.linspace(0.9, 1.1, 21)
+"""Middles of windows of a solid that are looked at, over that of its beams."""
+
+
+def correct(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a mechanism with the window, the widths and, where the stress needs it, the lengths of its solids.
+
+    The force is linear in both widths: of windows around the present one that is taken in which the widths that fit the
+    force best leave the least of it. Longer leaves of the same rise are stressed less, as one over the length squared;
+    their force falls with its cube.
+    """
+    wish = aim_below_stiffening(spec, wish, analyze)
+    solid = spec.replace({"analysis.fidelity": "solid", "requirements": (), "sensitivity": None})
+    window = solid.analysis.window
+    middle = 0.5 * (float(window[0]) + float(window[1])) if window else 0.5 * spec.travel
+    ends = [share * middle + 0.5 * wish.travel for share in NEARBY if share * middle > 0.5 * wish.travel]
+    if not ends:
+        return solid
+    free = {"analysis.travel": max(ends), "analysis.window": None, "analysis.preloads": (0.0,)}
+    sampler = SolidSampler(solid.replace(free), max(ends), 0.0, Run())
+    tried = [fit_in_window(sampler, end - 0.5 * wish.travel, wish.target, wish.travel) for end in ends]
+    known = [one for one in tried if one is not None]
+    if not known:
+        return solid
+    _, at, wide, stiff = min(known)
+    last = at + 0.5 * wish.travel
+    leaf = float(sampler.leaves(np.linspace(0.0, last, 201)).stress.max())
+    preloads, largest = solid.analysis.preloads, max(solid.analysis.preloads)
+    force, stress = sampler.spring(np.array([last - wish.travel, last]))
+    side = float(np.max(stress)) * float(parts(solid).spring.stress(last + largest) / parts(solid).spring.stress(last))
+    rate = stiff * float(force[1] - force[0]) / wish.travel
+    strength = wish.strength_used * (solid.mechanism.material.allowable(1.0) or np.inf)
+    longer = [max(1.0, sqrt(1.02 * one / strength)) for one in (leaf, side)]
+    made = solid
+    if solid.mechanism.springs is None:
+        made = lengthened(solid, longer)
+        preloads = preloads_for(spec, wish, 1.0 / rate, solid.analysis.preloads)
+    else:
+        made = lengthened(solid, [longer[0], 1.0])
+    made = widened(made, wide * longer[0] ** 3, stiff * longer[1] ** 3)
+    begin = last - wish.travel * (1.0 + INSIDE)
+    changes = {
+        "analysis.window": (Place(begin, "length"), Place(last, "length")), "analysis.travel": last,
+        "analysis.preloads": preloads,
+    }  # fmt: skip
+    return opened(made.replace(changes), last, preloads)

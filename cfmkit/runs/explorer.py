@@ -1,0 +1,308 @@
+"""A specification whose numbers are moved by sliders, with everything computed again as they move.
+
+`Explorer` holds the file as it was written and answers changes of it as data for a page. Changes are those of
+``--set``: a page can say no more than a command line.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit import api
+from cfmkit.errors import CfmError, OutputError, UsageError, lines_of, visible
+from cfmkit.runs.html_report_of_run import ENDS, escaped_json, part, template
+from cfmkit.runs.specfile import bind, changed, read_spec
+from cfmkit.specs.units.strict_decimal_number import NUMBER
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.curves import Curve
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.yamlio import Document
+
+
+LEFT_OUT = ("cfmkit", "family", "name", "description", "design", "sweep", "sensitivity")
+"""Blocks without sliders: what is analysed does not depend on them."""
+
+MOST_POINTS = 600
+"""Points of a branch that the page draws: more than there are pixels across its diagram."""
+
+SPAN = 0.5
+"""Share of a value by which its slider goes down and up: far enough to see a trend, near enough to stay a mechanism."""
+
+PAIRS = {name: ("x", "y") for name in ("at", "mirror")} | {
+    name: ("from", "to") for name in ("window", "over", "travel")
+}
+"""What the two numbers of a list are called."""
+
+OWN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.ya?ml")
+"""Names of files that the page may save: no folder, nothing hidden."""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number of the specification that can be moved.
+
+    Attributes
+    ----------
+    path : str
+        Dotted, as ``--set`` takes it.
+    value, low, high, step : float
+        In its unit.
+    unit : str
+        As the file has it; empty for a plain number.
+    about : str
+        What it is.
+    whole : bool
+        Whether it is a whole number.
+    """
+
+    path: str
+    value: float
+    low: float
+    high: float
+    step: float
+    unit: str
+    about: str
+    whole: bool
+
+    @property
+    def label(self) -> str:
+        """What stands beside it: the key, or what a number of a list is."""
+        *_, group, key = ("", *self.path.split("."))
+        if not key.isdecimal():
+            return key.replace("_", " ")
+        pair = PAIRS.get(group, ())
+        return pair[int(key)] if int(key) < len(pair) else f"number {int(key) + 1}"
+
+
+@dataclass
+class Explorer:
+    """A specification to be explored.
+
+    Attributes
+    ----------
+    source : str
+        The file.
+    document : Document
+        What it says.
+    folder : Path
+        That of the file; what the page saves is written there, and nowhere else.
+    """
+
+    source: str
+    document: Document
+    folder: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Note the folder beside which nothing is read or written."""
+        self.folder = Path(self.source).absolute().parent
+
+    @classmethod
+    def of(cls, source: str, changes: tuple[str, ...] = ()) -> Explorer:
+        """Return the explorer of a file.
+
+        Raises
+        ------
+        cfmkit.errors.UsageError
+            If it cannot be read.
+        cfmkit.errors.SpecError
+            With every problem in it.
+        """
+        document = read_spec(source, changes)
+        bind(document)
+        return cls(source, document)
+
+    def spec(self, changes: Sequence[str] = ()) -> Spec:
+        """Return the specification with changes."""
+        return bind(changed(self.document, changes))
+
+    def sliders(self) -> tuple[Slider, ...]:
+        """Return a slider for every number of the specification, those that it leaves to their defaults included."""
+        from cfmkit.specs.keys_and_schema import keys
+        from cfmkit.specs.yamlio import read_document
+
+        spec = self.spec()
+        known = {key.path: key for key in keys(type(spec))}
+        tree = read_document(api.dumps(spec, complete=True), "spec").tree
+        found = []
+        for path, value in _leaves({key: tree[key] for key in tree if key not in LEFT_OUT}):
+            key = known.get(re.sub(r"\.\d+", "[]", path)) or known.get(re.sub(r"\.\d+$", "", path))
+            about, whole = (key.description, key.kind == "whole number") if key else ("", False)
+            if (slider := _slider(path, value, about, whole)) is not None:
+                found.append(slider)
+        return tuple(found)
+
+    def answer(self, changes: Sequence[str]) -> dict[str, Any]:
+        """Return what a page shows of the changed specification: curve, metrics, requirements, or what is wrong."""
+        start = time.perf_counter()
+        try:
+            result = api.analyze(self.spec(changes))
+            found = _shown(result)
+        except CfmError as error:
+            found = {"problem": [line.removeprefix("error    ") for line in lines_of(error)]}
+        return found | {"seconds": time.perf_counter() - start}
+
+    def drawing(self, changes: Sequence[str]) -> dict[str, Any]:
+        """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
+        from cfmkit.families import family
+        from cfmkit.plots.figures import moving_of
+        from cfmkit.plots.poses_in_one_svg import still
+
+        try:
+            result = api.analyze(self.spec(changes))
+            moving = moving_of(family(result.spec.family), result)
+        except CfmError:
+            moving = None
+        drawn = "" if moving is None else still(moving, len(moving.motion) // 2, "the mechanism to scale, half way")
+        return {"svg": drawn}
+
+    def yaml(self, changes: Sequence[str]) -> str:
+        """Return the specification with changes as YAML."""
+        return api.dumps(self.spec(changes))
+
+    def save(self, name: str, changes: Sequence[str]) -> dict[str, Any]:
+        """Write the specification with changes beside its file; nothing is replaced.
+
+        Raises
+        ------
+        cfmkit.errors.UsageError
+            If it is not the plain name of a YAML file.
+        cfmkit.errors.OutputError
+            If there is such a file, or it cannot be written.
+        """
+        from cfmkit.store.safe_disk_changes import reporting, write_new
+
+        if not OWN_NAME.fullmatch(name):
+            raise UsageError(f"{visible(name)!r}: name a file such as mine.yaml, without a folder")
+        target = self.folder / name
+        if target.exists() or target.is_symlink():
+            raise OutputError(f"cannot write {visible(name)}: a file of that name is in the way")
+        with reporting(name):
+            write_new(target, self.yaml(changes).encode())
+        return {"saved": name}
+
+    def page(self, token: str, nonce: str = "") -> bytes:
+        """Return the page; its script reports with a token who it is, and runs only with the nonce of this answer."""
+        spec = self.spec()
+        groups: dict[str, list[Slider]] = {}
+        for slider in self.sliders():
+            groups.setdefault(slider.path.rpartition(".")[0], []).append(slider)
+        data = {"token": token, "source": self.source, "first": self.answer(())}
+        text: str = template("explorer.html.j2").render(
+            title=spec.name,
+            family=spec.family,
+            groups={name: (_legend(name, spec), sliders) for name, sliders in groups.items()},
+            data=escaped_json(data),
+            nonce=nonce,
+            style=part("report.css") + part("explorer.css"),
+            script=part("explorer.js"),
+            suggestion=suggested_name(Path(self.source).stem),
+        )
+        return text.encode()
+
+
+def suggested_name(stem: str) -> str:
+    """Return the name under which the page offers to save: that of the file, as far as `OWN_NAME` has such letters.
+
+    Examples
+    --------
+    >>> suggested_name("cam 2"), suggested_name("träger<b>"), suggested_name(".-")
+    ('cam 2-explored.yaml', 'tr-ger-b-explored.yaml', 'explored.yaml')
+    """
+    plain = re.sub(r"[^A-Za-z0-9._ -]+", "-", stem).strip("._ -")[:60].rstrip("._ -")
+    return f"{plain}-explored.yaml" if plain else "explored.yaml"
+
+
+def _legend(group: str, spec: Spec) -> str:
+    """Return what stands above a group of sliders: its path; of a requirement, also which metric it is about."""
+    match = re.match(r"requirements\.(\d+)", group)
+    return f"{group}: {spec.requirements[int(match[1])].metric}" if match else group
+
+
+def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(tree, dict):
+        for key, value in tree.items():
+            if "." not in key:
+                yield from _leaves(value, f"{path}.{key}" if path else key)
+    elif isinstance(tree, tuple | list):
+        for number, value in enumerate(tree):
+            yield from _leaves(value, f"{path}.{number}")
+    else:
+        yield path, tree
+
+
+def _slider(path: str, value: Any, about: str, whole: bool) -> Slider | None:
+    """Return the slider of a leaf; None if it is not a number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    unit = ""
+    number = value
+    if isinstance(value, str):
+        match = NUMBER.match(value)
+        if match is None or not re.fullmatch(r" ?[^\s\d].*", value[match.end() :]):
+            return None
+        number, unit = float(match[0]), value[match.end() :].strip()
+    number = float(number)
+    if not np.isfinite(number):
+        return None
+    low, high = sorted((number * (1 - SPAN), number * (1 + SPAN))) if number else (0.0, 1.0)
+    if whole:
+        low, high = float(np.floor(low)), float(np.ceil(high)) + (not number)
+    step = 1.0 if whole else 10.0 ** np.round(np.log10((high - low) / 200))
+    return Slider(path, number, float(f"{low:.6g}"), float(f"{high:.6g}"), float(f"{step:.1e}"), unit, about, whole)
+
+
+def _shown(result: Result) -> dict[str, Any]:
+    """Return a result as data for the page."""
+    from cfmkit.families import family
+    from cfmkit.runs.run_outcome import report_on
+    from cfmkit.specs.units import border_unit, format_short
+
+    report = report_on(result)
+    tone, words = ENDS.get(int(report.exit_code), ("warn", "the run ended early"))
+    first = (*family(result.spec.family).leading, "force_mean", "torque_mean", "force_ripple", "torque_ripple")
+    known = {name: report.metrics[name] for name in dict.fromkeys(first) if name in report.metrics}
+    found: dict[str, Any] = {
+        "tone": tone,
+        "verdict": words,
+        "message": report.message,
+        "requirements": [{"sentence": one.sentence, "ok": one.ok} for one in report.requirements],
+        "warnings": [{"name": one.name, "message": one.message} for one in report.warnings],
+        "metrics": [
+            [name.replace("_", " "), one.word or format_short(one.value, one.dimension), one.definition]
+            for name, one in known.items()
+            if one.value is not None
+        ],
+    }
+    if result.curves:
+        curve = result.curves[0]
+        found["curve"] = {
+            "x": f"{curve.motion_name} [{border_unit(curve.motion_dimension)}]",
+            "y": f"{curve.kind} [{border_unit(curve.kind)}]",
+            "branches": dict(_branches(curve)),
+        }
+    return found
+
+
+def _branches(curve: Curve) -> Iterator[tuple[str, list[list[float | None]]]]:
+    from cfmkit.specs.units import to_border
+
+    for name in dict.fromkeys(curve.branches):
+        on = np.flatnonzero(curve.branch == name)
+        on = on[np.unique(np.linspace(0, len(on) - 1, min(len(on), MOST_POINTS)).round().astype(int))]
+        motion = to_border(curve.motion[on], curve.motion_dimension)
+        effort = to_border(curve.effort[on], curve.kind)
+        yield name, [[_number(value) for value in side] for side in (motion, effort)]
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.5g}") if np.isfinite(value) else None

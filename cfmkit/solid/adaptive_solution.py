@@ -1,0 +1,363 @@
+"""A part on meshes that are refined until its force is known as closely as requested, and how closely it is known.
+
+The part is followed on a coarse mesh, then on the same mesh with every triangle split in four. What the two differ by
+in an element says how much of the error was there, and how much is left follows from the order of convergence that it
+has at least: at a reentrant corner or the end of a clamp the stress is singular and the error falls like the size;
+elsewhere it falls like the square, and in fact like the fourth power (benchmarks/solid_mesh_error.py). Where more is
+left than is allowed, the elements with the most of it are split again. Nothing is extrapolated: values are those of the
+last mesh.
+
+The force is the derivative of the energy with respect to the travel, so its error is that of the energy's: the tangent
+energy of the missing displacements and of the missing slopes of the path, a sum over the elements [BR].
+
+Reference
+---------
+[BR] R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite element methods,
+Acta Numerica 10 (2001) 1-102.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.one_blas_thread import one_blas_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.solid.equilibrium import Balance
+    from cfmkit.solid.mesh_refinement import RefinedMesh
+    from cfmkit.solid.meshed_part import Meshed, MeshSolution, Part
+
+    Report = Callable[[float, str], None]
+
+SINGULAR_LEFT = 1.5
+"""Error left at a singular point, in what splitting took away: 1 where it falls like the size, the least there is."""
+SMOOTH_LEFT = 1.0 / 3.0
+"""Error left elsewhere, in what splitting took away: it falls like the square at least."""
+FORCE_ROUNDING = 5e-5
+"""Least error of the force: poses are solved, and arcs drawn, about as closely."""
+STRESS_LEFT, STRESS_LEAST = 1.0, 0.03
+"""Error of the largest stress in what splitting changed, and the least: an average over elements scatters."""
+STRESS_ALLOWED = 0.14
+"""Error of the largest stress from which on a mesh is called coarse."""
+MAX_NODES = 30_000
+"""Of meshes that are refined further: beyond it a pose takes seconds."""
+MAX_ROUNDS = 8
+N_TRIAL_POSES = 5
+"""Poses at which meshes are compared before the last one is followed."""
+AIMED_SHARE = 0.6
+"""Of the allowed error, that refinement is to leave."""
+SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT = 0.5, 1.0 / 8.0
+"""Error expected in a triangle once it is split, in what it was."""
+BETWEEN_SHARE = 0.2
+"""Of the allowed error, that cubics between poses may have."""
+
+
+@dataclass(frozen=True)
+class MeshError:
+    """How closely force and largest stress of a part are known."""
+
+    force_difference: float  # of the last two meshes, in parts of the largest force
+    stress_difference: float  # the same of the largest stress
+    force: float  # error of the force on the last mesh and of cubics between poses, in parts of the largest
+    target: float  # error that was requested
+    between: float = math.nan  # what cubics are off between poses, in parts of the largest force
+
+    @property
+    def stress(self) -> float:
+        """Error of the largest stress, in parts of it."""
+        return max(STRESS_LEFT * self.stress_difference, STRESS_LEAST)
+
+    def values(self) -> dict[str, float | None]:
+        """Return them by the names that every family gives them (`families.fem_results`)."""
+        return {
+            "mesh_force_difference": self.force_difference,
+            "mesh_stress_difference": self.stress_difference,
+            "mesh_force_error": self.force,
+            "mesh_stress_error": self.stress,
+            "curve_error": None if math.isnan(self.between) else self.between,
+        }
+
+    def worse(self, other: MeshError) -> MeshError:
+        """Return the larger of both, each."""
+        return MeshError(
+            max(self.force_difference, other.force_difference),
+            max(self.stress_difference, other.stress_difference),
+            max(self.force, other.force),
+            self.target,
+            float(np.fmax(self.between, other.between)),
+        )
+
+    def too_large(self) -> Iterator[tuple[str, str]]:
+        """Yield the name of a finding and what it says, if an error is larger than allowed."""
+        if self.force > self.target or self.stress > STRESS_ALLOWED:
+            yield (
+                "mesh_coarse",
+                f"the force is known to {100 * self.force:.2g} % of the largest (requested: "
+                f"{100 * self.target:.2g} %), the largest stress to {100 * self.stress:.2g} %: meshes of more than "
+                f"{MAX_NODES} nodes are not refined, and poses at most doubled",
+            )
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """Where a part leaves its path for another branch, and how closely that is known."""
+
+    travel: float  # [m or rad]
+    effort: float  # [N or N m]
+    error: float  # of both, each in parts of its own value; NaN if the coarser mesh has no such point
+
+
+@dataclass(frozen=True)
+class AdaptiveSolution:
+    """A part followed on a mesh that was refined, and how closely its force is known."""
+
+    solution: MeshSolution
+    error: MeshError
+    meshed: Meshed
+    critical_points: tuple[CriticalPoint, ...] = ()
+
+    def no_curve(self, poses: int) -> str:
+        """Return why there are fewer poses than a curve needs; empty if there are enough."""
+        course = self.solution.course
+        return course.ended if len(course.poses) < poses else ""
+
+
+@dataclass(frozen=True)
+class DrivenPart:
+    """A part with what is needed to follow it."""
+
+    name: str  # for files
+    part: Part
+    error: float  # that the force may have, in parts of the largest
+    stops: tuple[float, ...]  # travels to solve for, from rest on in one direction [m or rad]
+
+    @one_blas_thread
+    def solved(self, report: Report = lambda _share, _text: None) -> AdaptiveSolution:
+        """Return the part on a mesh on which its force is known as requested, or as closely as `MAX_NODES` allow.
+
+        Raises
+        ------
+        cfmkit.errors.GeometryError
+            If the outline cannot be meshed, or no node is where the part is held.
+        """
+        meshed = self.part.meshed()
+        allowed = BETWEEN_SHARE * self.error
+        coarse = meshed.densely(self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), allowed)
+        if len(coarse.course.poses) < 2:
+            return AdaptiveSolution(coarse, MeshError(math.nan, math.nan, math.nan, self.error), meshed)
+
+        def report_fine(share: float) -> None:
+            report(FIRST_SHARE + (1.0 - FIRST_SHARE) * share, "fine mesh")
+
+        finer, refinement = meshed.refined()
+        solution = _followed_alike(finer, PoseGuide(coarse, finer, (refinement,)), self.stops, report_fine)
+        differences = solution.differences(coarse)
+        trial = _trial_travels(solution, coarse)
+        level = Level.of(finer, refinement, _states(solution, trial), _states(coarse, trial))
+        before = coarse
+        allowed, refinements = self.error - np.nan_to_num(coarse.between), []
+        for _ in range(MAX_ROUNDS):
+            if level.error <= allowed or len(level.meshed.grid.nodes) > MAX_NODES:
+                break
+            if (refined := level.refined(allowed)) is None:
+                break
+            level, refinement = refined
+            refinements.append(refinement)
+        if refinements:
+            guide = PoseGuide(solution, level.meshed, tuple(refinements))
+            before, solution = solution, _followed_alike(level.meshed, guide, self.stops, report_fine)
+        force = level.error + float(np.nan_to_num(coarse.between))
+        error = MeshError(*differences, max(force, FORCE_ROUNDING), self.error, coarse.between)
+        solution = replace(solution, between=coarse.between)
+        return AdaptiveSolution(solution, error, level.meshed, _critical_points(solution, before))
+
+
+FIRST_SHARE = 0.25
+"""Of the time, that the coarse mesh takes."""
+
+
+@dataclass(frozen=True)
+class PoseGuide:
+    """Unknowns on a mesh predicted from those of a coarser one that it was refined from."""
+
+    coarse: MeshSolution
+    meshed: Meshed
+    refinements: tuple[RefinedMesh, ...]
+
+    @cached_property
+    def _poses(self) -> dict[float, Balance]:
+        return {pose.travel: pose for pose in self.coarse.course.poses}
+
+    def __call__(self, travel: float) -> FloatArray | None:
+        """Return the unknowns at a travel [m or rad]; None if the coarser mesh has no pose there."""
+        pose = self._poses.get(travel)
+        return None if pose is None else interpolate_unknowns(self.coarse, pose, self.meshed, self.refinements)
+
+    @property
+    def travels(self) -> tuple[float, ...]:
+        """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
+        course = self.coarse.course
+        near = APART * abs(course.poses[-1].travel - course.poses[0].travel)
+        return tuple(
+            pose.travel
+            for pose in course.poses
+            if all(abs(pose.travel - place) > near for place in course.bifurcations)
+        )
+
+
+APART = 0.01
+"""Distance from a bifurcation within which poses of a coarser mesh are not repeated, in parts of the travel."""
+
+
+def interpolate_unknowns(
+    coarse: MeshSolution, pose: Balance, meshed: Meshed, refinements: Sequence[RefinedMesh]
+) -> FloatArray:
+    """Return unknowns on a mesh from those of a pose of a coarser one that it was refined from."""
+    moved = coarse.moved(pose)
+    for refinement in refinements:
+        moved = refinement.interpolate(moved)
+    free = pose.unknowns[len(coarse.problem.supports.loose) :]
+    return np.concatenate([moved.ravel()[meshed.problem.supports.loose], free])
+
+
+def _followed_alike(
+    meshed: Meshed, guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]
+) -> MeshSolution:
+    """Return the poses of a part at all travels at which a coarser mesh has one, and at the stops."""
+    travels = sorted({*guide.travels, *stops}, reverse=bool(stops[-1] < stops[0]))
+    return meshed.followed(travels, report, guide)
+
+
+def _critical_points(solution: MeshSolution, coarse: MeshSolution) -> tuple[CriticalPoint, ...]:
+    """Return the bifurcations on a mesh, with what they differ by on the coarser one as their error."""
+    span = abs(solution.course.travel[-1] - solution.course.travel[0])
+    found = []
+    for travel in solution.course.bifurcations:
+        effort, error = float(solution.course.effort(np.array([travel]))[0]), math.nan
+        near = [place for place in coarse.course.bifurcations if abs(place - travel) < SAME_BIFURCATION * span]
+        if near and travel and effort:
+            other = min(near, key=lambda place: abs(place - travel))
+            apart = abs(float(coarse.course.effort(np.array([other]))[0]) - effort)
+            error = max(apart / abs(effort), abs(other - travel) / abs(travel), CRITICAL_LEAST)
+        found.append(CriticalPoint(travel, effort, error))
+    return tuple(found)
+
+
+SAME_BIFURCATION = 0.05
+"""Distance of bifurcations on two meshes, in parts of the travel, up to which they are the same one."""
+CRITICAL_LEAST = 1e-4
+"""Least error of a critical travel and effort: where tangents of the curve meet is known about as closely."""
+
+
+def _trial_travels(solution: MeshSolution, coarse: MeshSolution) -> tuple[float, ...]:
+    """Return a few travels of poses of both meshes: even ones, and that at which the forces differ most [m or rad]."""
+    travel, own, other = np.intersect1d(solution.course.travel, coarse.course.travel, return_indices=True)
+    force = np.array([solution.course.poses[k].effort for k in own])
+    apart = np.abs(force - [coarse.course.poses[k].effort for k in other])
+    # a pose at rest has no force and no error
+    even = np.linspace(0, len(travel) - 1, N_TRIAL_POSES + 1).round().astype(int)
+    return tuple(travel[np.unique([*even, apart.argmax()])].tolist())
+
+
+@dataclass(frozen=True)
+class MeshedPose:
+    """An equilibrium on a mesh."""
+
+    solution: MeshSolution
+    pose: Balance
+
+    @property
+    def moved(self) -> FloatArray:
+        """Displacements of the nodes (n, 2) [m]."""
+        return self.solution.moved(self.pose)
+
+    @property
+    def slope(self) -> FloatArray:
+        """Derivatives of the displacements with respect to the travel (n, 2)."""
+        supports, pose = self.solution.problem.supports, self.pose
+        carried = supports.carried(pose.unknowns, pose.travel, np.zeros_like(supports.places))
+        return carried.moves(np.append(pose.slope, 1.0))
+
+
+def _states(solution: MeshSolution, travels: Sequence[float]) -> tuple[MeshedPose, ...]:
+    poses = {pose.travel: pose for pose in solution.course.poses}
+    return tuple(MeshedPose(solution, poses[travel]) for travel in travels)
+
+
+@dataclass(frozen=True)
+class Level:
+    """A mesh and what is left of the error in each of its triangles, at a few poses."""
+
+    meshed: Meshed
+    states: tuple[MeshedPose, ...]
+    left: FloatArray  # of p poses and m triangles, in parts of the largest force, (p, m)
+
+    @property
+    def error(self) -> float:
+        """Error of the force, in parts of the largest, at the worst of the poses."""
+        return float(self.left.sum(axis=1).max())
+
+    @classmethod
+    def of(
+        cls,
+        meshed: Meshed,
+        refinement: RefinedMesh,
+        states: tuple[MeshedPose, ...],
+        coarse: tuple[MeshedPose, ...],
+        left: FloatArray | None = None,
+    ) -> Level:
+        """Return a level from poses on a mesh and on the coarser one, whose triangles had an error left (p, m)."""
+        children = np.bincount(refinement.parents)[refinement.parents]
+        split = children > 1
+        largest = max(abs(state.pose.effort) for state in states)
+        shares = np.where(meshed.singular, SINGULAR_LEFT, SMOOTH_LEFT)
+        found = np.zeros((len(states), len(split)))
+        for row, (state, before) in enumerate(zip(states, coarse, strict=True)):
+            missing, slope = (
+                own - refinement.interpolate(other)
+                for own, other in ((state.moved, before.moved), (state.slope, before.slope))
+            )
+            energy = np.zeros(len(split))
+            energy[meshed.moving] = np.abs(meshed.problem.elements.tangent_energies(state.moved, missing, slope))
+            energy[~split] = 0.0
+            whole = float(energy.sum())
+            apart = abs(state.pose.effort - before.pose.effort) / largest if largest else 0.0
+            found[row] = shares * energy * (apart / whole if whole else 0.0)
+            if left is not None:
+                found[row, ~split] = left[row, refinement.parents[~split]]
+        return cls(meshed, states, found)
+
+    def marked(self, allowed: float) -> NDArray[np.bool_]:
+        """Return the triangles to split, (m,): those with the most error left, so that a part of `allowed` remains."""
+        worst = self.left[self.left.sum(axis=1).argmax()]
+        gain = worst * (1.0 - np.where(self.meshed.singular, SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT))
+        order = np.argsort(-gain)
+        needed = self.error - AIMED_SHARE * allowed
+        count = int(np.searchsorted(np.cumsum(gain[order]), needed)) + 1
+        # a split triangle has about eight new nodes, with those of the neighbours that follow
+        count = min(count, max(1, (MAX_NODES - len(self.meshed.grid.nodes)) // 8))
+        marked = np.zeros(len(worst), bool)
+        marked[order[:count]] = gain[order[:count]] > 0.0
+        return marked
+
+    def refined(self, allowed: float) -> tuple[Level, RefinedMesh] | None:
+        """Return the level with triangles split; None if an equilibrium is not found on it."""
+        meshed, refinement = self.meshed.refined(self.marked(allowed))
+        states = []
+        for state in self.states:
+            guess = interpolate_unknowns(state.solution, state.pose, meshed, (refinement,))
+            pose = meshed.problem.solve(guess, state.pose.travel)
+            if pose is None or pose.unstable > state.pose.unstable:
+                return None
+            states.append(MeshedPose(meshed.at(pose), pose))
+        return Level.of(meshed, refinement, tuple(states), self.states, self.left), refinement

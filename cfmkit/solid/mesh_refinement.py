@@ -1,0 +1,170 @@
+"""Meshes whose marked triangles are split, each inside its parent.
+
+Assumes six-node triangles that meet along whole sides. A marked triangle is split in four by the nodes in the middle of
+its sides; its neighbours are split in two or three, always through their longest side, so that no angle gets smaller
+and smaller [R]. New nodes on the boundary stand on the true edge. Spaces of displacements on straight-sided meshes are
+nested: what two meshes in a row differ by shows the order of convergence, as meshes of a free mesher do not.
+
+Reference
+---------
+[R] M.-C. Rivara, Algorithms for refining triangular grids, Int. J. Num. Meth. Eng. 20 (1984) 745-756.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.solid.elements import CORNERS, shape_functions
+from cfmkit.solid.mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.solid.boundary_and_element_sizes import Ring
+
+    IntArray = NDArray[np.int64]
+
+CHILDREN_BY_SIDES = {
+    (False, False, False): ((0, 1, 2),),
+    (True, False, False): ((2, 0, 3), (1, 2, 3)),
+    (True, True, False): ((2, 0, 3), (3, 1, 4), (2, 3, 4)),
+    (True, False, True): ((3, 2, 5), (0, 3, 5), (1, 2, 3)),
+    (True, True, True): ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+}
+"""Corners of the children by which sides are halved; side 0, from node 0 to node 1, is the longest."""
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedMesh:
+    """A mesh whose triangles are parts of those of another one."""
+
+    mesh: TriangleMesh
+    origins: IntArray  # node of the other mesh that each corner of triangles is, (c,)
+    parents: IntArray  # triangle of the other mesh that each triangle lies in, (m,)
+    node_parents: IntArray  # nodes of the parent triangle of each node, (n, 6)
+    node_shares: FloatArray  # values of their shape functions at the node, (n, 6)
+
+    def between(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which nodes (n,) are chosen ones of the other mesh, or in the middle of a side between two of them."""
+        corners = self.mesh.triangles[:, :3].max(initial=-1) + 1
+        found = np.zeros(len(self.mesh.nodes), bool)
+        found[:corners] = chosen[self.origins]
+        for first, last, middle in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+            ends = self.mesh.triangles[:, [first, last]]
+            found[self.mesh.triangles[:, middle]] = found[ends].all(axis=1)
+        return found
+
+    def interpolate(self, values: FloatArray) -> FloatArray:
+        """Return values (n, ...) at the nodes from values at the nodes of the other mesh."""
+        return np.asarray(np.einsum("na,na...->n...", self.node_shares, values[self.node_parents]))
+
+
+def refine(mesh: TriangleMesh, rings: tuple[Ring, ...], marked: NDArray[np.bool_] | None = None) -> RefinedMesh:
+    """Return a mesh with some triangles split in four, and neighbours as far as they must be.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    rings : tuple of Ring
+        The boundary that it was made on.
+    marked : (m,) array of bool, optional
+        Which triangles are split in four; all if left out.
+    """
+    rotated, halved = _halved_sides(mesh, marked)
+    corners, parents, places = [], [], []
+    patterns = halved[rotated[:, 3:]]
+    for sides, children in CHILDREN_BY_SIDES.items():
+        chosen = np.flatnonzero((patterns == sides).all(axis=1))
+        for child in children:
+            corners.append(rotated[chosen][:, child])
+            parents.append(chosen)
+            places.append(np.broadcast_to(CORNERS[list(child)], (len(chosen), 3, 2)))
+    return _with_side_nodes(
+        mesh, rings, rotated, halved, np.concatenate(corners), np.concatenate(parents), np.concatenate(places)
+    )
+
+
+def _halved_sides(mesh: TriangleMesh, marked: NDArray[np.bool_] | None) -> tuple[IntArray, NDArray[np.bool_]]:
+    """Return the triangles (m, 6), turned so that side 0 is the longest, and which nodes (n,) halve their sides."""
+    points = mesh.nodes[mesh.triangles[:, :3]]
+    lengths = np.hypot(*(np.roll(points, -1, axis=1) - points).transpose(2, 0, 1))
+    # of sides that are equally long but for rounding both neighbours take the same: the one with the larger number
+    ranks = np.round(lengths / lengths.max(), 9)
+    longest = np.where(ranks == ranks.max(axis=1, keepdims=True), mesh.triangles[:, 3:], -1).argmax(axis=1)
+    turn = (longest[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(turn))[:, None]
+    rotated = np.concatenate([mesh.triangles[rows, turn], mesh.triangles[rows, 3 + turn]], axis=1)
+    halved = np.zeros(len(mesh.nodes), bool)
+    halved[rotated[:, 3:] if marked is None else rotated[marked, 3:]] = True
+    while True:
+        sides = halved[rotated[:, 3:]]
+        open_sides = sides.any(axis=1) & ~sides[:, 0]
+        if not open_sides.any():
+            return rotated, halved
+        halved[rotated[open_sides, 3]] = True
+
+
+def _with_side_nodes(
+    mesh: TriangleMesh,
+    rings: tuple[Ring, ...],
+    rotated: IntArray,
+    halved: NDArray[np.bool_],
+    corners: IntArray,
+    parents: IntArray,
+    places: FloatArray,
+) -> RefinedMesh:
+    """Return the mesh of some corners (m, 3), numbered as in the other mesh, with new nodes on their sides."""
+    used = np.unique(corners)
+    number = np.full(len(mesh.nodes), -1)
+    number[used] = np.arange(len(used))
+    sides = np.sort(number[corners[:, [0, 1, 1, 2, 2, 0]]].reshape(-1, 2), axis=1)
+    keys, which = np.unique(sides[:, 0] * len(used) + sides[:, 1], return_inverse=True)
+    ends = np.column_stack([keys // len(used), keys % len(used)])
+    points = mesh.nodes[used]
+    middles = points[ends].mean(axis=1)
+
+    def side_of(first: IntArray, last: IntArray) -> IntArray:
+        low, high = np.minimum(number[first], number[last]), np.maximum(number[first], number[last])
+        return np.asarray(np.searchsorted(keys, low * len(used) + high), np.int64)
+
+    first, last, middle = mesh.edges.T
+    split = halved[middle]
+    low, high = mesh.arcs.T
+    halfway = 0.5 * (low + high)
+    edges = np.concatenate(
+        [
+            np.column_stack([first, last])[~split],
+            np.column_stack([first, middle])[split],
+            np.column_stack([middle, last])[split],
+        ]
+    )
+    arcs = np.concatenate(
+        [
+            mesh.arcs[~split],
+            np.column_stack([low, halfway])[split],
+            np.column_stack([halfway, high])[split],
+        ]
+    )
+    owners = np.concatenate([mesh.rings[~split], mesh.rings[split], mesh.rings[split]])
+    on_edge = side_of(edges[:, 0], edges[:, 1])
+    for owner, ring in enumerate(rings):
+        own = owners == owner
+        middles[on_edge[own]] = ring.at(arcs[own].mean(axis=1))
+    triangles = np.column_stack([number[corners], len(used) + which.reshape(-1, 3)])
+    refined = TriangleMesh(
+        read_only(np.concatenate([points, middles])),
+        triangles,
+        np.column_stack([number[edges], len(used) + on_edge]),
+        owners,
+        read_only(arcs),
+    )
+    at = np.concatenate([places, 0.5 * (places + np.roll(places, -1, axis=1))], axis=1)
+    node_parents, node_places = np.zeros((len(refined.nodes), 6), np.int64), np.zeros((len(refined.nodes), 2))
+    node_parents[triangles] = rotated[parents][:, None]
+    node_places[triangles] = at
+    return RefinedMesh(refined, used, parents, node_parents, shape_functions(node_places))

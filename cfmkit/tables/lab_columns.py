@@ -1,0 +1,368 @@
+"""What the columns of a lab file are: names, units and roles.
+
+Units are read or stated by the user, never guessed. A unit stands in the header as ``Force [N]``, ``Kraft (N)``,
+``s/mm``, ``Load, N`` or ``travel in mm``, in a line of its own below the names, in the cells (``6.00 N``), in a column
+of its own beside the numbers, or in ``--units``. Where two of these contradict each other the file is refused. A
+column's role follows from the dimension of its unit; where several columns qualify, from its name; where that does not
+decide either, the file is refused with the choices.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import DataError, QuantityError, UsageError
+from cfmkit.specs.units.strict_decimal_number import shown
+from cfmkit.specs.units.table import COMMON, UNITS
+from cfmkit.specs.units.unit_size import border_size, is_unit, unit_size
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+
+ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
+"""What a column of a dimension can be."""
+
+_IN_HEADER = (
+    re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]"),
+    re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)"),
+    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),
+    re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"),
+    re.compile(r"(?P<name>.*[^,;:\s])\s*[,;:]\s*(?P<unit>[^,;:]*\S)"),
+    re.compile(r"(?P<name>.*\S)\s+(?P<unit>N|(?!in$|min$)\S\S+)"),
+)
+_OTHER_WORDS = {
+    "°": "deg", "sec": "s", "secs": "s", "sek": "s", "micron": "um", "microns": "um", "inches": "in", "zoll": "in",
+    "kilopond": "kgf", "lbsf": "lbf", "poundsforce": "lbf", "feet": "ft",
+}  # fmt: skip
+_AMBIGUOUS = {"mn"}
+"""Spellings without regard to case that could be two units: mN and MN."""
+
+_NUMBERS_OF_ITEMS = {"-": "1", "": "1", "mm/mm": "1"}
+_LABEL_OF_UNITS = re.compile(r"(?i).*(unit|einheit).*")
+_WORDS = {
+    "time": ("time", "t", "zeit", "temps", "tiempo", "prüfzeit", "test time"),
+    "length": (
+        "displacement", "travel", "stroke", "position", "extension", "deflection", "crosshead", "s", "u", "x",
+        "weg", "traverse", "traversenweg", "standardweg", "hub", "deplacement", "déplacement", "desplazamiento",
+    ),
+    "angle": ("angle", "rotation", "phi", "theta", "winkel", "drehwinkel"),
+    "force": ("force", "load", "f", "kraft", "standardkraft", "load cell", "fuerza", "carga"),
+    "torque": ("torque", "moment", "m", "drehmoment", "par"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ColumnInfo:
+    """One column of a lab file as its header and its cells describe it."""
+
+    index: int  # its place in the file, from 0
+    name: str  # as in the header, without the unit; "column 1" where there is none
+    unit: str | None = None  # as cfmkit spells it; as in the file if it is none; None if it is not stated
+    dimension: str | None = None  # of the unit; None if that is of no use here
+    reported: bool = False  # whether --units names the column
+    source: str = ""  # what says the unit, for messages
+    unit_column: int | None = None  # where the unit of each cell stands, if beside it
+
+    @property
+    def label(self) -> str:
+        """Name and unit for messages: ``'Kraft' [N]``."""
+        return f"{shown(self.name)} [{self.unit}]" if self.unit else f"{shown(self.name)} without a unit"
+
+    def states(self, unit: str, source: str, file: str, place: str = "") -> ColumnInfo:
+        """Return the column with a unit that something says of it.
+
+        Raises
+        ------
+        cfmkit.errors.DataError
+            If something else said another one.
+        """
+        if self.dimension is None:
+            return replace(self, unit=unit, dimension=dimension_of(unit), source=source)
+        if unit != self.unit:
+            verb = "give" if self.source == CELLS else "gives"
+            raise DataError(
+                f"{file}: {place}{self.source} {verb} {shown(self.name)} in {self.unit}, {source} in {unit}; correct "
+                "the one that is wrong"
+            )
+        return self
+
+
+HEADER, UNIT_LINE, CELLS = "the header", "the line of units", "the cells"
+
+
+def read_units(text: str | None) -> dict[str, str]:
+    """Return what ``--units`` says: ``"s=mm,F=N"`` by column.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is malformed or names a unit that there is not.
+    """
+    found: dict[str, str] = {}
+    for part in (text or "").split(","):
+        name, equals, unit = (piece.strip() for piece in part.rpartition("="))
+        if not part.strip() and not (text or "").strip():
+            continue
+        if not equals or not name or not unit or name in found:
+            raise UsageError(
+                f'--units: {shown(part)} is not \'column=unit\'; write e.g. --units "s=mm,F=N", or --units "1=mm,2=N" '
+                "by number"
+            )
+        if dimension_of(unit) is None:
+            raise UsageError(f"--units: {shown(unit)} is not a unit of a time, displacement, angle, force or torque")
+        found[name] = spelt(unit)
+    return found
+
+
+def describe(
+    names: Sequence[str], unit_row: Sequence[str], cells: Mapping[int, str], units: Mapping[str, str], file: str
+) -> list[ColumnInfo]:
+    """Return the columns of a file with what header, cells and ``--units`` say of them.
+
+    Parameters
+    ----------
+    names, unit_row : sequence of str
+        Cells of the lines with the names and the units; empty texts where there is none.
+    cells : mapping of int to str
+        Unit that stands in the cells of a column.
+    units : mapping of str to str
+        What ``--units`` says, by name or by number from 1.
+    file : str
+        For messages.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If two of them contradict each other, or ``--units`` names a column that is not there.
+    """
+    columns = [_described(index, *pair, file) for index, pair in enumerate(zip(names, unit_row, strict=True))]
+    for index, unit in cells.items():
+        columns[index] = columns[index].states(unit, CELLS, file)
+    for key, unit in units.items():
+        index = _index(key, columns, file)
+        columns[index] = replace(columns[index].states(unit, "--units", file), reported=True)
+    return columns
+
+
+def _index(key: str, columns: Sequence[ColumnInfo], file: str) -> int:
+    """Return which column ``--units`` or ``--group`` means, by name or by number from 1."""
+    named = [column.index for column in columns if column.name == key]
+    if len(named) == 1:
+        return named[0]
+    if len(named) > 1:
+        numbers = " and ".join(str(index + 1) for index in named)
+        raise DataError(f"{file}: columns {numbers} are both called {shown(key)}; name the one that is meant by number")
+    if key.isdecimal() and 1 <= int(key) <= len(columns):
+        return int(key) - 1
+    near = get_close_matches(key, [column.name for column in columns], n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(shown(c.name) for c in columns)}"
+    raise DataError(f"{file}: there is no column {shown(key)}{hint}")
+
+
+def column_named(key: str, columns: Sequence[ColumnInfo], file: str) -> ColumnInfo:
+    """Return the column that an option means, by name or by number from 1.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there is none, or there are several.
+    """
+    return columns[_index(key, columns, file)]
+
+
+def _described(index: int, text: str, below: str, file: str) -> ColumnInfo:
+    """Return a column as the header and the line of units describe it."""
+    name, unit = split_header(text)
+    under = _bare_unit(below)
+    if unit is not None and dimension_of(unit) is None and under is not None and dimension_of(under):
+        name, unit = text, None  # such as "Force (compression)"
+    column = ColumnInfo(index, " ".join(name.strip(' "').split()) or f"column {index + 1}")
+    if unit is not None:
+        column = column.states(spelt(unit), HEADER, file)
+    if under is not None and (dimension_of(under) or unit is None):
+        column = column.states(spelt(under), UNIT_LINE, file)
+    return column
+
+
+def split_header(text: str) -> tuple[str, str | None]:
+    """Return name and unit of a header's cell; the unit is None where there is none.
+
+    Examples
+    --------
+    >>> split_header("Kraft (N)"), split_header("s/mm"), split_header("Load, N"), split_header("Force")
+    (('Kraft', 'N'), ('s', 'mm'), ('Load', 'N'), ('Force', None))
+    """
+    text = text.strip().strip('"').strip()
+    for number, pattern in enumerate(_IN_HEADER):
+        match = pattern.fullmatch(text)
+        # A word after "in", a slash, a comma or a space is a unit only if there is such a unit.
+        if match and (number < 2 or dimension_of(match["unit"])):
+            return match["name"], match["unit"].strip()
+    return text, None
+
+
+def is_unit_row(cells: Iterable[str]) -> bool:
+    """Return whether a line has nothing but units, bare or in brackets, at least one, and perhaps the word first."""
+    cells = [cell.strip(' "') for cell in cells]
+    if len(cells) > 1 and _LABEL_OF_UNITS.fullmatch(cells[0]):
+        cells = cells[1:]
+    known = [(unit := _bare_unit(cell)) is not None and is_known(unit) for cell in cells]
+    return any(known) and all(good or not cell or _bracketed(cell) for good, cell in zip(known, cells, strict=True))
+
+
+def _bracketed(cell: str) -> bool:
+    return cell[:1] + cell[-1:] in ("[]", "()")
+
+
+def _bare_unit(cell: str) -> str | None:
+    cell = cell.strip(' "')
+    return (cell[1:-1].strip() if _bracketed(cell) else cell) or None
+
+
+@lru_cache(maxsize=1)
+def _words() -> dict[str, str]:
+    """Return the symbols of units of forces, lengths, angles and times by what else people write, folded."""
+    found: dict[str, str] = {}
+    for unit in UNITS:
+        if unit.dimension in ROLES:
+            names = (unit.symbol, *unit.aliases, unit.name, unit.name + "s", unit.name.replace("meter", "metre"))
+            found |= {_folded(word): unit.symbol for word in names if len(word) > 1}
+    return {word: symbol for word, symbol in (found | _OTHER_WORDS).items() if word not in _AMBIGUOUS}
+
+
+def _folded(unit: str) -> str:
+    return re.sub(r"[\s._-]", "", unit).lower()
+
+
+@lru_cache(maxsize=1024)
+def spelt(unit: str) -> str:
+    """Return a unit as cfmkit spells it; what is none as it is.
+
+    Examples
+    --------
+    >>> spelt("lbF"), spelt("Inches"), spelt("N·mm"), spelt("kgf-cm"), spelt("sec.")
+    ('lbf', 'in', 'N*mm', 'kgf*cm', 's')
+    """
+    unit = unit.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2")
+    if unit in _NUMBERS_OF_ITEMS:
+        return _NUMBERS_OF_ITEMS[unit]
+    if is_unit(unit):
+        return unit
+    if _folded(unit) in _words():
+        return _words()[_folded(unit)]
+    joined = re.fullmatch(r"(?P<one>.*N)(?P<other>[cm]?m)", unit)  # Nmm
+    parts = joined.groups() if joined else re.split(r"\s*[·⋅×*.\s-]\s*", unit)
+    symbols = [part if is_unit(part) else _words().get(_folded(part), "") for part in parts]
+    return "*".join(symbols) if len(symbols) == 2 and all(symbols) else unit
+
+
+def is_known(unit: str) -> bool:
+    """Return whether a text is a unit, in any of the spellings that are read."""
+    return spelt(unit) == "1" or is_unit(spelt(unit))
+
+
+@lru_cache(maxsize=1024)
+def dimension_of(unit: str) -> str | None:
+    """Return which of the dimensions of interest a unit has; None if it has none of them."""
+    symbol = spelt(unit)
+    common = next((name for name in ROLES if (name, symbol) in COMMON), None)
+    if common or not is_unit(symbol):
+        return common
+    try:
+        powers = unit_size(symbol).powers
+    except QuantityError:
+        return None
+    return next((name for name in ROLES if border_size(name).powers == powers), None)
+
+
+def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> dict[str, ColumnInfo]:
+    """Return the columns that are used, by role.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there is no pair of displacement and force or angle and torque, or several; the message has the choices.
+    """
+    pairs = (("length", "force"), ("angle", "torque"))
+    there = {item.dimension for item in numeric}
+    complete = [pair for pair in pairs if set(pair) <= there]
+    if len(complete) > 1:
+        reported = {item.dimension for item in numeric if item.reported}
+        complete = [pair for pair in pairs if set(pair) <= reported] or complete
+    if len(complete) > 1:
+        raise DataError(
+            f"{name}: there are displacement and force, and angle and torque; name the columns that are meant "
+            'with --units, e.g. --units "phi=deg,M=N*mm"'
+        )
+    if not complete:
+        raise DataError(_missing(numeric, columns, name))
+    candidates = {dimension: _candidates(numeric, dimension) for dimension in ("time", *complete[0])}
+    times, motions = candidates["time"], [item for item in numeric if item.dimension == complete[0][0]]
+    beside = [item for item in times if item.index < candidates[complete[0][0]][0].index]
+    if len(times) == len(motions) > 1 and beside:
+        candidates["time"] = beside[-1:]  # each displacement has its time
+    if several := [candidates[one] for one in (*complete[0], "time") if len(candidates[one]) > 1]:
+        raise DataError(_choices(several, name))
+    return {ROLES[dimension]: found[0] for dimension, found in candidates.items() if found}
+
+
+def _candidates(columns: Sequence[ColumnInfo], dimension: str) -> list[ColumnInfo]:
+    """Return the columns that could be of a dimension's role: those of --units, else of the usual name, else all."""
+    found = [column for column in columns if column.dimension == dimension]
+    found = [column for column in found if column.reported] or found
+    named = [column for column in found if re.sub(r"[\W_\d]+", " ", column.name).strip().lower() in _WORDS[dimension]]
+    return named if len(found) > 1 and named else found
+
+
+def _choices(several: Sequence[Sequence[ColumnInfo]], name: str) -> str:
+    """Return what to choose from where several columns could have a role: of columns side by side the pairs."""
+    titles = [column.name for found in several for column in found]
+
+    def key(column: ColumnInfo) -> str:
+        unique = titles.count(column.name) == 1 and not set(column.name) & set(",=")
+        return f"{column.name if unique else column.index + 1}={column.unit}"
+
+    side_by_side = len(several) == 2 and len(several[0]) == len(several[1])
+    sets = list(zip(*several, strict=True)) if side_by_side else [(column,) for column in several[0]]
+    options = " or ".join(f'--units "{",".join(map(key, chosen))}"' for chosen in sets)
+    many = "; ".join(
+        f"{len(found)} columns could be the {ROLES[found[0].dimension or 'time']}: "
+        f"{', '.join(column.label for column in found)}"
+        for found in several
+    )
+    return f"{name}: {many}; choose with {options}"
+
+
+def _missing(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> str:
+    """Return which of displacement and force there is not, and what to do."""
+
+    def key(column: ColumnInfo) -> str:
+        usable = not column.name.startswith("column ") and not set(column.name) & set(",=")
+        return column.name if usable else str(column.index + 1)
+
+    if not any(column.unit for column in columns):
+        example = ",".join(f"{key(column)}=..." for column in numeric[:3])
+        return f'{name}: the header names no units, and they are never guessed; state them with --units "{example}"'
+    there = {item.dimension for item in numeric}
+    lacking = "force" if "length" in there else "displacement" if "force" in there else "displacement and force"
+    lacking = "torque" if "angle" in there and "force" not in there else lacking
+    weighed = next((item for item in numeric if item.unit and item.dimension is None and _is_mass(item.unit)), None)
+    if weighed is not None and "force" not in there:
+        return (
+            f"{name}: {weighed.label} is a mass; if the gauge shows the force of that mass, say so: --units "
+            f'"{key(weighed)}={_folded(weighed.unit or "").removesuffix("s")}f"'
+        )
+    labels = ", ".join(column.label for column in columns)
+    return (
+        f"{name}: no column for the {lacking} was found among {labels}; state which column it is, and its unit, with "
+        "--units"
+    )
+
+
+def _is_mass(unit: str) -> bool:
+    return _folded(unit).removesuffix("s") in ("kg", "g", "lb", "oz")

@@ -1,0 +1,200 @@
+"""Efforts that are zero up to rounding: what is relative to them has no value; `static_balance` judges balancers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from metrics_support import curve
+
+import cfmkit
+from cfmkit.cli.main import main
+from cfmkit.elastica.outcome import member_efforts
+from cfmkit.errors import ExitCode, SpecError
+from cfmkit.families import family
+from cfmkit.families.base import Block, Measure
+from cfmkit.families.beam.model import solve
+from cfmkit.metrics import MeasuringFrame, Window, known_metrics, measure, validate_requirements
+from cfmkit.metrics.ranges_many import ManyBranches, band_range, range_95, range_95_fraction
+from cfmkit.metrics.spread import Spread, deviation_from_mean, half_band, ripple
+from cfmkit.results import Result, Status, round_off
+
+RELATIVE = (
+    *("ripple", "half_band", "deviation_from_mean", "range_95", "range_95_fraction"),
+    *("band_range_05pct", "band_range_1pct", "band_range_5pct", "usable_stroke", "usable_start"),
+)
+
+BALANCER = """\
+cfmkit: 1
+family: beam
+name: balancer
+mechanism:
+  material: {{youngs_modulus: 200 GPa}}
+  thickness: 8 mm
+  width: 8 mm
+  nodes:
+    pivot: {{at: [0 mm, 0 mm], support: pinned}}
+    tip: {{at: [100 mm, 0 mm]}}
+  beams:
+    lever: {{start: pivot, end: tip}}
+  springs:
+    zfl: {{kind: line, start: tip, ground: [0 mm, 80 mm], stiffness: {rate} N/mm, free_length: 0 mm}}
+  loads:
+    - {{kind: point, node: tip, fy: -40 N}}
+  drive: {{kind: rotation, node: pivot}}
+analysis: {{travel: 80 deg, points: 17}}
+"""
+
+TRUSS = """\
+cfmkit: 1
+family: beam
+name: truss
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 3 mm
+  width: 10 mm
+  axial: true
+  nodes:
+    wall: {at: [-100 mm, 0 mm], support: pinned}
+    top: {at: [0 mm, 10 mm], support: guided, direction: 90 deg}
+  beams:
+    half: {start: wall, end: top, end_joint: pin}
+  drive: {kind: displacement, node: top, direction: -90 deg}
+  copies: {mirror: [0 mm, 0 mm]}
+analysis: {travel: 20 mm, points: 21}
+requirements:
+  - {metric: range_95_fraction, min: 70 %}
+"""
+
+
+def noise(kind="force"):
+    return curve((np.linspace(0, 1, 11), 1e-13 * np.cos(7 * np.linspace(0, 1, 11))), kind=kind)
+
+
+def test_nothing_is_relative_to_what_is_below_the_error_of_the_curve():
+    found = measure(noise(), MeasuringFrame(effort_error=1e-12), Window(0.0, 1.0))
+    for name in RELATIVE:
+        name = "force_ripple" if name == "ripple" else name
+        assert found[name].value is None, name
+        assert "zero" in found[name].reason or "usable" in found[name].reason, name
+    assert found["force_mean"].value == 0.0
+    assert measure(noise(), MeasuringFrame(effort_error=1e-16), Window(0.0, 1.0))["half_band"].value is not None
+
+
+def test_a_target_below_the_error_is_none():
+    found = measure(noise(), MeasuringFrame(target=1e-13, effort_error=1e-12))
+    assert "the target is zero" in found["deviation_from_target"].reason
+
+
+def test_one_curve_and_many_agree_on_what_is_nothing():
+    many = Spread.of(np.array([0.5, 5.0]), np.array([1.0, 6.0]), np.array([0.0, 4.0]), np.array([2.0, 2.0]))
+    for metric in (ripple, half_band, deviation_from_mean):
+        assert np.isnan(metric(many)).tolist() == [True, False]
+        assert np.isnan(metric(Spread.of(0.5, 1.0, 0.0, 2.0)))
+    motion = np.array([[0.0, 1.0, 2.0]] * 2)
+    ends = np.zeros(2), np.full(2, 2.0)
+    rows = ManyBranches(motion, np.array([[0.1, 0.2, 0.3], [1.0, 2.0, 3.0]]), *ends, error=np.array([0.5, 0.5]))
+    with np.errstate(all="ignore"):
+        for metric in (range_95, range_95_fraction, lambda one: band_range(one, 0.01)):
+            assert np.isnan(metric(rows)).tolist() == [True, False]
+
+
+def test_rounding_of_a_sum_counts_the_sizes_of_its_parts():
+    assert round_off(np.array([[4.0, 2.0], [-4.0, 1.0]])) == pytest.approx(8e-12)
+
+
+@pytest.mark.parametrize(("rate", "balance"), [(0.5, 0.0), (0.45, 1 / 9), (0.6, 1 / 6)])
+def test_static_balance_of_a_spring_balancer(tmp_path, rate, balance):
+    """T = (k a - P) L cos t, of the spring k a L cos t: their ratio is 1 - P/(k a)."""
+    (tmp_path / "b.yaml").write_text(BALANCER.format(rate=rate), encoding="utf-8")
+    found = cfmkit.analyze(cfmkit.load(tmp_path / "b.yaml")).metrics
+    assert found["static_balance"].value == pytest.approx(balance, rel=1e-6, abs=1e-9)
+    assert (found["torque_ripple"].value is None) == (rate == 0.5)
+    if rate == 0.5:
+        assert "static_balance" in found["torque_ripple"].reason
+        assert found["usable_stroke"].value is None
+
+
+def test_a_truss_that_ends_without_force_misses_its_range(tmp_path, monkeypatch, capsys):
+    """It was 100 %, ok, exit 0."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.yaml").write_text(TRUSS, encoding="utf-8")
+    assert main(["analyze", "t.yaml", "--no-plots"]) == ExitCode.REQUIREMENT_MISSED
+    assert "no value: the force at the end is zero within its numerical error" in " ".join(
+        capsys.readouterr().out.split()
+    )
+    found = cfmkit.analyze(cfmkit.load("t.yaml"))
+    assert found.metrics["half_band"].value is None
+    assert found.metrics["range_fraction"].value is None
+    assert found.metrics["static_balance"].value == pytest.approx(2.0, rel=1e-6)  # two halves alike
+
+
+@pytest.mark.parametrize("name", ["beam_lan2010", "beam_end_effector"])
+def test_the_efforts_of_all_members_are_that_of_the_drive(name):
+    solution = solve(cfmkit.load(f"configs/{name}.yaml"))
+    path, keep = solution.path, solution.keep[1::10]
+    here = replace(path, points=path.points.take(keep), branch=path.branch[keep])
+    ahead, behind = (member_efforts._along(here, step) for step in (1e-6, -1e-6))
+    moved = ahead.drive - behind.drive
+    total = solution.assembly.parallel * member_efforts._works(here, ahead, behind).sum(axis=0) / moved
+    np.testing.assert_allclose(total, solution.effort[1::10], rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("config", "path", "values"),
+    [
+        ("cam", "mechanism.springs.count", (1, 2, 4)),
+        ("slider_crank_li2019", "mechanism.springs.pivot", (0.2, 0.5)),
+        ("vcfm_ding2022", "mechanism.bistable.half_beams", (2, 4)),
+    ],
+)
+def test_the_balance_of_many_designs_is_that_of_each(config, path, values):
+    spec = cfmkit.load(f"configs/{config}.yaml")
+    if "vcfm" in config:
+        spec = spec.replace({"analysis.fidelity": "analytic"})
+    single = [cfmkit.analyze(spec.replace({path: value})).metrics["static_balance"].value for value in values]
+    measure_of_balance = Measure("static_balance", spec.analysis.window)
+    block = Block({path: np.array(values, dtype=float)}, (measure_of_balance,), len(values))
+    answer = family(spec.family).analyze_block(spec, block)
+    assert answer.done.all()
+    many = answer.values[0]["load"]
+    np.testing.assert_allclose(many, single, rtol=1e-6)
+
+
+def test_a_curve_without_parts_has_no_balance():
+    spec = cfmkit.load("configs/cam.yaml")
+    assert "static_balance" not in measure(noise(), MeasuringFrame())
+    assert Result(spec, Status.COMPLETE).effort_error is None
+
+
+@pytest.mark.parametrize(
+    ("requirement", "said"),
+    [
+        ({"metric": "force_ripple", "max": "5"}, "5 is 500 %; did you mean 5 %?"),
+        ({"metric": "range_95_fraction", "min": "70"}, "did you mean 70 %?"),
+        ({"metric": "half_band", "max": "1.5"}, "did you mean 1.5 %?"),
+    ],
+)
+def test_a_share_above_1_is_no_bound(requirement, said):
+    spec = cfmkit.load("configs/beam_lan2010.yaml").replace({"requirements": [requirement]})
+    with pytest.raises(SpecError, match="did you mean") as caught:
+        validate_requirements(spec, known_metrics("force"))
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("analysis.band=5", "did you mean 5 %?"),
+        ("requirements.0.max=5", "did you mean 5 %?"),
+        ("sensitivity={min_yield: 90, parameters: {mechanism.thickness: {normal: 1 %}}}", "did you mean 90 %?"),
+    ],
+)
+def test_a_share_above_1_is_refused_everywhere(change, said, capsys):
+    assert main(["check", "configs/beam_lan2010.yaml", "--set", change]) == ExitCode.INVALID
+    captured = capsys.readouterr()
+    assert said in captured.out + captured.err
+
+
+def test_a_per_cent_sign_means_what_it_says(capsys):
+    change = "requirements=[{metric: force_ripple, max: 150 %}, {metric: safety_factor, min: 2}]"
+    assert main(["check", "configs/beam_lan2010.yaml", "--set", change]) == ExitCode.OK
