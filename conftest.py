@@ -19,6 +19,8 @@ from hypothesis import settings
 
 plugin_support.register()
 
+os.environ["COLUMNS"] = "110"  # as redirected output: no text depends on the terminal in which tests run
+
 settings.register_profile("repeat", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("search" if os.environ.get("CFMKIT_TEST_SEARCH") else "repeat")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import traceback
 from contextlib import suppress
@@ -119,17 +120,18 @@ def _reported(error: BaseException) -> str:
 
 
 _PARSER_WORDS = (
-    ("Value error, ", ""),
-    ("Input should be a valid integer, unable to parse string as an integer", "a whole number is needed"),
+    (r"Value error, ", ""),
+    (r"Input should be a valid integer, unable to parse string as an integer", "a whole number is needed"),
+    (r"'[^']*' is not a valid integer", "a whole number is needed"),  # typer 0.26
 )
-"""Of the library that checks the types of options, and what to say instead."""
+"""Patterns of what the library says that checks the types of options, and what to say instead."""
 
 
 def _of_the_parser(error: Any) -> str:
     """Return what is wrong with the command line, and where to look."""
     message = " ".join(error.format_message().split()).rstrip(".")
     for theirs, ours in _PARSER_WORDS:
-        message = message.replace(theirs, ours)
+        message = re.sub(theirs, ours, message)
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "cfmkit"
     joint = " See" if message.endswith("?") else "; see"
