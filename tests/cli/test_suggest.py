@@ -47,6 +47,7 @@ def published(tmp_path_factory):
     return out, page.getvalue()
 
 
+@pytest.mark.slow
 def test_a_cam_is_suggested_for_a_long_stroke_with_some_loss(published):
     out, _ = published
     found = json.loads((out / "metrics.json").read_text())
@@ -56,6 +57,7 @@ def test_a_cam_is_suggested_for_a_long_stroke_with_some_loss(published):
     assert header.startswith("number,family,variant,force_mean [N],ripple [1]")
 
 
+@pytest.mark.slow
 def test_the_next_line_is_a_command_that_writes_files_to_cut(published, tmp_path):
     out, page = published
     last = page.splitlines()[-1]  # one line, longer than the page is wide
