@@ -63,6 +63,13 @@ def test_what_no_process_makes_is_refused_in_one_line(keys, words):
     assert words in str(problem)
 
 
+@pytest.mark.parametrize("key", ["ripple", "hysteresis", "yield"])
+def test_a_number_for_a_share_is_asked_back_as_a_percentage(key):
+    """Of the yield only one of its bounds was named, without the question."""
+    with pytest.raises(SpecError, match=rf"--{key}: 90 is not allowed: must be > 0 and < 1; did you mean 90 %\?"):
+        block(**{key: "90"})
+
+
 @pytest.mark.parametrize("material", ["pla", "petg", "{youngs_modulus: 2 GPa, yield_strength: 40 MPa}"])
 def test_what_a_process_makes_is_accepted(material):
     assert wish(material=material, process="fdm").process == "fdm"
@@ -134,6 +141,14 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
     spec = cfmkit.loads(one.text)
     assert spec.fidelity == "solid"
     assert all(outcome.ok for outcome in cfmkit.check(cfmkit.analyze(spec)))
+
+
+def test_the_mean_of_a_row_is_that_of_both_directions():
+    """The worst of both counted as a third one: 50.31 N for 50.9 N on the way up and 49.1 N back."""
+    result = cfmkit.analyze(cfmkit.load(CONFIGS / "cam_friction.yaml"))
+    known = cfmkit.evaluate(result)
+    up, down = (known[f"force_mean[{way}]"].value for way in ("load", "unload"))
+    assert judging.numbers_of(result, None, wish())["mean"] == pytest.approx((up + down) / 2, rel=1e-12)
 
 
 def test_the_file_of_a_proposal_keeps_the_whole_wish():
