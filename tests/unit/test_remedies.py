@@ -73,6 +73,12 @@ SPECS = {
     "braced.yaml": BRACED,
     "rescaled.yaml": RESCALED,
     "vee.yaml": VEE.replace("0.05 mm", "1e-6 mm"),
+    "effector.yaml": re.sub(
+        "profile: {.*}",
+        "profile: {kind: file, file: heights.csv}",
+        (CONFIGS / "beam_end_effector.yaml").read_text(encoding="utf-8"),
+    ),
+    "heights.csv": "x [mm],y [mm]\n" + "".join(f"{x},0\n" for x in (0, 1, 2, 3, 4, 8, 9, 10, 11, 12)),
 }
 
 CAM, MOVING = str(CONFIGS / "cam.yaml"), str(CONFIGS / "cam_dynamics.yaml")
@@ -94,6 +100,7 @@ WARNED = {
     "prestressed": ("beam", "closure_prestress", "analyze", LAN, *changed("mechanism.closure=raw")),
     "sharp network": ("beam", "sharp_corners", "analyze", "vee.yaml", *changed("analysis.travel=1 mm"), *COARSE),
     "overstressed rescaled": ("beam", "rescale_stress", "design", "rescaled.yaml"),
+    "hole in a surface": ("beam", "surface_hole", "analyze", "effector.yaml"),
     "objective of the paper": (
         *("beam", "objective_ill_posed", "design", str(CONFIGS / "beam_design_lan.yaml")),
         *("--fidelity", "inextensible"),
