@@ -20,6 +20,7 @@ from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoad
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
+from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
@@ -141,6 +142,25 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
     spec = cfmkit.loads(one.text)
     assert spec.fidelity == "solid"
     assert all(outcome.ok for outcome in cfmkit.check(cfmkit.analyze(spec)))
+
+
+def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
+    """Stiffness and number alone were written: nobody could order them, and nothing said what their wire bears."""
+    asked = wish(force="50 N", travel="100 mm", room="[250 mm, 350 mm, 80 mm]", material="steel-s235")
+    candidate = first("cam", asked, "2 springs")
+    plain = cfmkit.design(candidate.spec).spec
+    spec = function_named(candidate.finish)(plain, asked)
+    wire = spec.mechanism.springs.wound
+    assert wire.wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
+    assert spec.mechanism.springs.name.startswith("wound to measure, wire")
+    result = cfmkit.analyze(spec)
+    strength = tensile_strength(wire.wire)
+    assert result.values["wire_stress_max"].value <= 0.38 * strength * (1 + 1e-9)
+    assert result.values["loop_stress_max"].value <= 0.75 * strength
+    assert result.curve.force.tolist() == cfmkit.analyze(plain).curve.force.tolist()
+    boxes = [function_named(family("cam").room)(cfmkit.analyze(one)) for one in (plain, spec)]
+    assert boxes[0].depth == pytest.approx(boxes[1].depth, rel=1e-9)
+    assert cfmkit.loads(cfmkit.dumps(spec)).mechanism.springs == spec.mechanism.springs
 
 
 def test_the_mean_of_a_row_is_that_of_both_directions():
