@@ -57,7 +57,8 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli.run_spec_and_print_page import execute
     from cfmkit.runs.run import Verb, analysed
 
-    work, inputs, words = analysed, {}, ()
+    work, inputs = analysed, {}
+    words: tuple[str, ...] = ()
     if options.data is not None:
         inputs, words = data_record(options.data), ("--data", options.data, *chain(*measuring_words(options)))
         work = partial(compute_beside, read_measured(options.data, options))

@@ -323,7 +323,7 @@ def _without_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
     if not holes:
         return found
     unknown = np.any([(found.place > low) & (found.place < high) for low, high in holes], axis=0)
-    rows = {
+    rows: dict[str, Any] = {
         name: np.where(unknown, np.nan, getattr(found, name))
         for name in ("height", "displacement", "force", "contact", "lateral", "stress")
     }
@@ -418,7 +418,8 @@ def curve_of(found: Ride) -> Curve:
 def values_along(found: Ride) -> Mapping[str, Quantity]:
     """Return the scalar results of a ride by name."""
     if found.hole is not None:
-        return {name: Quantity(None, *meant, found.hole.message) for name, meant in DEFINITIONS.items()}
+        reason = found.hole.message.partition(":")[0]
+        return {name: Quantity(None, *meant, reason) for name, meant in DEFINITIONS.items()}
     return quantities(DEFINITIONS, found.values)
 
 
