@@ -300,9 +300,14 @@ def refuse_without_data(options: Measuring) -> None:
     cfmkit.errors.UsageError
         Naming the first of them.
     """
-    for name in ("units", "tare", "zero", "flip", "cycles", "group"):
-        if getattr(options, name) is not None:
-            raise UsageError(f"--{name} applies to a measurement: name its file with --data")
+    for name, _ in measuring_words(options):
+        raise UsageError(f"{name} applies to a measurement: name its file with --data")
+
+
+def measuring_words(options: Measuring) -> list[tuple[str, str]]:
+    """Return the stated options about a measurement, each with its value."""
+    names = ("units", "tare", "zero", "flip", "cycles", "group")
+    return [(f"--{name}", value) for name in names if (value := getattr(options, name)) is not None]
 
 
 def seconds(text: str) -> float:

@@ -33,13 +33,13 @@ from cfmkit.specs.units import border_unit, format_short, to_border
 from cfmkit.specs.what_yield_metrics_mean import OF_MANY_PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.output import Terminal
     from cfmkit.cli.page_block_types import Block
     from cfmkit.metrics import Outcome
-    from cfmkit.results import Quantity, Searched
+    from cfmkit.results import Finding, Quantity, Searched
     from cfmkit.runs.run import FinishedRun, Verb
     from cfmkit.runs.run_outcome import Report
     from cfmkit.specs.spec import Requirement, Spec
@@ -126,18 +126,21 @@ def _page(outcome: FinishedRun, written: Written, everything: bool) -> Iterator[
         yield Paragraph(word, text)
     for text in searched(found.design.search) if found.design else ():
         yield Paragraph("search", text)
-    yield from _ending(found)
+    yield from _ending(outcome)
     yield from _warnings(outcome)
     yield written.block(everything)
     for name, spare in outcome.kept.items():
         yield Paragraph("kept", f"{name} was edited since the last run; the edited version is kept as {spare}", BAD)
 
 
-def _ending(found: Report) -> Iterator[Block]:
-    """Yield how the run ended, where that is not as asked, and what the design decided."""
+def _ending(outcome: FinishedRun) -> Iterator[Block]:
+    """Yield how the run ended, where that is not as asked, with what would cure it, and what the design decided."""
+    found = outcome.report
     status, design = found.status, found.design
     if status.exit_code is not ExitCode.OK:
-        yield Paragraph("partial" if status.usable else "failed", found.message, BAD)
+        cures = tuple(dict.fromkeys(cure for item in _reasons(found) for cure in item.cures))
+        yield Paragraph("partial" if status.usable else "failed", found.message + (":" if cures else ""), BAD)
+        yield from _commands(outcome, cures)
     elif design is not None and design.message != design.status.value:
         yield Paragraph("design", design.message)
     if design is not None and design.nearest_feasible:
@@ -148,12 +151,22 @@ def _ending(found: Report) -> Iterator[Block]:
 
 def _warnings(outcome: FinishedRun) -> Iterator[Block]:
     """Yield the warnings that say more than the run's message, each with the commands that would cure it."""
+    reasons = _reasons(outcome.report)
     for item in outcome.report.warnings:
-        if item.message == outcome.report.result.message:
-            continue
-        yield Paragraph("warning", f"{item.name}: {item.message}" + (":" if item.cures else ""), BAD)
-        for cure in item.cures:
-            yield whole_line(Span(" " * MARGIN + _cure(outcome, cure)))
+        if item not in reasons:
+            yield Paragraph("warning", f"{item.name}: {item.message}" + (":" if item.cures else ""), BAD)
+            yield from _commands(outcome, item.cures)
+
+
+def _reasons(found: Report) -> list[Finding]:
+    """Return the warnings that say what the run's message says."""
+    return [item for item in found.warnings if item.message == found.result.message]
+
+
+def _commands(outcome: FinishedRun, cures: Iterable[str | tuple[str, ...]]) -> Iterator[Block]:
+    """Yield a line for each command that applies a cure."""
+    for cure in cures:
+        yield whole_line(Span(" " * MARGIN + _cure(outcome, cure)))
 
 
 def _cure(outcome: FinishedRun, cure: str | tuple[str, ...]) -> str:
@@ -164,7 +177,8 @@ def _cure(outcome: FinishedRun, cure: str | tuple[str, ...]) -> str:
     kept = [change for change in outcome.changes if change.partition("=")[0].strip() not in paths]
     settings = [word for change in (*kept, *changes) for word in ("--set", change)]
     folder = ["-o", outcome.folder] if outcome.source == STDIN else []
-    return command_line("cfmkit", verb, outcome.source, *settings, *folder)
+    words = outcome.verb.words if verb == outcome.verb.name else ()
+    return command_line("cfmkit", verb, outcome.source, *words, *settings, *folder)
 
 
 HEADLINE = (

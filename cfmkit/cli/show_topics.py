@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
@@ -359,12 +360,18 @@ def _metrics() -> Records:
 
 
 def _values() -> Records:
+    """Return the values of the families, of the causes that they find in a measured loop, and of recordings."""
+    from cfmkit.experiment.value_definitions import recorded
     from cfmkit.specs.units import border_unit
 
+    every = families.records()
+    known = [(record.name, record.values) for record in every]
+    known += [(record.name, import_module(record.attribution).DEFINITIONS) for record in every if record.attribution]
+    known.append(("recordings", recorded("torque") | recorded("force")))
     return _gathered(
-        (key, {"name": key, "family": record.name, "unit": border_unit(dimension), "definition": definition})
-        for record in families.records()
-        for key, (dimension, definition) in record.values.items()
+        (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
+        for name, values in known
+        for key, (dimension, definition) in values.items()
     )
 
 
@@ -388,10 +395,16 @@ def _spec_keys() -> Records:
 
 
 def _findings() -> Records:
+    """Return what a run of a family, of a recording or of a study may warn of."""
+    from cfmkit.experiment import calibration, findings
+    from cfmkit.studies.findings import FINDINGS
+
+    known = [(record.name, record.findings) for record in families.records()]
+    known += [("recordings", findings.FINDINGS), ("calibrate", calibration.FINDINGS), *FINDINGS.items()]
     return _gathered(
-        (key, {"name": key, "family": record.name, "meaning": meaning})
-        for record in families.records()
-        for key, meaning in record.findings.items()
+        (key, {"name": key, "family": name, "meaning": meaning})
+        for name, meanings in known
+        for key, meaning in meanings.items()
     )
 
 

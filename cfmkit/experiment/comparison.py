@@ -14,6 +14,7 @@ from cfmkit.experiment.branches import LOAD, UNLOAD
 from cfmkit.experiment.coverage import emptied, holes_of, large_holes
 from cfmkit.experiment.curves_and_metrics_of_recording import elapsed
 from cfmkit.experiment.loop_area_and_repeatability import loop_area
+from cfmkit.experiment.value_definitions import RECORDED, recorded
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -152,11 +153,10 @@ class Comparison(ShortRepr):
             return {}
         area = loop_area(loop.places, loop.up, loop.down)
         kind, width = self.curve.kind, self.window.hi - self.window.lo
+        meant = recorded(kind)
         found = {
-            "data_loss": Quantity(area, "energy", "area between the measured branches over the window"),
-            "data_half_gap": Quantity(
-                0.5 * area / width, kind, f"half the mean difference of the measured {kind} on the way up and back"
-            ),
+            "data_loss": Quantity(area, *meant["data_loss"]),
+            "data_half_gap": Quantity(0.5 * area / width, *meant["data_half_gap"]),
         }
         return emptied(found, self.holes, kind)
 
@@ -195,11 +195,10 @@ def _mean_of(up: Samples, down: Samples, cycle: int) -> tuple[FloatArray, FloatA
     return places, effort, passed, cycle
 
 
-_OVER = "over the measured travel in the window"
 _ERRORS: dict[str, Measure] = {
-    "data_rmse": (rms, f"root mean square of (model - measured) {{}}, {_OVER}"),
-    "data_error_max": (largest, "(model - measured) {} where it is largest in magnitude, in the window"),
-    "data_offset": (mean, f"mean of (model - measured) {{}}, {_OVER}"),
+    "data_rmse": (rms, RECORDED["data_rmse"][1]),
+    "data_error_max": (largest, RECORDED["data_error_max"][1]),
+    "data_offset": (mean, RECORDED["data_offset"][1]),
 }
 """What is reported of the errors: name -> (function, definition)."""
 

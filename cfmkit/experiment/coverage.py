@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
+from cfmkit.experiment.value_definitions import RECORDED
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.metric_definitions import split_name
-from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, STEPS, holes_between
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
 from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import read_quantity
 
@@ -120,16 +121,12 @@ def emptied(metrics: Mapping[str, Quantity], large: Sequence[UnrecordedInterval]
     return found
 
 
-_COVERAGE = "part of the window that was recorded, from steps of more than {} usual ones; of several cycles the least"
-
-
 def coverage(curve: Curve, holes: Sequence[UnrecordedInterval], window: Window) -> dict[str, Quantity]:
     """Return which part of the window each branch of a curve covers, and the least of them."""
-    definition = _COVERAGE.format(f"{STEPS:g}")
     shares = {name: share_covered([hole for hole in holes if hole.branch == name], window) for name in curve.branches}
     named = {f"coverage[{name}]": share for name, share in shares.items()} if len(shares) > 1 else {}
     found = {"coverage": min(shares.values()), **named}
-    return {name: Quantity(value, "ratio", definition) for name, value in found.items()}
+    return {name: Quantity(value, *RECORDED["coverage"]) for name, value in found.items()}
 
 
 def least(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.experiment.value_definitions import recorded
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -95,14 +96,14 @@ def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity
         ``force_repeatability[load]`` and so on; without a value where there is one cycle only.
     """
     kind = curves[0].kind
-    definition = f"sqrt(mean over the window of the variance (n - 1) of the {kind} between cycles at the same place)"
+    meant = recorded(kind)[f"{kind}_repeatability"]
     places = np.linspace(window.lo, window.hi, PLACES)
     found = {}
     for branch in curves[0].branches:
         name = f"{kind}_repeatability[{branch}]"
         if len(curves) < 2:
-            found[name] = Quantity(None, kind, definition, "there is one cycle only")
+            found[name] = Quantity(None, *meant, "there is one cycle only")
             continue
         forces = np.array([branch_at(curve, branch, places) for curve in curves])
-        found[name] = Quantity(float(np.sqrt(forces.var(axis=0, ddof=1).mean())), kind, definition)
+        found[name] = Quantity(float(np.sqrt(forces.var(axis=0, ddof=1).mean())), *meant)
     return found

@@ -231,7 +231,9 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
 
 
 def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
-    values = best.x * problem.size
+    at_bound = best.active_mask != 0
+    # the solver stays inside by a hair
+    values = np.where(at_bound, np.where(best.active_mask < 0, problem.low, problem.high), best.x * problem.size)
     residuals = problem.residuals(values)
     count, free = len(residuals), len(residuals) - len(values)
     rms = float(np.sqrt((residuals**2).sum() / max(free, 1)))
@@ -242,9 +244,7 @@ def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
     inverse = (right.T / np.maximum(singular, 1e-14 * singular[0]) ** 2) @ right
     covariance = noise**2 * inflation * inverse * np.outer(problem.size, problem.size)
     freedom = max(count / inflation - len(values), 1.0)
-    return FittedValues(
-        values, covariance, residuals, noise, inflation, best.active_mask != 0, freedom, bool(best.success)
-    )
+    return FittedValues(values, covariance, residuals, noise, inflation, at_bound, freedom, bool(best.success))
 
 
 @dataclass(frozen=True)

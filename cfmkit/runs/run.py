@@ -58,7 +58,8 @@ class Verb:
 
     `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
     what the manifest says about other files than the spec; `running` makes of a run in the folder one
-    that works in several processes, or notes what it has finished.
+    that works in several processes, or notes what it has finished; `words` are what its command line
+    says of those files.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Verb:
     compute: Callable[[Spec, Run], Report]
     inputs: Mapping[str, Any] = field(default_factory=dict)
     running: Callable[[RunFolder, Run], AbstractContextManager[Run]] = _as_it_is
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

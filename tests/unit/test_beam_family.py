@@ -434,15 +434,39 @@ def test_a_steep_surface_jams():
     assert "tip_jams" in warned(solved("beam_end_effector", *changes))
 
 
-def test_a_surface_from_a_file(tmp_path):
-    heights = np.linspace(0, 12.3, 50)
-    rows = [f"{x:.9f},{1.75 * (1 - np.cos(np.pi * x / 12.3)):.9f}" for x in heights]
-    (tmp_path / "heights.csv").write_text("x [mm],y [mm]\n" + "\n".join(rows) + "\n")
+def on_measured_surface(folder, places, between="smooth"):
+    """Return the specification of the end-effector on the points of its surface at places [mm]."""
+    rows = [f"{x:.9f},{1.75 * (1 - np.cos(np.pi * x / 12.3)):.9f}" for x in places]
+    (folder / "heights.csv").write_text("x [mm],y [mm]\n" + "\n".join(rows) + "\n")
     text = cfmkit.dumps(config("beam_end_effector"))
-    start = text.index("    profile:")
-    end = text.index("    preload:")
-    (tmp_path / "spec.yaml").write_text(text[:start] + "    profile: {kind: file, file: heights.csv}\n" + text[end:])
-    found = cfmkit.analyze(cfmkit.load(tmp_path / "spec.yaml"))
+    start, end = text.index("    profile:"), text.index("    preload:")
+    profile = f"    profile: {{kind: file, file: heights.csv, between: {between}}}\n"
+    (folder / "spec.yaml").write_text(text[:start] + profile + text[end:])
+    return cfmkit.load(folder / "spec.yaml")
+
+
+def test_a_hole_in_a_measured_surface_is_not_bridged(tmp_path):
+    """From 4 mm to 8 mm there are no points: a spline went through, and its extremes counted as measured."""
+    places = np.linspace(0, 12.3, 100)
+    holed = places[(places <= 4) | (places >= 8)]
+    found = cfmkit.analyze(on_measured_surface(tmp_path, holed))
+    assert found.status is Status.PARTIAL
+    (reported,) = [one for one in found.warnings if one.name == "surface_hole"]
+    assert "no points from 3.976 mm to 8.076 mm" in reported.message
+    assert reported.cures == ("analysis.surface.profile.between=straight",)
+    assert found.values["tip_force_max"].value is None
+    assert "no points" in found.values["tip_force_max"].reason
+    along = found.curves[1]
+    inside = (along.motion > 3.98 * MM) & (along.motion < 8.07 * MM)
+    assert inside.sum() > 20
+    assert np.isnan(along.effort[inside]).all()
+    assert np.isfinite(along.effort[~inside]).all()
+    for points, between in ((places, "smooth"), (holed, "straight")):
+        assert cfmkit.analyze(on_measured_surface(tmp_path, points, between)).status is Status.COMPLETE
+
+
+def test_a_surface_from_a_file(tmp_path):
+    found = cfmkit.analyze(on_measured_surface(tmp_path, np.linspace(0, 12.3, 50)))
     for name in ("tip_force_min", "tip_force_max"):
         assert value(found, name) == pytest.approx(value(solved("beam_end_effector"), name), rel=1e-4)
     (tmp_path / "heights.csv").write_text("x [mm],y [mm]\n0,0\n2,1\n1,2\n")

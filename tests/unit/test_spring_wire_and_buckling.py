@@ -241,6 +241,30 @@ def test_a_spring_that_buckles_is_reported_with_the_rod_that_cures_it(vcfm):
     assert buckles(vcfm, seats="pivoted-pivoted", wound={"wire": "0.8 mm", "coil": "6 mm", "turns": 8})
 
 
+def test_a_guide_with_much_clearance_is_none(vcfm):
+    """A rod of 1 mm in a spring of 2.5 mm was accepted: it lets the spring bow by 0.75 mm."""
+    (one,) = buckles(vcfm, guide_rod="1.9 mm")
+    assert "the guide stated is too loose (a rod from 2 mm, a tube up to 4.2 mm)" in one.message
+    assert one.cures == ("mechanism.springs.guide_rod=2.25 mm",)
+    assert not buckles(vcfm, guide_rod="2 mm")
+    assert buckles(vcfm, guide_tube="4.3 mm")
+    assert not buckles(vcfm, guide_tube="4.2 mm")
+    assert not buckles(vcfm, guide_rod="1.9 mm", guide_tube="4.2 mm")
+
+
+def test_the_loops_of_extension_springs_have_a_stress_of_their_own():
+    """In full loops bending is far above the shear in the turns, which alone was reported."""
+    spec = cfmkit.load(CONFIGS / "studies/cam_bought_parts.yaml")
+    values = cfmkit.analyze(spec).values
+    wire = spec.mechanism.springs.wound
+    load = math.pi * wire.wire**3 / (8 * wire.coil) * values["wire_stress_max"].value
+    index = wire.coil / wire.wire
+    load /= (4 * index - 1) / (4 * index - 4) + 0.615 / index
+    bending = (4 * index**2 - index - 1) / (4 * index * (index - 1)) * 16 * load * wire.coil / (math.pi * wire.wire**3)
+    assert values["loop_stress_max"].value == pytest.approx(bending + 4 * load / (math.pi * wire.wire**2), rel=1e-9)
+    assert "loop_stress_max" not in cfmkit.analyze(cfmkit.load(CONFIGS / "vcfm_bought_springs.yaml")).values
+
+
 def test_without_its_wire_a_spring_is_judged_by_its_outer_diameter(vcfm):
     known = {"kind": "compression", "count": 2, "stiffness": "1.3 N/mm", "free_length": "40 mm", "wound": None}
     assert buckles(vcfm, **known, outer_diameter="3.5 mm")

@@ -20,6 +20,7 @@ from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoad
 from cfmkit.runs.part_on_paper import assumed_tolerances
 from cfmkit.runs.read_wish import wish_of
 from cfmkit.runs.suggestion_files import as_json, exit_code, table
+from cfmkit.stock.springs.helical_spring_formulas import tensile_strength
 from cfmkit.studies.stated_or_assumed_tolerances import assumed
 from cfmkit.studies.suggest import proposal_making_and_judging as judging
 from cfmkit.studies.suggest.misses_in_words import raised_out
@@ -61,6 +62,13 @@ def test_what_no_process_makes_is_refused_in_one_line(keys, words):
         block(**keys)
     (problem,) = caught.value.problems
     assert words in str(problem)
+
+
+@pytest.mark.parametrize("key", ["ripple", "hysteresis", "yield"])
+def test_a_number_for_a_share_is_asked_back_as_a_percentage(key):
+    """Of the yield only one of its bounds was named, without the question."""
+    with pytest.raises(SpecError, match=rf"--{key}: 90 is not allowed: must be > 0 and < 1; did you mean 90 %\?"):
+        block(**{key: "90"})
 
 
 @pytest.mark.parametrize("material", ["pla", "petg", "{youngs_modulus: 2 GPa, yield_strength: 40 MPa}"])
@@ -134,6 +142,33 @@ def test_what_a_solid_judged_keeps_every_requirement_when_its_file_is_analysed(n
     spec = cfmkit.loads(one.text)
     assert spec.fidelity == "solid"
     assert all(outcome.ok for outcome in cfmkit.check(cfmkit.analyze(spec)))
+
+
+def test_the_springs_of_a_proposed_cam_are_stated_and_bear_their_load():
+    """Stiffness and number alone were written: nobody could order them, and nothing said what their wire bears."""
+    asked = wish(force="50 N", travel="100 mm", room="[250 mm, 350 mm, 80 mm]", material="steel-s235")
+    candidate = first("cam", asked, "2 springs")
+    plain = cfmkit.design(candidate.spec).spec
+    spec = function_named(candidate.finish)(plain, asked)
+    wire = spec.mechanism.springs.wound
+    assert wire.wound("extension").rate == pytest.approx(spec.mechanism.springs.stiffness, rel=1e-9)
+    assert spec.mechanism.springs.name.startswith("wound to measure, wire")
+    result = cfmkit.analyze(spec)
+    strength = tensile_strength(wire.wire)
+    assert result.values["wire_stress_max"].value <= 0.38 * strength * (1 + 1e-9)
+    assert result.values["loop_stress_max"].value <= 0.75 * strength
+    assert result.curve.force.tolist() == cfmkit.analyze(plain).curve.force.tolist()
+    boxes = [function_named(family("cam").room)(cfmkit.analyze(one)) for one in (plain, spec)]
+    assert boxes[0].depth == pytest.approx(boxes[1].depth, rel=1e-9)
+    assert cfmkit.loads(cfmkit.dumps(spec)).mechanism.springs == spec.mechanism.springs
+
+
+def test_the_mean_of_a_row_is_that_of_both_directions():
+    """The worst of both counted as a third one: 50.31 N for 50.9 N on the way up and 49.1 N back."""
+    result = cfmkit.analyze(cfmkit.load(CONFIGS / "cam_friction.yaml"))
+    known = cfmkit.evaluate(result)
+    up, down = (known[f"force_mean[{way}]"].value for way in ("load", "unload"))
+    assert judging.numbers_of(result, None, wish())["mean"] == pytest.approx((up + down) / 2, rel=1e-12)
 
 
 def test_the_file_of_a_proposal_keeps_the_whole_wish():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.options import (
@@ -13,6 +14,7 @@ from cfmkit.cli.options import (
     WithReport,
     data_record,
     flag,
+    measuring_words,
     option,
     read_measured,
     refuse_without_data,
@@ -56,14 +58,16 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.run import Verb, analysed
 
     work, inputs = analysed, {}
+    words: tuple[str, ...] = ()
     if options.data is not None:
-        inputs = data_record(options.data)
+        inputs, words = data_record(options.data), ("--data", options.data, *chain(*measuring_words(options)))
         work = partial(compute_beside, read_measured(options.data, options))
     else:
         refuse_without_data(options)
     if options.compare_fidelity:
         work = partial(compute_each, work)
-    return execute(Verb("analyze", "analysed", work, inputs), options, terminal, options.report)
+    verb = Verb("analyze", "analysed", work, inputs, words=words)
+    return execute(verb, options, terminal, options.report)
 
 
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:

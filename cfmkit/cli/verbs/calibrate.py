@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
-from cfmkit.cli.options import Computing, Measuring, WithReport, argument, data_record, option, read_measured
+from cfmkit.cli.options import (
+    Computing,
+    Measuring,
+    WithReport,
+    argument,
+    data_record,
+    measuring_words,
+    option,
+    read_measured,
+)
 
 if TYPE_CHECKING:
     from cfmkit.cli.output import Terminal
@@ -58,7 +68,10 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     if options.loss not in LOSSES:
         raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
     source = read_measured(options.data, options)
-    verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data))
+    bounds = [("--bounds", text) for text in options.bounds or ()]
+    loss = [] if options.loss == CalibrateOptions.loss else [("--loss", options.loss)]
+    words = (options.data, "--fit", options.fit, *chain(*bounds, *loss, *measuring_words(options)))
+    verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data), words=words)
     return execute(verb, options, terminal, options.report)
 
 

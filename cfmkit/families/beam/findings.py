@@ -52,6 +52,7 @@ FINDINGS = {
     "starts_lost": "worker processes died, and the starts that they were working on are lost",
     "search_cut_short": "the time budget ended before all starts were finished",
     "surface_out_of_reach": "following the surface requires more displacement than the solved travel",
+    "surface_hole": "a part of the surface was not measured: the force there is not known, nor any extreme along it",
     "tip_lifts_off": "the mechanism no longer presses on the surface: the tip lifts off",
     "surface_stress_exceeded": "the stress along the surface exceeds the allowable one",
     "tip_jams": "somewhere the surface is too steep for the friction at the tip",

@@ -24,6 +24,7 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
 from cfmkit.numerics.cubic_interpolation import bisect, values_at
+from cfmkit.numerics.holes_in_samples import LARGEST_HOLE, holes_between
 from cfmkit.results import Quantity, quantities
 from cfmkit.specs.units import format_short
 
@@ -56,12 +57,15 @@ class SurfaceCourse(ShortRepr):
         The places that the curve along it is written at [m].
     corners : (k,) array
         Where the slope jumps [m].
+    holes : tuple of (float, float)
+        Between which places it was not measured [m].
     """
 
     height: Callable[[FloatArray], FloatArray]
     slope: Callable[[FloatArray], FloatArray]
     rows: FloatArray
     corners: FloatArray
+    holes: tuple[tuple[float, float], ...] = ()
 
     def places(self, end: float) -> FloatArray:
         """Return many places up to one [m], the rows and both sides of every corner among them."""
@@ -103,7 +107,9 @@ def _of_file(given: FileProfile) -> SurfaceCourse:
     rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _ROWS)]))
     if given.between == "smooth":
         spline = CubicSpline(x, y)
-        return SurfaceCourse(spline, spline.derivative(), rows, np.zeros(0))
+        least = LARGEST_HOLE * (x[-1] - x[0])
+        holes = tuple((low, high) for low, high in holes_between(x, x[0], x[-1]) if high - low > least)
+        return SurfaceCourse(spline, spline.derivative(), rows, np.zeros(0), holes)
     steps = np.diff(y) / np.diff(x)
 
     def slope(places: FloatArray) -> FloatArray:
@@ -175,6 +181,8 @@ class Ride:
         Why it ends before the surface does.
     findings : tuple of Finding
         What else is wrong with it.
+    hole : Finding or None
+        Where the surface was not measured: nothing is known there, nor what holds over the whole surface.
     """
 
     place: FloatArray
@@ -188,11 +196,13 @@ class Ride:
     values: Mapping[str, float | None]
     ending: Finding | None = None
     findings: tuple[Finding, ...] = ()
+    hole: Finding | None = None
 
     @property
     def missing(self) -> str:
-        """Why it ends before the surface does; empty if it does not."""
-        return "" if self.ending is None else self.ending.message
+        """Why it ends before the surface does, or has a hole; empty if neither."""
+        reasons = [found.message for found in (self.ending, self.hole) if found is not None]
+        return "; ".join(reasons)
 
 
 @dataclass(frozen=True)
@@ -303,7 +313,28 @@ def ride(solution: OnCurve) -> Ride | None:
     stress, stable = tip.stress_at(u), np.interp(u, tip.x, tip.stable) == 1
     values = _values(tip, rows, solution.assembly.allowable_stress)
     shown = Ride(rows, u - surface.preload, u, tip.force(rows), contact, lateral, stress, stable, values, ending)
+    shown = _without_holes(shown, tip.course.holes)
     return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
+
+
+def _without_holes(found: Ride, holes: tuple[tuple[float, float], ...]) -> Ride:
+    """Return a ride without what lies in holes of the surface, and without values if there are any."""
+    holes = tuple(hole for hole in holes if len(found.place) and hole[0] < found.place[-1])
+    if not holes:
+        return found
+    unknown = np.any([(found.place > low) & (found.place < high) for low, high in holes], axis=0)
+    rows: dict[str, Any] = {
+        name: np.where(unknown, np.nan, getattr(found, name))
+        for name in ("height", "displacement", "force", "contact", "lateral", "stress")
+    }
+    spans = " and ".join(f"{format_short(low, 'length')} to {format_short(high, 'length')}" for low, high in holes)
+    hole = finding(
+        "surface_hole",
+        f"the surface has no points from {spans} along it: the force there is not known, nor the extremes; "
+        "'analysis.surface.profile.between: straight' takes straight lines there for the surface",
+        "analysis.surface.profile.between=straight",
+    )
+    return replace(found, **rows, values=dict.fromkeys(DEFINITIONS), hole=hole)
 
 
 def _tip(solution: OnCurve, surface: Surface) -> Tip:
@@ -386,11 +417,13 @@ def curve_of(found: Ride) -> Curve:
 
 def values_along(found: Ride) -> Mapping[str, Quantity]:
     """Return the scalar results of a ride by name."""
+    if found.hole is not None:
+        reason = found.hole.message.partition(":")[0]
+        return {name: Quantity(None, *meant, reason) for name, meant in DEFINITIONS.items()}
     return quantities(DEFINITIONS, found.values)
 
 
 def findings_along(found: Ride) -> Iterator[Finding]:
     """Yield what is wrong with a ride."""
-    if found.ending is not None:
-        yield found.ending
+    yield from (item for item in (found.ending, found.hole) if item is not None)
     yield from found.findings

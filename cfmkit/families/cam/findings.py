@@ -21,7 +21,7 @@ from cfmkit.families.cam.scalar_results import (
     root_mean_square,
 )
 from cfmkit.families.cam.statics import spring_force
-from cfmkit.families.findings import finder, mm, mpa, newton
+from cfmkit.families.findings import at_least, finder, mm, mpa, newton
 from cfmkit.numerics.robust_statistics import neighbour_noise
 
 if TYPE_CHECKING:
@@ -122,13 +122,14 @@ def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Fin
     if contact is None or allowable is None or largest is None or not yields(largest, allowable):
         return None
     limit = YIELD_PRESSURE * allowable
-    wider = contact.width * (largest / limit) ** 2
+    wider = at_least(contact.width * (largest / limit) ** 2)
     safety = f" over a safety factor of {mechanism.safety_factor:g}" if mechanism.safety_factor != 1 else ""
     return finding(
         "overstressed",
         f"the contact pressure of {mpa(largest)} {place} is above {mpa(limit)}, at which the material first yields "
-        f"below the surface (1.67 times its yield strength{safety}); use a contact of at least {mm(wider)} "
+        f"below the surface (1.67 times its yield strength{safety}); use a contact of at least {wider} "
         "('mechanism.contact.width'), a stronger material or a larger roller",
+        f"mechanism.contact.width={wider}",
     )
 
 
@@ -283,15 +284,16 @@ def _lift_off(solution: Solution) -> Iterator[Finding]:
     """Yield where weight across the slider's travel pulls the lower roller off the cam."""
     loads = solution.assembly.loads
     beside = abs(loads.sideways[0])
-    if beside and beside > float(spring_force(solution.states, loads)[0]):
+    mounting = solution.assembly.spec.mechanism.mounting
+    if mounting and beside and beside > float(spring_force(solution.states, loads)[0]):
         opened = loads.stiffness * solution.assembly.spec.mechanism.springs.tension_stretch
         released = _travel_at(solution, (beside - opened) / loads.stiffness)
         yield finding(
             "lift_off",
             f"at the start the weight of a roller across the guide is {newton(beside)}, more than the springs hold: "
             f"the lower roller lifts off the cam for the first {mm(released)} of travel; use preloaded springs, "
-            "lighter "
-            "rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
+            "lighter rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
+            f"mechanism.mounting={{elevation: {np.degrees(mounting.elevation):.10g} deg, roll: 90 deg}}",
         )
 
 

@@ -332,7 +332,7 @@ def _check_bend(profile: CamProfile) -> None:
                 "undercut_total",
                 f"the path that lets the weights help has a radius of curvature of {mm(radius)} at x = {mm(place)}, "
                 f"less than the roller's {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius') "
-                "or leave the weight uncompensated ('design.gravity: false')",
+                "or leave the weight uncompensated ('design.gravity')",
             )
         )
 

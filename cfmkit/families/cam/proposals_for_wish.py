@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.bounding_box import depth_of
+from cfmkit.families.cam.bounding_box import count_of, depth_of
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.springs_spec import Springs
@@ -25,6 +25,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
 from cfmkit.specs.units import Place
 from cfmkit.stock.material_and_part_spec import MaterialSpec
+from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -168,10 +169,28 @@ def _candidate(wish: Wish, size: dict[str, float]) -> Candidate | None:
     return None
 
 
+def with_wire(spec: CamSpec, _wish: Wish) -> CamSpec:
+    """Return a designed cam whose springs have wire, coil and turns: the slimmest that fit between the rollers.
+
+    They are those that its depth counts with (`bounding_box.depth_of`).
+    """
+    from cfmkit.families.cam.model import analyze
+    from cfmkit.families.run_control import Run
+
+    springs, solution = spec.mechanism.springs, analyze(spec, Run()).state
+    if springs.wound is not None or solution is None:
+        return spec
+    stretch, length = float(solution.elongation.max()), 2.0 * spec.mechanism.rest_half_width
+    coil = extension_spring(springs.total / count_of(springs), stretch, length)
+    if coil is None:
+        return spec
+    return spec.replace({f"mechanism.springs.{key}": value for key, value in as_stated(coil).items()})
+
+
 def _from_catalogue(made: Candidate) -> Candidate:
     """Return the same proportions with springs of the generic series; from these the force constant follows."""
     spec = made.spec.replace({"design.choose": "catalogue", "design.catalogue": "generic"})
-    return replace(made, variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant), spec=spec)
+    return replace(made, variant=re.sub(r"^\d+ springs?", "catalogue springs", made.variant), spec=spec, finish="")
 
 
 def _written(
@@ -210,7 +229,8 @@ def _written(
     spec = CamSpec.model_validate(data)
     area = size["width"] * size["height"] / (wish.room[0] * wish.room[1])
     variant = called(f"{count} spring{'s' if count > 1 else ''}", wish, material)
-    return Candidate(variant, spec, design=True, promise=area + size["ripple"] / wish.ripple)
+    promise = area + size["ripple"] / wish.ripple
+    return Candidate(variant, spec, design=True, finish=f"{__name__}:with_wire", promise=promise)
 
 
 def _out_of_reach(wish: Wish, found: dict[str, Any]) -> FamilyOffer:

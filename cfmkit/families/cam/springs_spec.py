@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
-from cfmkit.specs.units import Force, Stiffness
-from cfmkit.stock.springs.spec import Life, SpringWire, settle_rate, wire_of
+from cfmkit.specs.units import Stiffness
+from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate, wire_of
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.offer_type_and_generic_series import Offer
@@ -31,14 +31,10 @@ class Springs(Model):
     rest_length: PositiveLength | None = Field(
         None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
     )
-    initial_tension: Annotated[Force, Field(ge=0)] = Field(
-        0.0, description="force at which one spring begins to open: it pulls with so much more than its elongation says"
-    )
+    initial_tension: InitialTension = 0.0
     max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed for a spring")
-    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
-    wound: SpringWire | None = Field(
-        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
-    )
+    name: PartName = None
+    wound: StatedWire = None
     life: Life | None = None
 
     @model_validator(mode="after")

@@ -30,7 +30,7 @@ from cfmkit.families.wishes import Candidate, FamilyOffer
 from cfmkit.specs.units import Place, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.springs.helical_spring_formulas import YOUNGS_MODULUS, tensile_strength
-from cfmkit.stock.springs.made_to_measure import extension_spring, shortest_torsion_spring, torsion_spring
+from cfmkit.stock.springs.made_to_measure import as_stated, extension_spring, shortest_torsion_spring, torsion_spring
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE
 
 if TYPE_CHECKING:
@@ -393,7 +393,7 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
         if coil is None or coil.outer_diameter > (deep if name == "slider" else widest):
             raise SolutionError(_no_spring(name, turns[name], coil))
         bought[name] = coil
-    return spec.replace({"mechanism.springs.bought": tuple(_wound_to_measure(name, bought[name]) for name in turns)})
+    return spec.replace({"mechanism.springs.bought": tuple({"at": name, **as_stated(bought[name])} for name in turns)})
 
 
 def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
@@ -401,11 +401,6 @@ def _no_spring(name: str, turn: tuple[float, float], coil: Wound | None) -> str:
     reported = f"{format_short(turn[0], dimension, 3)} over {format_short(turn[1], way, 3)}"
     wide = "" if coil is None else f" is {mm(coil.outer_diameter)} wide"
     return f"no spring of steel wire fits at the {name.replace('_', ' ')}: {reported}{wide}"
-
-
-def _wound_to_measure(name: str, coil: Wound) -> dict[str, Any]:
-    reported = f"wound to measure, wire {mm(coil.wire)}, coil {mm(coil.coil)}, {coil.turns:.3g} turns"
-    return {"at": name, "name": reported, "wound": {"wire": coil.wire, "coil": coil.coil, "turns": coil.turns}}
 
 
 def pushed_linkage(wish: Wish, lengths: Proportions, crank: float, first: float) -> Candidate | float:

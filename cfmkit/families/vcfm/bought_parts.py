@@ -53,7 +53,7 @@ def spring_faults(solution: Solution) -> Iterator[tuple[str, ...]]:
             "spring_buckles",
             f"a spring of {mm(springs.free_length or 0.0)} buckles when it is deflected by {mm(springs.unguided)} "
             f"(ends {springs.seats}), and is deflected by {mm(most)} with a preload of {mm(worst.preload)}; "
-            f"{guide_needed(springs.coil, 'mechanism.springs')}",
+            f"{guide_needed(springs, springs.coil, 'mechanism.springs')}",
             *guide_cure(springs.coil, "mechanism.springs"),
         )
     least = min(push.preload for push in solution.pushes)

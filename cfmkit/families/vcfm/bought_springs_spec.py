@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, ValidationInfo, model_validator
 
 from cfmkit.specs.spec import PositiveLength
-from cfmkit.specs.units import Force, Stiffness
+from cfmkit.specs.units import Stiffness
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import Life, SpringSupport, SpringWire, settle_rate
+from cfmkit.stock.springs.spec import InitialTension, Life, PartName, StatedWire, settle_rate
+from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import Wound
@@ -25,9 +26,7 @@ class BoughtSprings(SpringSupport):
     kind: Literal["compression", "extension"] = Field("compression", description="how they are loaded")
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel")
-    initial_tension: Annotated[Force, Field(ge=0)] = Field(
-        0.0, description="force at which an extension spring begins to open"
-    )
+    initial_tension: InitialTension = 0.0
     max_elongation: PositiveLength | None = Field(
         None, description="largest elongation (or compression) allowed for a spring"
     )
@@ -38,10 +37,8 @@ class BoughtSprings(SpringSupport):
         None, description="with the turns touching; default: of closed ends, from 'wound'"
     )
     outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
-    name: str | None = Field(None, min_length=1, description="designation, for the parts list")
-    wound: SpringWire | None = Field(
-        None, description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"
-    )
+    name: PartName = None
+    wound: StatedWire = None
     life: Life | None = None
 
     @model_validator(mode="after")
@@ -56,6 +53,11 @@ class BoughtSprings(SpringSupport):
     def coil(self) -> Wound | None:
         """Its wire, coil and turns; None if they are not stated."""
         return None if self.wound is None else self.wound.wound(self.kind)
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether a rod or a tube keeps it from buckling."""
+        return self.guides(self.coil)
 
     @property
     def unguided(self) -> float:

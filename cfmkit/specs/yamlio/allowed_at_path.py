@@ -66,7 +66,8 @@ class Slot:
     def child(self, key: str | int) -> tuple[Slot, ...]:
         """Return what is allowed below a key or index; nothing if it does not exist."""
         if self.model is not None:
-            field = self.model.model_fields.get(str(key))
+            fields = self.model.model_fields
+            field = fields.get(str(key)) or next((one for one in fields.values() if one.alias == key), None)
             return slots(field.annotation, tuple(field.metadata)) if field else ()
         arguments = get_args(self.kind)
         if isinstance(self.origin, type) and issubclass(self.origin, Mapping):

@@ -9,7 +9,7 @@ from cfmkit.stock.springs.offer_type_and_generic_series import guide_rod_for
 
 if TYPE_CHECKING:
     from cfmkit.stock.springs.helical_spring_formulas import Wound
-    from cfmkit.stock.springs.spec import SpringSupport
+    from cfmkit.stock.springs.support_spec import SpringSupport
 
 
 def guide_words(support: SpringSupport) -> list[str]:
@@ -22,12 +22,16 @@ def guide_words(support: SpringSupport) -> list[str]:
     return words
 
 
-def guide_needed(wound: Wound | None, key: str) -> str:
+def guide_needed(support: SpringSupport, wound: Wound | None, key: str) -> str:
     """Return the remedy for a spring that buckles, in words; `key` is the path of its block."""
     if wound is None:
         return f"guide it on a rod ('{key}.guide_rod') or in a tube, or use a shorter or wider one"
-    rod = format_short(guide_rod_for(wound), "length")
-    return f"guide it on a rod of {rod} ('{key}.guide_rod') or in a tube, or use a shorter or wider one"
+    rod, least, most = (
+        format_short(value, "length")
+        for value in (guide_rod_for(wound), wound.thinnest_guide_rod, wound.widest_guide_tube)
+    )
+    loose = f"the guide stated is too loose (a rod from {least}, a tube up to {most}); " if guide_words(support) else ""
+    return f"{loose}guide it on a rod of {rod} ('{key}.guide_rod') or in a tube, or use a shorter or wider one"
 
 
 def guide_cure(wound: Wound | None, key: str) -> tuple[str, ...]:

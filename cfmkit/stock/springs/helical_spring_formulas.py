@@ -56,6 +56,10 @@ END_CONDITION: Mapping[Seats, float] = MappingProxyType(
 SMALL_HOLE, SMALL_HOLE_CLEARANCE, CLEARANCE = 0.013, 0.10, 0.05
 """Clearance of a spring on a rod, in diameters of its inside: below 13 mm, and above [N]."""
 
+LOOSEST = 0.20
+"""Largest clearance of a guide, in diameters of the inside (rod) or outside (tube): twice that of [N], assumed. In a
+looser one a spring bows as far as the clearance lets it."""
+
 
 @dataclass(frozen=True)
 class Wound:
@@ -89,6 +93,21 @@ class Wound:
             return inner * 32.0 * load / (math.pi * self.wire**3)
         curved = (4.0 * c - 1.0) / (4.0 * c - 4.0) + 0.615 / c
         return curved * 8.0 * load * self.coil / (math.pi * self.wire**3)
+
+    def loop_stress(self, load: float) -> float:
+        """Return the largest bending stress in the full loops of an extension spring [Pa] under a force [N].
+
+        The loops are as wide as the coil: [Sh, eq. 10-34] with the factor of curvature of eq. 10-35 for r1 = D/2.
+
+        Examples
+        --------
+        >>> spring = Wound("extension", 2e-3, 12e-3, 20.0)
+        >>> round(spring.loop_stress(80.0) / 1e6, 1), round(spring.stress(80.0) / 1e6, 1)
+        (723.2, 382.7)
+        """
+        c = self.index
+        curved = (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0))
+        return load * (curved * 16.0 * self.coil / (math.pi * self.wire**3) + 4.0 / (math.pi * self.wire**2))
 
     @property
     def body_length(self) -> float:
@@ -155,6 +174,16 @@ class Wound:
         """Diameter of the thickest rod that guides the spring with clearance [m]."""
         inner = self.inner_diameter
         return inner * (1.0 - (SMALL_HOLE_CLEARANCE if inner < SMALL_HOLE else CLEARANCE))
+
+    @property
+    def thinnest_guide_rod(self) -> float:
+        """Diameter of the thinnest rod that still guides a compression spring [m]."""
+        return self.inner_diameter * (1.0 - LOOSEST)
+
+    @property
+    def widest_guide_tube(self) -> float:
+        """Inner diameter of the widest tube that still guides a compression spring [m]."""
+        return self.outer_diameter * (1.0 + LOOSEST)
 
 
 def buckling_deflection(

@@ -8,10 +8,11 @@ of the coil.
 from __future__ import annotations
 
 from math import log2, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound, tensile_strength
 from cfmkit.stock.springs.offer_type_and_generic_series import BENDING_SHARE, SHEAR_SHARE
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE
@@ -48,6 +49,15 @@ def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
     """
     fitting = [spring for spring in _candidates("extension", rate, stretch) if loaded_length(spring) <= room]
     return min(fitting, key=lambda spring: spring.outer_diameter, default=None)
+
+
+def as_stated(spring: Wound) -> dict[str, Any]:
+    """Return designation and wire of a spring as a specification has them."""
+    wire, coil = (format_short(size, "length") for size in (spring.wire, spring.coil))
+    return {
+        "name": f"wound to measure, wire {wire}, coil {coil}, {spring.turns:.3g} turns",
+        "wound": {"wire": spring.wire, "coil": spring.coil, "turns": spring.turns},
+    }
 
 
 def torsion_spring(rate: float, turn: float, room: float, pin: float = 0.0) -> Wound | None:

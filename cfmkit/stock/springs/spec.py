@@ -16,8 +16,9 @@ from cfmkit.specs.spec import AS_MADE, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque, format_short
 from cfmkit.specs.units.unit_size import is_unit
 from cfmkit.stock.material_and_part_spec import Fatigue
-from cfmkit.stock.springs.helical_spring_formulas import Seats, Wound
+from cfmkit.stock.springs.helical_spring_formulas import Wound
 from cfmkit.stock.springs.offer_type_and_generic_series import GENERIC, Offer, generic
+from cfmkit.stock.springs.support_spec import SpringSupport
 from cfmkit.stock.springs.wire_materials import MUSIC_WIRE, WIRES, WireName, WireOutOfRange
 from cfmkit.tables.lab_columns import split_header
 from cfmkit.tables.lab_file import decoded, lines_of
@@ -90,39 +91,6 @@ class WireLimits(Model):
             raise ValueError(f"{error}; state {others}the wire's own moduli") from None
 
 
-class SpringSupport(Model):
-    """How a compression spring is kept from buckling."""
-
-    seats: Seats = Field(
-        "fixed-fixed",
-        description="how the ends of a compression spring are held: fixed is flat on a plate, against buckling",
-    )
-    guide_rod: Annotated[Length, Positive] | None = Field(
-        None, description="diameter of the rod in a compression spring: guided, it does not buckle"
-    )
-    guide_tube: Annotated[Length, Positive] | None = Field(None, description="or inner diameter of the tube around it")
-
-    @property
-    def is_guided(self) -> bool:
-        """Whether a rod or a tube keeps the spring from buckling."""
-        return self.guide_rod is not None or self.guide_tube is not None
-
-    def check_guide(self, kind: Kind, wound: Wound | None, outer: float | None) -> None:
-        """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
-        own = ["seats"] if self.seats != "fixed-fixed" else []
-        own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
-        if own and kind != "compression":
-            raise ValueError(f"{own[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
-        inside = wound.inner_diameter if wound is not None else outer
-        if self.guide_rod is not None and inside is not None and self.guide_rod >= inside:
-            inner = format_short(inside, "length")
-            raise ValueError(f"'guide_rod' must be thinner than the inside of the spring, which is below {inner}")
-        around = wound.outer_diameter if outer is None and wound is not None else outer
-        if self.guide_tube is not None and around is not None and self.guide_tube <= around:
-            reported = format_short(around, "length")
-            raise ValueError(f"'guide_tube' must be wider than the spring, which is {reported} outside")
-
-
 Life = Annotated[
     float, Field(gt=0, description="life in cycles up to the largest deflection, as stated by the manufacturer")
 ]
@@ -178,6 +146,21 @@ def check_initial_tension(wound: Wound | None, tension: float) -> None:
     if tension > TIGHTEST * wound.usual_initial_tension[1]:
         stated = format_short(tension, "force")
         raise ValueError(f"'initial_tension' of {stated} cannot be wound: such a spring has about {low} to {high}")
+
+
+PartName = Annotated[str | None, Field(min_length=1, description="designation, for the parts list")]
+StatedWire = Annotated[
+    SpringWire | None,
+    Field(description="wire, coil and turns, for the stress in the wire, and for the rate if none is stated"),
+]
+InitialTension = Annotated[
+    Force,
+    Field(
+        ge=0,
+        description="force at which one extension spring begins to open: it pulls with so much more than its "
+        "elongation says",
+    ),
+]
 
 
 def settle_rate(springs: Any, kind: Kind, info: ValidationInfo) -> None:

@@ -26,12 +26,18 @@ if TYPE_CHECKING:
 WIRE_DEFINITIONS = {
     "wire_stress_max": (
         "stress",
-        "largest stress in the wire of a bought spring over the travel, with Wahl's curvature factor: shear, or "
-        "bending in a torsion spring",
+        "largest stress in the turns of a bought spring over the travel, with Wahl's curvature factor: shear, or "
+        "bending in a torsion spring; loops of extension springs: 'loop_stress_max'",
+    ),
+    "loop_stress_max": (
+        "stress",
+        "largest bending stress in the loops of bought extension springs over the travel: full loops as wide as the "
+        "coil (Shigley, eq. 10-34), which springs with a stated 'wound' are assumed to have",
     ),
     "spring_life": (
         "count",
-        "life of a bought spring in cycles of the whole travel: from the S-N data of its wire and Goodman's line, "
+        "life of the turns of a bought spring in cycles of the whole travel: from the S-N data of its wire and "
+        "Goodman's line, "
         "or as its manufacturer states",
     ),
 }
@@ -80,8 +86,15 @@ class SpringInUse:
 
     @property
     def stress(self) -> float | None:
-        """Largest stress in the wire [Pa]."""
+        """Largest stress in the turns [Pa]."""
         return None if self.wound is None else self.wound.stress(self.largest)
+
+    @property
+    def loop_stress(self) -> float | None:
+        """Largest bending stress in the loops of an extension spring [Pa]."""
+        if self.wound is None or self.wound.kind != "extension":
+            return None
+        return self.wound.loop_stress(self.largest)
 
     def life(self) -> float | None:
         """Return the cycles that it lasts; None where nothing is known of it.
@@ -102,11 +115,14 @@ def in_the_sense_of_the_larger(high: float, low: float) -> tuple[float, float]:
 
 
 def wire_quantities(springs: Sequence[SpringInUse]) -> dict[str, Quantity]:
-    """Return the largest stress and the shortest life of some springs by name; what nothing is known of is left out."""
+    """Return the largest stresses and the shortest life of some springs by name, as far as they are known."""
     found: dict[str, Quantity] = {}
-    stresses = [one.stress for one in springs if one.stress is not None]
-    if stresses:
-        found["wire_stress_max"] = Quantity(max(stresses), *WIRE_DEFINITIONS["wire_stress_max"])
+    for name, each in (
+        ("wire_stress_max", [one.stress for one in springs]),
+        ("loop_stress_max", [one.loop_stress for one in springs]),
+    ):
+        if stresses := [stress for stress in each if stress is not None]:
+            found[name] = Quantity(max(stresses), *WIRE_DEFINITIONS[name])
     try:
         lives = [life for life in (one.life() for one in springs) if life is not None]
     except Undefined as error:

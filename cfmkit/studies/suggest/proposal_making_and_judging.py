@@ -435,10 +435,9 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         return max(values) if values else None
 
     lost = worst("hysteresis_area")
-    means = [
-        one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean" and one.value is not None
-    ]
-    mean = float(np.mean(means)) if means else None
+    means = {key: one.value for key, one in found.items() if key.partition("[")[0] == f"{kind}_mean"}
+    each = [value for key, value in means.items() if value is not None and ("[" in key or len(means) == 1)]
+    mean = float(np.mean(each)) if each else None
     return {
         "mean": mean,
         "ripple": worst(f"{kind}_ripple"),

@@ -273,7 +273,7 @@ def notes_of(audit: Audit, spread: NetworkScatter, held: tuple[str, ...]) -> tup
 
 def _held(held: tuple[str, ...]) -> tuple[str, str]:
     more = f" and {len(held) - 8} more" if len(held) > 8 else ""
-    return "limited by", "; ".join(held[:8]) + more
+    return "limits", "; ".join(held[:8]) + more
 
 
 def starts_table(task: Task, result: Explored) -> Table:

@@ -31,6 +31,9 @@ BRACE_SHARE = (0.1, 3.0)
 """The same for a brace over a slender rod: 3 has all its mass at the ends."""
 
 
+INVERSE = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
+
+
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
     checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction, _sideways)
@@ -46,7 +49,7 @@ def old_word(spec: CamSpec) -> tuple[Finding, ...]:
         "'analysis.dynamics.method: direct' is the old name of 'inverse': forces follow from a given motion, which is "
         "inverse dynamics; the next version will no longer accept it"
     )
-    return (finding("old_word", message, "analysis.dynamics.method=inverse"),)
+    return (finding("old_word", message, INVERSE),)
 
 
 def outside(parts: Build, span: tuple[float, float]) -> Finding:
@@ -67,6 +70,7 @@ def runs_on_corner(parts: Build) -> Finding:
         "contact_not_single_valued",
         "on the corner of the cam the contact is not a function of its height, as the nine-coordinate model needs: "
         f"start above {mm(above)} ('analysis.dynamics.slider_position'), or use 'analysis.dynamics.method: inverse'",
+        INVERSE,
     )
 
 
@@ -164,6 +168,7 @@ def _friction(moved: MotionSolution) -> Iterator[Finding]:
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
             f"{moved.spec.mechanism.rolling_friction:g} is neglected; 'analysis.dynamics.method: inverse' includes it",
+            INVERSE,
         )
 
 
@@ -174,6 +179,7 @@ def _sideways(moved: MotionSolution) -> Iterator[Finding]:
             "friction_left_out",
             "the nine-coordinate model neglects the weight across the slider's travel, which 'mechanism.mounting' "
             "implies; 'analysis.dynamics.method: inverse' includes it",
+            INVERSE,
         )
 
 

@@ -36,7 +36,7 @@ def bought_spring_faults(spec: SliderCrankSpec, turns: FloatArray) -> Iterator[t
                 yield (
                     "spring_buckles",
                     f"{spring.name} buckles when it is deflected by {mm(spring.unguided)} (ends {spring.seats}), and "
-                    f"is deflected by {mm(moved)}; {guide_needed(coil, key)}",
+                    f"is deflected by {mm(moved)}; {guide_needed(spring, coil, key)}",
                     guide_cure(coil, key),
                 )
         elif spring.kind == "torsion" and coil is not None and pins is not None and np.isfinite(moved):

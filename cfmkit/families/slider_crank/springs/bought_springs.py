@@ -103,7 +103,8 @@ class SpringOption:
             about |= {"loaded": offer.kind, "free_length": offer.free_length} | support_of(offer)
             if offer.guide_tube is None and offer.wound is not None:
                 needed = self.deflection > offer.unguided
-                about["guide_rod"] = (offer.guide_rod or guide_rod_for(offer.wound)) if needed else None
+                guides = offer.guide_rod is not None and offer.guide_rod >= offer.wound.thinnest_guide_rod
+                about["guide_rod"] = (offer.guide_rod if guides else guide_rod_for(offer.wound)) if needed else None
         return Bought.model_validate(
             {"at": JOINTS[self.joint], "name": self.offer.name, "count": self.count}
             | {key: value for key, value in about.items() if value is not None}

@@ -113,7 +113,8 @@ class SpringTask:
         angle = self.assembly.units(np.linspace(low, high, PROBES)).angle
         if np.ptp(np.sign(np.diff(angle))) > 0.0:
             text = "the crank turns back within the window, where the coupler is perpendicular to the guide"
-            raise Infeasible(finding("infeasible_targets", f"{text}: set 'design.spacing: even', or change the window"))
+            cure = "set 'design.spacing: even', or change the window"
+            raise Infeasible(finding("infeasible_targets", f"{text}: {cure}", "design.spacing=even"))
         return self._travels(angle[0] + (angle[-1] - angle[0]) * share, high)
 
     def _travels(self, angle: FloatArray, last: float) -> FloatArray:

@@ -10,7 +10,8 @@ from cfmkit.specs.spec import DesignBlock, Model, PositiveForce, PositiveLength,
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.offer_type_and_generic_series import unguided_deflection
-from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringSupport, SpringWire, is_made
+from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire, is_made
+from cfmkit.stock.springs.support_spec import SpringSupport
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -57,6 +58,11 @@ class Bought(SpringSupport):
     def coil(self) -> Wound | None:
         """Its wire, coil and turns; None if they are not stated."""
         return None if self.wound is None else self.wound.wound(self.kind)
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether a rod or a tube keeps it from buckling."""
+        return self.guides(self.coil)
 
     @property
     def unguided(self) -> float:

@@ -1,0 +1,44 @@
+"""What the numbers of a recording mean, beside the metrics of any curve: name -> (dimension, definition).
+
+``{}`` in a definition stands for what was measured, and "effort" for its dimension: force or torque.
+"""
+
+from __future__ import annotations
+
+from cfmkit.numerics.holes_in_samples import STEPS
+
+_OVER = "over the measured travel in the window"
+
+RECORDED = {
+    "coverage": (
+        "ratio",
+        f"part of the window that was recorded, from steps of more than {STEPS:g} usual ones; of several cycles the "
+        "least",
+    ),
+    "repeatability": (
+        "effort",
+        "sqrt(mean over the window of the variance (n - 1) of the {} between cycles at the same place)",
+    ),
+    "data_rmse": ("effort", f"root mean square of (model - measured) {{}}, {_OVER}"),
+    "data_error_max": ("effort", "(model - measured) {} where it is largest in magnitude, in the window"),
+    "data_offset": ("effort", f"mean of (model - measured) {{}}, {_OVER}"),
+    "data_loss": ("energy", "area between the measured branches over the window"),
+    "data_half_gap": ("effort", "half the mean difference of the measured {} on the way up and back"),
+}
+
+
+def recorded(kind: str) -> dict[str, tuple[str, str]]:
+    """Return name, dimension and definition of each of them, of a force or of a torque.
+
+    Examples
+    --------
+    >>> recorded("torque")["torque_repeatability"][0]
+    'torque'
+    """
+    return {
+        f"{kind}_repeatability" if name == "repeatability" else name: (
+            kind if dimension == "effort" else dimension,
+            definition.format(kind),
+        )
+        for name, (dimension, definition) in RECORDED.items()
+    }

@@ -1,0 +1,60 @@
+"""What a specification may say about the seats and the guide of a compression spring."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import Length, format_short
+from cfmkit.stock.springs.helical_spring_formulas import Seats
+
+if TYPE_CHECKING:
+    from cfmkit.stock.springs.helical_spring_formulas import Kind, Wound
+
+Positive = Field(gt=0)
+
+
+class SpringSupport(Model):
+    """How a compression spring is kept from buckling."""
+
+    seats: Seats = Field(
+        "fixed-fixed",
+        description="how the ends of a compression spring are held: fixed is flat on a plate, against buckling",
+    )
+    guide_rod: Annotated[Length, Positive] | None = Field(
+        None,
+        description="diameter of the rod in a compression spring: guided, it does not buckle; at least 80 % of its "
+        "inner diameter",
+    )
+    guide_tube: Annotated[Length, Positive] | None = Field(
+        None, description="or inner diameter of the tube around it, at most 120 % of its outer diameter"
+    )
+
+    def guides(self, wound: Wound | None) -> bool:
+        """Return whether a rod or a tube keeps a spring from buckling; where its wire is not known, any that is stated.
+
+        A guide with more clearance than `LOOSEST` is none.
+        """
+        rod, tube = self.guide_rod, self.guide_tube
+        if wound is None:
+            return rod is not None or tube is not None
+        fits = 1.0 - 1e-9
+        on_rod = rod is not None and rod >= wound.thinnest_guide_rod * fits
+        return on_rod or (tube is not None and tube * fits <= wound.widest_guide_tube)
+
+    def check_guide(self, kind: Kind, wound: Wound | None, outer: float | None) -> None:
+        """Raise `ValueError` for a guide that does not fit, or for one of a spring that does not buckle."""
+        own = ["seats"] if self.seats != "fixed-fixed" else []
+        own += [key for key in ("guide_rod", "guide_tube") if getattr(self, key) is not None]
+        if own and kind != "compression":
+            raise ValueError(f"{own[0]!r} is for compression springs, which buckle; this is of kind {kind!r}")
+        inside = wound.inner_diameter if wound is not None else outer
+        if self.guide_rod is not None and inside is not None and self.guide_rod >= inside:
+            inner = format_short(inside, "length")
+            raise ValueError(f"'guide_rod' must be thinner than the inside of the spring, which is below {inner}")
+        around = wound.outer_diameter if outer is None and wound is not None else outer
+        if self.guide_tube is not None and around is not None and self.guide_tube <= around:
+            reported = format_short(around, "length")
+            raise ValueError(f"'guide_tube' must be wider than the spring, which is {reported} outside")

@@ -1,0 +1,15 @@
+"""What studies say beside their numbers, by name: by what says it, name -> meaning."""
+
+FINDINGS = {
+    "sensitivity": {
+        "failed_samples": "samples have no result; the policy says what became of them",
+        "not_stated": "indices or tolerances that cannot be stated are empty",
+        "no_value": "a metric has no value for the specification itself and is left out",
+        "correlation_not_used": "correlated deviations are stated for a method that varies every parameter by itself",
+        "unbalanced": "the number of samples is not a power of two, at which Sobol sequences are balanced",
+        "no_requirements": "without requirements there is no yield",
+        "derived_part": "other values follow a varied parameter: every sample is a part made for its own value",
+    },
+    "--compare-fidelity": {"fidelity_left_out": "a model cannot run on this specification and is left out"},
+    "suggest": {"search_cut_short": "the time budget ended the search before everything was tried"},
+}
