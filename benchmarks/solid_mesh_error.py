@@ -23,7 +23,8 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.solid import adaptive_solution, meshed_part
+from cfmkit.solid import meshed_part
+from cfmkit.solid.few_poses import PoseGuide
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -173,10 +174,8 @@ def reference(part: Part, stops: tuple[float, ...]) -> MeshSolution:
     found = meshed.at(*(pose for pose in found.course.poses if pose.travel in travels))
     for split in (*N_CORNER_SPLITS * [True], False):
         finer, refinement = meshed.refined(meshed.singular if split else None)
-        poses = []
-        for pose in found.course.poses:
-            guess = adaptive_solution.interpolate_unknowns(found, pose, finer, (refinement,))
-            poses.append(finer.problem.solve(guess, pose.travel))
+        guide = PoseGuide(found, finer, (refinement,))
+        poses = [finer.problem.solve(guide(travel), travel) for travel in guide.poses]
         meshed, found = finer, finer.at(*(pose for pose in poses if pose is not None and pose.unstable == 0))
     return found
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from cfmkit.arrays import read_only
 from cfmkit.solid.elements import CORNERS, shape_functions
@@ -61,7 +62,9 @@ class RefinedMesh:
 
     def interpolate(self, values: FloatArray) -> FloatArray:
         """Return values (n, ...) at the nodes from values at the nodes of the other mesh."""
-        return np.asarray(np.einsum("na,na...->n...", self.node_shares, values[self.node_parents]))
+        starts = np.arange(0, self.node_parents.size + 1, 6)
+        shape = (len(self.node_parents), len(values))
+        return np.asarray(csr_array((self.node_shares.ravel(), self.node_parents.ravel(), starts), shape) @ values)
 
 
 def refine(mesh: TriangleMesh, rings: tuple[Ring, ...], marked: NDArray[np.bool_] | None = None) -> RefinedMesh:
