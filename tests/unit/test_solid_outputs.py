@@ -10,6 +10,7 @@ from half_vee import VEE
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.families import family
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.mesh import mesh
@@ -108,3 +109,10 @@ def test_the_material_around_a_point_tells_its_motion_and_its_turn():
 def test_a_stiffness_across_is_refused_of_a_solid():
     with pytest.raises(SpecError, match=r"analysis\.outputs\.cross_stiffness is not supported"):
         cfmkit.loads(VEE).replace({"analysis.outputs.cross_stiffness": True})
+
+
+def test_reactions_are_read_off_solved_poses_only():
+    spec = cfmkit.loads(VEE)
+    for reactions in (["root"], []):
+        (part,) = family("beam").driven_parts(spec.replace({"analysis.outputs.reactions": reactions}))
+        assert part.every_pose == bool(reactions)
