@@ -58,8 +58,9 @@ AIMED_SHARE = 0.6
 """Of the allowed error, that refinement is to leave."""
 SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT = 0.5, 1.0 / 8.0
 """Error expected in a triangle once it is split, in what it was."""
-CORRECTION_SHARE = 0.04
-"""Of the allowed error, that the difference of meshes may have between the poses that are solved on both."""
+CORRECTION_SHARE, CORRECTION_LARGEST = 0.04, 2e-5
+"""Of the allowed error, that the difference of meshes may have between the poses that are solved on both; and how much
+of the largest force that may be, however little is asked for: a curve's shape is not to suffer."""
 BETWEEN_SHARE = 0.2
 """Of the allowed error, that cubics between poses may have."""
 
@@ -164,7 +165,8 @@ class DrivenPart:
             report(FIRST_SHARE + (1.0 - FIRST_SHARE) * share, "fine mesh")
 
         between = float(np.nan_to_num(coarse.between))
-        allowed = (1.0 - CORRECTION_SHARE) * self.error - between
+        correction = min(CORRECTION_SHARE * self.error, CORRECTION_LARGEST)
+        allowed = self.error - correction - between
         first, guide, followed = self._first_level(meshed, coarse, report_fine)
         level = first
         for _ in range(MAX_ROUNDS):
@@ -177,7 +179,7 @@ class DrivenPart:
         solution = followed
         if solution is None and not self.every_pose:
             poses = [state.pose for state in level.states]
-            solution = follow_some(guide, poses, CORRECTION_SHARE * self.error, report_fine)
+            solution = follow_some(guide, poses, self.stops, correction, report_fine)
         if solution is None:
             solution = replace(_followed_alike(guide, self.stops, report_fine), between=coarse.between)
         left = level.error * _largest_beside(solution, guide, [state.pose.travel for state in level.states])

@@ -32,6 +32,13 @@ CORRECTION_CHECKS = 2
 """Poses that must be as predicted, one after the other: those of Lan's part are predicted to 1e-6 from seven."""
 
 
+SEEN = 0.01
+"""Part of the largest effort within which the solved poses must draw the coarse curve: what two meshes differ by, a
+thousandth of it, is then known to some 1e-5."""
+SHARP = 1.0 / 8.0
+"""Part of the steps between stops: where steps are shorter, the path has nearly a corner, and all poses are solved."""
+
+
 @dataclass(frozen=True, eq=False)
 class PoseGuide:
     """Unknowns on a mesh predicted from those of a coarser one that it was refined from."""
@@ -125,14 +132,29 @@ class Correction:
         )
 
     def next_travel(self, travels: Sequence[float]) -> float | None:
-        """Return the travel, of some, in the middle of where the curve may be off most; None if all are solved."""
+        """Return the travel, of some, where the curve may be off most; None if all are solved.
+
+        First where cubics through the coarse poses at the same travels miss the coarse curve: it has no shape there
+        that the solved poses do not see. Then in the middle of the interval where those of the difference may be off.
+        """
         places = np.array([self._sense * pose.travel for pose in self.solved])
+        missed = self._missed(travels)
+        if missed.max() > SEEN:
+            return travels[int(missed.argmax())]
         for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
             inside = [one for one in travels if places[k] < self._sense * one < places[k + 1]]
             if inside:
                 middle = 0.5 * (places[k] + places[k + 1])
                 return min(inside, key=lambda one: abs(self._sense * one - middle))
         return None
+
+    def _missed(self, travels: Sequence[float]) -> FloatArray:
+        """Return what the coarse curve is off at travels, drawn through the solved ones only, of its largest effort."""
+        poses = self.guide.poses
+        drawn = replace(self.guide.coarse.course, poses=tuple(poses[pose.travel] for pose in self.solved))
+        effort = np.array([poses[travel].effort for travel in travels])
+        size = float(np.abs(effort).max())
+        return np.abs(drawn.effort(np.array(travels)) - effort) / size if size else np.zeros(len(travels))
 
 
 def _difference(pose: Balance, other: Balance) -> Balance:
@@ -158,7 +180,7 @@ def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...
 
 
 def follow_some(
-    guide: PoseGuide, poses: Sequence[Balance], allowed: float, report: Callable[[float], None]
+    guide: PoseGuide, poses: Sequence[Balance], stops: Sequence[float], allowed: float, report: Callable[[float], None]
 ) -> MeshSolution | None:
     """Return the path on a fine mesh at all travels of the coarse one; None where it has not the same course.
 
@@ -168,6 +190,8 @@ def follow_some(
         With the path on the coarse mesh.
     poses : sequence of Balance
         That are solved on the fine mesh, the first and the last one of the path among them.
+    stops : sequence of float
+        Travels at which poses were wanted, before steps were cut [m or rad].
     allowed : float
         Difference of the cubics and a pose, in parts of the largest effort, below which enough are solved.
     report : callable
@@ -175,6 +199,8 @@ def follow_some(
     """
     course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
     if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
+        return None
+    if _is_sharp(np.abs(travels), np.abs(stops)):
         return None
     if (poses[0].travel, poses[-1].travel) != (travels[0], travels[-1]):
         return None
@@ -198,3 +224,11 @@ def follow_some(
     return MeshSolution(
         guide.meshed.part, guide.meshed.problem, replace(course, poses=whole), guide.meshed.unjudged, between
     )
+
+
+def _is_sharp(travels: FloatArray, stops: FloatArray) -> bool:
+    """Return True if two steps in a row had to be much shorter than those between stops; one may be what was left."""
+    interval = np.clip(np.searchsorted(stops, travels[1:], side="left"), 1, len(stops) - 1)
+    steps = np.diff(stops)[interval - 1]
+    short = np.diff(travels) < SHARP * (1.0 - 1e-9) * steps
+    return bool((short[:-1] & short[1:]).any())
