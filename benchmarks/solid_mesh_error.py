@@ -23,7 +23,8 @@ import numpy as np
 
 import cfmkit
 from cfmkit.families import family
-from cfmkit.solid import adaptive_solution, meshed_part
+from cfmkit.solid import meshed_part
+from cfmkit.solid.few_poses import PoseGuide
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -146,6 +147,29 @@ PARTS = LEAVES | {
         *("d", 0, 3, "1 mm", "0.3 mm"),
     ),
 }
+ARC, RISING = ({"kind": "arc", "sweep": f"{sweep} deg"} for sweep in (60, -100))
+DRILLED = leaf([[0, "3 mm"], [1, "1.8 mm"]], (20, 0), 1.5, "0.4 mm", ARC)
+DRILLED["mechanism"]["part"]["holes"] = [{"at": ["4.5 mm", "-1.75 mm"], "diameter": "0.8 mm"}]
+PARTS |= {  # of other kinds: neither the target's shares nor the bars were chosen with them
+    "thick arc, tapered, with a hole": DRILLED,
+    "rubber arc, pulled": leaf("1.6 mm", (14, 0), 4, "0.4 mm", RISING, 0.0, **RUBBER),
+    "thick, pulled, nearly incompressible": leaf("2.5 mm", (10, 0), 0.8, "0.4 mm", drive=0.0, poisson_ratio=0.499),
+    "neo-Hookean leaf that buckles": leaf("0.8 mm", (25, 4.5), 8, "0.2 mm", law="neo-hookean"),
+    "thick strut": leaf("1.5 mm", (22, 0), 1.2, "0.3 mm", drive=180.0, poisson_ratio=0.45),
+    "tapered leaf that buckles": leaf([[0, "0.4 mm"], [0.5, "0.8 mm"], [1, "0.4 mm"]], (28, 3.5), 6, "0.1 mm"),
+    "thick wave": leaf("1.5 mm", (20, 1), 2, "0.5 mm", {"kind": "spline", "points": S_POINTS}, 180.0),
+    "portal": network(
+        {"a": node(0, 0, "clamped"), "b": node(2, 14), "c": node(16, 14), "e": node(18, 0, "clamped")},
+        {"p": beam("a", "b"), "q": beam("b", "c", thickness="1.8 mm"), "r": beam("c", "e")},
+        *("b", 0, 2.5, "1.1 mm", "0.4 mm"),
+    ),
+    "step": network(
+        {"a": node(0, 0, "clamped"), "b": node(9, 0), "d": node(20, 0, "guided", -90)},
+        {"p": beam("a", "b", thickness="2.4 mm"), "q": beam("b", "d")},
+        *("d", -90, 2, "0.9 mm", "0.3 mm"),
+        law="neo-hookean",
+    ),
+}
 CONFIGS = ("beam_lan2010", "vcfm_ding2022", "slider_crank_lumped")
 
 
@@ -173,10 +197,8 @@ def reference(part: Part, stops: tuple[float, ...]) -> MeshSolution:
     found = meshed.at(*(pose for pose in found.course.poses if pose.travel in travels))
     for split in (*N_CORNER_SPLITS * [True], False):
         finer, refinement = meshed.refined(meshed.singular if split else None)
-        poses = []
-        for pose in found.course.poses:
-            guess = adaptive_solution.interpolate_unknowns(found, pose, finer, (refinement,))
-            poses.append(finer.problem.solve(guess, pose.travel))
+        guide = PoseGuide(found, finer, (refinement,))
+        poses = [finer.problem.solve(guide(travel), travel) for travel in guide.poses]
         meshed, found = finer, finer.at(*(pose for pose in poses if pose is not None and pose.unstable == 0))
     return found
 

@@ -20,12 +20,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.numerics.one_blas_thread import one_blas_thread
+from cfmkit.solid.few_poses import PoseGuide, follow_some, solve_some
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -52,12 +52,15 @@ STRESS_ALLOWED = 0.14
 MAX_NODES = 30_000
 """Of meshes that are refined further: beyond it a pose takes seconds."""
 MAX_ROUNDS = 8
-N_TRIAL_POSES = 5
+N_TRIAL_POSES = 4
 """Poses at which meshes are compared before the last one is followed."""
 AIMED_SHARE = 0.6
 """Of the allowed error, that refinement is to leave."""
 SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT = 0.5, 1.0 / 8.0
 """Error expected in a triangle once it is split, in what it was."""
+CORRECTION_SHARE, CORRECTION_LARGEST = 0.04, 2e-5
+"""Of the allowed error, that the difference of meshes may have between the poses that are solved on both; and how much
+of the largest force that may be, however little is asked for: a curve's shape is not to suffer."""
 BETWEEN_SHARE = 0.2
 """Of the allowed error, that cubics between poses may have."""
 
@@ -140,6 +143,7 @@ class DrivenPart:
     part: Part
     error: float  # that the force may have, in parts of the largest
     stops: tuple[float, ...]  # travels to solve for, from rest on in one direction [m or rad]
+    every_pose: bool = False  # solved on the last mesh, too: reactions are not read off poses that are put together
 
     @one_blas_thread
     def solved(self, report: Report = lambda _share, _text: None) -> AdaptiveSolution:
@@ -151,91 +155,75 @@ class DrivenPart:
             If the outline cannot be meshed, or no node is where the part is held.
         """
         meshed = self.part.meshed()
-        allowed = BETWEEN_SHARE * self.error
-        coarse = meshed.densely(self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), allowed)
+        coarse = meshed.densely(
+            self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), BETWEEN_SHARE * self.error
+        )
         if len(coarse.course.poses) < 2:
             return AdaptiveSolution(coarse, MeshError(math.nan, math.nan, math.nan, self.error), meshed)
 
         def report_fine(share: float) -> None:
             report(FIRST_SHARE + (1.0 - FIRST_SHARE) * share, "fine mesh")
 
-        finer, refinement = meshed.refined()
-        solution = _followed_alike(finer, PoseGuide(coarse, finer, (refinement,)), self.stops, report_fine)
-        differences = solution.differences(coarse)
-        trial = _trial_travels(solution, coarse)
-        level = Level.of(finer, refinement, _states(solution, trial), _states(coarse, trial))
-        before = coarse
-        allowed, refinements = self.error - np.nan_to_num(coarse.between), []
+        between = float(np.nan_to_num(coarse.between))
+        correction = min(CORRECTION_SHARE * self.error, CORRECTION_LARGEST)
+        allowed = self.error - correction - between
+        first, guide, followed = self._first_level(meshed, coarse, report_fine)
+        level = first
         for _ in range(MAX_ROUNDS):
             if level.error <= allowed or len(level.meshed.grid.nodes) > MAX_NODES:
                 break
             if (refined := level.refined(allowed)) is None:
                 break
             level, refinement = refined
-            refinements.append(refinement)
-        if refinements:
-            guide = PoseGuide(solution, level.meshed, tuple(refinements))
-            before, solution = solution, _followed_alike(level.meshed, guide, self.stops, report_fine)
-        force = level.error + float(np.nan_to_num(coarse.between))
-        error = MeshError(*differences, max(force, FORCE_ROUNDING), self.error, coarse.between)
-        solution = replace(solution, between=coarse.between)
-        return AdaptiveSolution(solution, error, level.meshed, _critical_points(solution, before))
+            guide, followed = PoseGuide(coarse, level.meshed, (*guide.refinements, refinement)), None
+        solution = followed
+        if solution is None and not self.every_pose:
+            poses = [state.pose for state in level.states]
+            solution = follow_some(guide, poses, self.stops, correction, report_fine)
+        if solution is None:
+            solution = replace(_followed_alike(guide, self.stops, report_fine), between=coarse.between)
+        left = level.error * _largest_beside(solution, guide, [state.pose.travel for state in level.states])
+        force = max(left + float(np.nan_to_num(solution.between)), FORCE_ROUNDING)
+        compared = meshed.at(*(guide.poses[state.pose.travel] for state in first.states))
+        differences = first.states[0].solution.differences(compared)
+        error = MeshError(*differences, force, self.error, solution.between)
+        return AdaptiveSolution(solution, error, level.meshed, _critical_points(solution, coarse))
+
+    def _first_level(
+        self, meshed: Meshed, coarse: MeshSolution, report: Callable[[float], None]
+    ) -> tuple[Level, PoseGuide, MeshSolution | None]:
+        """Return the mesh with all triangles split, at trial poses; followed along its path if these are not found."""
+        finer, refinement = meshed.refined()
+        guide = PoseGuide(coarse, finer, (refinement,))
+        poses, followed = solve_some(guide, _trial_travels(guide)), None
+        if len(poses) < 2:
+            followed = replace(_followed_alike(guide, self.stops, report), between=coarse.between)
+            poses = tuple(pose for pose in followed.course.poses if pose.travel in guide.poses)
+        states = tuple(MeshedPose(finer.at(*poses), pose) for pose in poses)
+        before = tuple(MeshedPose(coarse, guide.poses[pose.travel]) for pose in poses)
+        return Level.of(finer, refinement, states, before), guide, followed
 
 
 FIRST_SHARE = 0.25
 """Of the time, that the coarse mesh takes."""
 
 
-@dataclass(frozen=True)
-class PoseGuide:
-    """Unknowns on a mesh predicted from those of a coarser one that it was refined from."""
-
-    coarse: MeshSolution
-    meshed: Meshed
-    refinements: tuple[RefinedMesh, ...]
-
-    @cached_property
-    def _poses(self) -> dict[float, Balance]:
-        return {pose.travel: pose for pose in self.coarse.course.poses}
-
-    def __call__(self, travel: float) -> FloatArray | None:
-        """Return the unknowns at a travel [m or rad]; None if the coarser mesh has no pose there."""
-        pose = self._poses.get(travel)
-        return None if pose is None else interpolate_unknowns(self.coarse, pose, self.meshed, self.refinements)
-
-    @property
-    def travels(self) -> tuple[float, ...]:
-        """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
-        course = self.coarse.course
-        near = APART * abs(course.poses[-1].travel - course.poses[0].travel)
-        return tuple(
-            pose.travel
-            for pose in course.poses
-            if all(abs(pose.travel - place) > near for place in course.bifurcations)
-        )
-
-
-APART = 0.01
-"""Distance from a bifurcation within which poses of a coarser mesh are not repeated, in parts of the travel."""
-
-
-def interpolate_unknowns(
-    coarse: MeshSolution, pose: Balance, meshed: Meshed, refinements: Sequence[RefinedMesh]
-) -> FloatArray:
-    """Return unknowns on a mesh from those of a pose of a coarser one that it was refined from."""
-    moved = coarse.moved(pose)
-    for refinement in refinements:
-        moved = refinement.interpolate(moved)
-    free = pose.unknowns[len(coarse.problem.supports.loose) :]
-    return np.concatenate([moved.ravel()[meshed.problem.supports.loose], free])
-
-
-def _followed_alike(
-    meshed: Meshed, guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]
-) -> MeshSolution:
+def _followed_alike(guide: PoseGuide, stops: tuple[float, ...], report: Callable[[float], None]) -> MeshSolution:
     """Return the poses of a part at all travels at which a coarser mesh has one, and at the stops."""
     travels = sorted({*guide.travels, *stops}, reverse=bool(stops[-1] < stops[0]))
-    return meshed.followed(travels, report, guide)
+    return guide.meshed.followed(travels, report, guide)
+
+
+def _largest_beside(solution: MeshSolution, guide: PoseGuide, trial: Sequence[float]) -> float:
+    """Return the largest difference to the coarse mesh, but near bifurcations, in that at trial poses; 1 at least."""
+    kept = {*guide.travels}
+    apart = {
+        pose.travel: abs(pose.effort - guide.poses[pose.travel].effort)
+        for pose in solution.course.poses
+        if pose.travel in kept
+    }
+    known = max((apart.get(travel, 0.0) for travel in trial), default=0.0)
+    return max(1.0, max(apart.values(), default=0.0) / known) if known else 1.0
 
 
 def _critical_points(solution: MeshSolution, coarse: MeshSolution) -> tuple[CriticalPoint, ...]:
@@ -259,14 +247,16 @@ CRITICAL_LEAST = 1e-4
 """Least error of a critical travel and effort: where tangents of the curve meet is known about as closely."""
 
 
-def _trial_travels(solution: MeshSolution, coarse: MeshSolution) -> tuple[float, ...]:
-    """Return a few travels of poses of both meshes: even ones, and that at which the forces differ most [m or rad]."""
-    travel, own, other = np.intersect1d(solution.course.travel, coarse.course.travel, return_indices=True)
-    force = np.array([solution.course.poses[k].effort for k in own])
-    apart = np.abs(force - [coarse.course.poses[k].effort for k in other])
+def _trial_travels(guide: PoseGuide) -> tuple[float, ...]:
+    """Return travels of a few coarse poses [m or rad]: even ones, of extreme forces, on both sides of bifurcations."""
+    travels = guide.travels
+    force = np.array([guide.poses[travel].effort for travel in travels])
     # a pose at rest has no force and no error
-    even = np.linspace(0, len(travel) - 1, N_TRIAL_POSES + 1).round().astype(int)
-    return tuple(travel[np.unique([*even, apart.argmax()])].tolist())
+    chosen = {*np.linspace(0, len(travels) - 1, N_TRIAL_POSES + 1).round().astype(int), force.argmin(), force.argmax()}
+    for place in guide.coarse.course.bifurcations:
+        behind = int((np.abs(travels) < abs(place)).sum())
+        chosen |= {max(behind - 1, 0), min(behind, len(travels) - 1)}
+    return tuple(travels[k] for k in sorted(chosen))
 
 
 @dataclass(frozen=True)
@@ -284,14 +274,7 @@ class MeshedPose:
     @property
     def slope(self) -> FloatArray:
         """Derivatives of the displacements with respect to the travel (n, 2)."""
-        supports, pose = self.solution.problem.supports, self.pose
-        carried = supports.carried(pose.unknowns, pose.travel, np.zeros_like(supports.places))
-        return carried.moves(np.append(pose.slope, 1.0))
-
-
-def _states(solution: MeshSolution, travels: Sequence[float]) -> tuple[MeshedPose, ...]:
-    poses = {pose.travel: pose for pose in solution.course.poses}
-    return tuple(MeshedPose(solution, poses[travel]) for travel in travels)
+        return self.solution.slope(self.pose)
 
 
 @dataclass(frozen=True)
@@ -355,9 +338,9 @@ class Level:
         meshed, refinement = self.meshed.refined(self.marked(allowed))
         states = []
         for state in self.states:
-            guess = interpolate_unknowns(state.solution, state.pose, meshed, (refinement,))
-            pose = meshed.problem.solve(guess, state.pose.travel)
+            guess = PoseGuide(state.solution, meshed, (refinement,))(state.pose.travel)
+            pose = None if guess is None else meshed.problem.solve(guess, state.pose.travel)
             if pose is None or pose.unstable > state.pose.unstable:
                 return None
-            states.append(MeshedPose(meshed.at(pose), pose))
+            states.append(MeshedPose(meshed.at(pose.kept()), pose.kept()))
         return Level.of(meshed, refinement, tuple(states), self.states, self.left), refinement

@@ -59,6 +59,8 @@ class Balance:
         Of the unknowns along the path, per unit of travel.
     factors : Factors or None
         Of the tangent.
+    solved : bool
+        False if it is put together from poses that are.
     """
 
     travel: float
@@ -68,6 +70,7 @@ class Balance:
     unstable: int
     slope: FloatArray
     factors: Factors | None
+    solved: bool = True
 
     def kept(self) -> Balance:
         """Return the same without the factors, which take a hundred times the room of all the rest."""

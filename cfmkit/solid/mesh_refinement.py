@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from cfmkit.arrays import read_only
-from cfmkit.solid.elements import CORNERS, shape_functions
+from cfmkit.solid.elements import CORNERS, shape_functions, slopes
 from cfmkit.solid.mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ CHILDREN_BY_SIDES = {
     (True, True, True): ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
 }
 """Corners of the children by which sides are halved; side 0, from node 0 to node 1, is the longest."""
+
+
+ROUNDS = 3
+"""Of Newton's method for places in curved triangles: one is exact in straight-sided ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +66,9 @@ class RefinedMesh:
 
     def interpolate(self, values: FloatArray) -> FloatArray:
         """Return values (n, ...) at the nodes from values at the nodes of the other mesh."""
-        return np.asarray(np.einsum("na,na...->n...", self.node_shares, values[self.node_parents]))
+        starts = np.arange(0, self.node_parents.size + 1, 6)
+        shape = (len(self.node_parents), len(values))
+        return np.asarray(csr_array((self.node_shares.ravel(), self.node_parents.ravel(), starts), shape) @ values)
 
 
 def refine(mesh: TriangleMesh, rings: tuple[Ring, ...], marked: NDArray[np.bool_] | None = None) -> RefinedMesh:
@@ -167,4 +174,18 @@ def _with_side_nodes(
     node_parents, node_places = np.zeros((len(refined.nodes), 6), np.int64), np.zeros((len(refined.nodes), 2))
     node_parents[triangles] = rotated[parents][:, None]
     node_places[triangles] = at
-    return RefinedMesh(refined, used, parents, node_parents, shape_functions(node_places))
+    shares = shape_functions(_places_in(mesh.nodes[node_parents], refined.nodes, node_places))
+    return RefinedMesh(refined, used, parents, node_parents, shares)
+
+
+def _places_in(triangles: FloatArray, nodes: FloatArray, places: FloatArray) -> FloatArray:
+    """Return where nodes (n, 2) [m] are in triangles (n, 6, 2) [m], (n, 2), by Newton's method from places nearby.
+
+    Inside triangles with a curved side the new sides are straight: displacements taken from places half way in the
+    parent triangle were wrong there by as much as what was missing on the coarser mesh.
+    """
+    for _ in range(ROUNDS):
+        off = nodes - np.einsum("na,nak->nk", shape_functions(places), triangles)
+        jacobian = np.einsum("nai,nak->nki", slopes(places), triangles)
+        places = places + np.linalg.solve(jacobian, off[:, :, None])[:, :, 0]
+    return places

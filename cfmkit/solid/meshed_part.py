@@ -356,6 +356,12 @@ class MeshSolution:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
         return self.problem.supports.displaced(pose.unknowns, pose.travel)
 
+    def slope(self, pose: Any) -> FloatArray:
+        """Return their derivatives with respect to the travel (n, 2)."""
+        supports = self.problem.supports
+        carried = supports.carried(pose.unknowns, pose.travel, np.zeros_like(supports.places))
+        return carried.moves(np.append(pose.slope, 1.0))
+
 
 def _apart(values: FloatArray, others: FloatArray) -> float:
     """Return the largest difference of values, in parts of the largest of the first; 0 where that is 0."""
@@ -435,7 +441,7 @@ def _checked(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tu
     travel = course.travel
     span = abs(travel[-1] - travel[0])
     corners = course.bifurcations
-    estimates = _estimates(course.poses)
+    estimates = missed_by_cubics(course.poses)
     # of estimates that are equal but for rounding, the first along the path: the same part gets the same poses
     ranks = np.round(estimates / max(float(estimates.max()), 1e-300), 3)
     for k in np.argsort(-ranks, kind="stable"):
@@ -453,7 +459,7 @@ def _checked(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tu
     return None
 
 
-def _estimates(poses: tuple[Balance, ...]) -> FloatArray:
+def missed_by_cubics(poses: tuple[Balance, ...]) -> FloatArray:
     """Return what the cubic of each interval may be off, (k - 1,) [N or N m]: the larger value of its two ends."""
     from scipy.interpolate import CubicHermiteSpline
 

@@ -101,6 +101,11 @@ class PosePath:
         """Of the poses, (k,) [m or rad]."""
         return np.array([pose.travel for pose in self.poses])
 
+    @property
+    def solved_travel(self) -> FloatArray:
+        """Of the poses that are solved, not put together, (j,) [m or rad]."""
+        return np.array([pose.travel for pose in self.poses if pose.solved])
+
     def law(self, sense: float = 1.0) -> CubicHermiteSpline:
         """Return the cubics through the efforts and stiffnesses of the poses, of travel and effort times a sign.
 

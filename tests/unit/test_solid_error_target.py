@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from cfmkit.families import family
 from cfmkit.solid import adaptive_solution
 from cfmkit.solid.adaptive_solution import DrivenPart, MeshError
 from cfmkit.solid.boundary_and_element_sizes import Ring
+from cfmkit.solid.few_poses import PoseGuide, follow_some, solve_some
 from cfmkit.solid.meshed_part import HeldOrDriven, Part
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 
@@ -136,3 +139,57 @@ def test_a_bifurcation_is_a_corner_of_the_curve_at_eulers_load():
     assert before.effort == pytest.approx(load, rel=0.01)
     assert abs(behind.stiffness) < 0.05 * before.stiffness
     assert max(pose.effort for pose in course.poses) == pytest.approx(course.poses[-1].effort, rel=0.01)
+
+
+def test_poses_that_are_not_solved_on_the_last_mesh_are_those_that_would_be():
+    """They are those of the first mesh and what the meshes differ by, which changes slowly along the path."""
+    part = DrivenPart("strip", PARTS["fillets"][0], 5e-4, tuple(np.linspace(0.0, 3e-3, 21).tolist()))
+    few, every = (replace(part, every_pose=one).solved() for one in (False, True))
+    course, other = few.solution.course, every.solution.course
+    assert course.travel == pytest.approx(other.travel)
+    assert len(course.solved_travel) <= 10 < 20 < len(other.solved_travel) == len(other.poses)
+    for name, allowed in (("effort", 1e-6), ("stiffness", 1e-5)):
+        one, two = (np.array([getattr(pose, name) for pose in path.poses]) for path in (course, other))
+        assert one == pytest.approx(two, abs=allowed * np.abs(two).max())
+    assert few.solution.peaks[0] == pytest.approx(every.solution.peaks[0], abs=1e-5 * every.solution.peaks[0].max())
+    assert few.error.force == pytest.approx(every.error.force, rel=0.01)
+
+
+def test_poses_are_solved_until_the_cubics_predict_them_as_closely_as_allowed():
+    part = PARTS["fillets"][0]
+    meshed = part.meshed()
+    stops = np.linspace(0.0, 3e-3, 13).tolist()
+    coarse = meshed.followed(stops)
+    finer, refinement = meshed.refined()
+    guide = PoseGuide(coarse, finer, (refinement,))
+    count = len(coarse.course.poses)
+    ends = solve_some(guide, coarse.course.travel[[0, count // 2, -1]].tolist())
+    solution = follow_some(guide, ends, stops, 0.0, lambda _share: None)
+    assert len(solution.course.solved_travel) == count
+    few = follow_some(guide, ends, stops, 1e-3, lambda _share: None)
+    assert len(few.course.solved_travel) == 5
+
+
+def test_a_path_with_a_bifurcation_is_solved_at_every_pose():
+    """The corner is elsewhere on each mesh: no cubic leads from one side to the other."""
+    strut = strip(30e-3, 0.8e-3, direction=(-1.0, 0.0))
+    solved, _ = forces(strut, 5e-4, 0.2e-3, 5)
+    course = solved.solution.course
+    assert course.bifurcations
+    assert len(course.solved_travel) == len(course.poses)
+    assert solved.critical_points[0].error < 2e-3
+
+
+@pytest.mark.slow
+def test_a_path_that_nearly_bifurcates_has_the_forces_of_all_poses():
+    """A strut that leans by a thirtieth buckles gently, within few poses: cubics across them missed the force."""
+    lean = strip(30e-3, 0.8e-3, direction=(-1.0, -0.03))
+    meshed = lean.meshed()
+    stops = np.linspace(0.0, 0.2e-3, 5).tolist()
+    coarse = meshed.followed(stops)
+    assert len(coarse.course.poses) > len(stops)
+    solved = DrivenPart("strip", lean, 0.1, tuple(stops)).solved()
+    every = DrivenPart("strip", lean, 0.1, tuple(stops), every_pose=True).solved()
+    places = np.linspace(0.0, 0.2e-3, 101)
+    force, truth = (found.solution.course.effort(places) for found in (solved, every))
+    assert force == pytest.approx(truth, abs=1e-4 * np.abs(truth).max())

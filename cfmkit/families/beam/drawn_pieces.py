@@ -39,6 +39,13 @@ ON = 1e-6
 LEAST = 0.1
 """Pads of which less than this share is behind all beams are none."""
 
+SQUARE = 0.1
+"""Sine of the angle between a beam and a section at a bend below which the section is that across the beam."""
+
+OVER = 1.02
+"""Length of sections at bends, in what straight beams have there: edges of curved ones are a little off. Beyond the
+edge a section has no nodes."""
+
 _CORNERS = 64
 """A polygon with so many lies within its circle by at most 0.12 % of the radius."""
 
@@ -232,6 +239,40 @@ def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) ->
 def ends_at(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[BeamEnd]:
     """Return the ends of beams at a node, first those that begin there."""
     return sorted(meeting_ends(assembly, beams).get(node, []), key=lambda end: end.last)
+
+
+def mitre_direction(ends: Sequence[BeamEnd]) -> float | None:
+    """Return the direction in which a section halves the angle between two beams [rad]; None if there are not two."""
+    if len(ends) != 2:
+        return None
+    along = ends[0].along - ends[1].along
+    return math.atan2(along[0], -along[1]) if np.hypot(*along) > ON else None
+
+
+def section_at_bend(ends: Sequence[BeamEnd], direction: float, fillet: float) -> FloatArray:
+    """Return the line through a node from edge to edge (2, 2) [m], where beams leave it to both sides or to one.
+
+    Parameters
+    ----------
+    ends : sequence of BeamEnd
+        Beams of one side, or of both.
+    direction : float
+        Of the line: that of the mirror axis, or half way between two beams [rad].
+    fillet : float
+        Radius of the inside corner [m].
+    """
+    line = np.array([math.cos(direction), math.sin(direction)])
+    reach = [0.0, 0.0]
+    for end in ends:
+        lean = float(line @ end.along)
+        square = math.sqrt(max(1.0 - lean**2, 0.0))
+        if square < SQUARE:
+            return ends[0].cap
+        inside, outside = (0.5 * end.thickness + fillet) / square - fillet, 0.5 * end.thickness * square
+        over = 1.0 if square > 1.0 - ON else OVER
+        for side, sign in enumerate((1.0, -1.0)):
+            reach[side] = max(reach[side], over * (inside if sign * lean > 0.0 else outside))
+    return np.array([ends[0].at + reach[0] * line, ends[0].at - reach[1] * line])
 
 
 def disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:

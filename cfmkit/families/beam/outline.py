@@ -39,7 +39,9 @@ from cfmkit.families.beam.drawn_pieces import (
     drawn_parts,
     ends_at,
     is_padded,
+    mitre_direction,
     pads_behind,
+    section_at_bend,
 )
 from cfmkit.families.beam.network_elements_spec import PartSpec
 from cfmkit.families.beam.network_from_spec import assemble, mirror_axis, moving_nodes, on_axis, thinnest_of
@@ -162,7 +164,10 @@ def _region(assembly: Assembly, node: str, ends: list[BeamEnd], bulge: float) ->
     end = ends[0]
     if about.support.across and not about.support.rotation and not on_axis(assembly, node):
         return HeldPlace(node, node, at, (disc(end.at, HOLE * end.thickness, bulge),))
-    return HeldPlace(node, node, at, (end.cap,), (end.cap,))
+    axis = mirror_axis(assembly)
+    mitre = axis[1] if axis is not None and on_axis(assembly, node) else mitre_direction(ends)
+    section = end.cap if mitre is None else section_at_bend(ends, mitre, drawn_fillet(assembly.spec))
+    return HeldPlace(node, node, at, (section,), (section,))
 
 
 def drawing(spec: BeamSpec, tolerance: float | None = None, check: bool = True) -> Drawing:

@@ -301,7 +301,8 @@ def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
     """Return the part with the travels that it is solved for."""
     from cfmkit.solid.adaptive_solution import DrivenPart
 
-    return DrivenPart("beams", part_of(spec, assembly), spec.analysis.solid.error, tuple(_stops(spec)))
+    analysis, reacting = spec.analysis, bool(spec.analysis.outputs.reactions)
+    return DrivenPart("beams", part_of(spec, assembly), analysis.solid.error, tuple(_stops(spec)), reacting)
 
 
 def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
@@ -398,7 +399,9 @@ def _turns(spec: BeamSpec) -> bool:
 
 def _curve(solution: SolidSolution) -> Curve:
     course, motion = solution.fine.course, solution.motion
-    solved = np.isclose(motion[:, None], course.travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(axis=1)
+    solved = np.isclose(motion[:, None], course.solved_travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(
+        axis=1
+    )
     extra = {
         "max_stress": Column(solution.stress, "stress"),
         "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),

@@ -145,7 +145,7 @@ class SolidSampler(ExactSampler):
 
 def _poses_at(places: FloatArray, paths: Sequence[SolidPath]) -> NDArray[np.bool_]:
     """Tell at which travels (n,) [m] one of some paths has a pose."""
-    known = np.concatenate([path.solved.course.travel for path in paths])
+    known = np.concatenate([path.solved.course.solved_travel for path in paths])
     near = 1e-9 * float(np.abs(known).max(initial=0.0))
     return np.asarray((np.abs(places[:, None] - known) <= near).any(axis=1))
 

@@ -227,7 +227,7 @@ def _stops(spec: SliderCrankSpec) -> list[float]:
 
 def _curve(solution: SolidSolution) -> Curve:
     course, travel = solution.fine.course, solution.travel
-    solved = np.isclose(travel[:, None], course.travel, rtol=0, atol=1e-9 * travel[-1]).any(axis=1)
+    solved = np.isclose(travel[:, None], course.solved_travel, rtol=0, atol=1e-9 * travel[-1]).any(axis=1)
     stable = np.array([pose.unstable == 0 for pose in course.poses])
     before = np.clip(np.searchsorted(course.travel, travel * (1 + 1e-12)) - 1, 0, None)
     extra = {

@@ -1,0 +1,234 @@
+"""The path of a part on a fine mesh, from that on a coarse mesh and a few poses on the fine one.
+
+What two meshes differ by changes much more slowly along the path than the poses themselves. It is known at poses that
+are solved on both, with its slope, and between them by cubics. Poses are solved in the middle of intervals where such a
+cubic may be off most, until it predicts their force: as for the curve between poses (`meshed_part.refined`), of which
+this is the curve of the difference. Every pose that is not solved says so (`Balance.solved`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.solid.meshed_part import MeshSolution, missed_by_cubics
+from cfmkit.solid.path_following import PathEnd
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from scipy.interpolate import CubicHermiteSpline
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.solid.equilibrium import Balance
+    from cfmkit.solid.mesh_refinement import RefinedMesh
+    from cfmkit.solid.meshed_part import Meshed
+
+
+CORRECTION_CHECKS = 2
+"""Poses that must be as predicted, one after the other: those of Lan's part are predicted to 1e-6 from seven."""
+
+
+SEEN = 0.01
+"""Part of the largest effort within which the solved poses must draw the coarse curve: what two meshes differ by, a
+thousandth of it, is then known to some 1e-5."""
+SHARP = 1.0 / 8.0
+"""Part of the steps between stops: where steps are shorter, the path has nearly a corner, and all poses are solved."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseGuide:
+    """Unknowns on a mesh predicted from those of a coarser one that it was refined from."""
+
+    coarse: MeshSolution
+    meshed: Meshed
+    refinements: tuple[RefinedMesh, ...]
+
+    @cached_property
+    def poses(self) -> dict[float, Balance]:
+        """Poses on the coarser mesh by their travel [m or rad]."""
+        return {pose.travel: pose for pose in self.coarse.course.poses}
+
+    def __call__(self, travel: float) -> FloatArray | None:
+        """Return the unknowns at a travel [m or rad]; None if the coarser mesh has no pose there."""
+        pose = self.poses.get(travel)
+        return None if pose is None else self._interpolate(self.coarse.moved(pose), pose.unknowns)
+
+    def interpolate(self, travel: float) -> Balance:
+        """Return the coarse pose at one of its travels [m or rad] as one on this mesh: unknowns and their slope."""
+        if travel not in self._interpolated:
+            pose = self.poses[travel]
+            unknowns = self._interpolate(self.coarse.moved(pose), pose.unknowns)
+            slope = self._interpolate(self.coarse.slope(pose), pose.slope)
+            self._interpolated[travel] = replace(pose, unknowns=unknowns, slope=slope, solved=False)
+        return self._interpolated[travel]
+
+    @cached_property
+    def _interpolated(self) -> dict[float, Balance]:
+        return {}
+
+    def _interpolate(self, field: FloatArray, unknowns: FloatArray) -> FloatArray:
+        """Return a field of the coarse nodes (n, 2) as unknowns, with the free motions of rigid pieces."""
+        for refinement in self.refinements:
+            field = refinement.interpolate(field)
+        free = unknowns[len(self.coarse.problem.supports.loose) :]
+        return np.concatenate([field.ravel()[self.meshed.problem.supports.loose], free])
+
+    @property
+    def travels(self) -> tuple[float, ...]:
+        """Travels of the poses that are not close to a bifurcation [m or rad]: it is elsewhere on each mesh."""
+        course = self.coarse.course
+        near = APART * abs(course.poses[-1].travel - course.poses[0].travel)
+        return tuple(
+            pose.travel
+            for pose in course.poses
+            if all(abs(pose.travel - place) > near for place in course.bifurcations)
+        )
+
+
+APART = 0.01
+"""Distance from a bifurcation within which poses of a coarser mesh are not repeated, in parts of the travel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What solved poses on a fine mesh differ by from those on a coarse one, as a curve."""
+
+    guide: PoseGuide
+    solved: tuple[Balance, ...]  # along the path, at travels of the coarse mesh
+
+    @property
+    def differences(self) -> tuple[Balance, ...]:
+        """The differences at the solved poses."""
+        return tuple(_difference(pose, self.guide.interpolate(pose.travel)) for pose in self.solved)
+
+    @cached_property
+    def _cubics(self) -> CubicHermiteSpline:
+        """The cubics through them, of the travel times the sense of the path: unknowns, then the effort."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        found = self.differences
+        values = np.array([np.append(one.unknowns, one.effort) for one in found])
+        slopes = np.array([np.append(one.slope, one.stiffness) for one in found])
+        return CubicHermiteSpline([self._sense * one.travel for one in found], values, self._sense * slopes)
+
+    @property
+    def _sense(self) -> float:
+        return float(np.sign(self.solved[-1].travel - self.solved[0].travel))
+
+    def pose_at(self, travel: float) -> Balance:
+        """Return the pose on the fine mesh at a travel of the coarse one [m or rad], by what they differ by there."""
+        coarse, at = self.guide.interpolate(travel), self._sense * travel
+        more, slope = self._cubics(at), self._sense * self._cubics(at, 1)
+        return replace(
+            coarse,
+            unknowns=coarse.unknowns + more[:-1],
+            effort=coarse.effort + float(more[-1]),
+            stiffness=coarse.stiffness + float(slope[-1]),
+            slope=coarse.slope + slope[:-1],
+        )
+
+    def next_travel(self, travels: Sequence[float]) -> float | None:
+        """Return the travel, of some, where the curve may be off most; None if all are solved.
+
+        First where cubics through the coarse poses at the same travels miss the coarse curve: it has no shape there
+        that the solved poses do not see. Then in the middle of the interval where those of the difference may be off.
+        """
+        places = np.array([self._sense * pose.travel for pose in self.solved])
+        missed = self._missed(travels)
+        if missed.max() > SEEN:
+            return travels[int(missed.argmax())]
+        for k in np.argsort(-missed_by_cubics(self.differences), kind="stable"):
+            inside = [one for one in travels if places[k] < self._sense * one < places[k + 1]]
+            if inside:
+                middle = 0.5 * (places[k] + places[k + 1])
+                return min(inside, key=lambda one: abs(self._sense * one - middle))
+        return None
+
+    def _missed(self, travels: Sequence[float]) -> FloatArray:
+        """Return what the coarse curve is off at travels, drawn through the solved ones only, of its largest effort."""
+        poses = self.guide.poses
+        drawn = replace(self.guide.coarse.course, poses=tuple(poses[pose.travel] for pose in self.solved))
+        effort = np.array([poses[travel].effort for travel in travels])
+        size = float(np.abs(effort).max())
+        return np.abs(drawn.effort(np.array(travels)) - effort) / size if size else np.zeros(len(travels))
+
+
+def _difference(pose: Balance, other: Balance) -> Balance:
+    return replace(
+        pose,
+        unknowns=pose.unknowns - other.unknowns,
+        effort=pose.effort - other.effort,
+        stiffness=pose.stiffness - other.stiffness,
+        slope=pose.slope - other.slope,
+    )
+
+
+def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...]:
+    """Return the poses on a fine mesh at some travels of the coarse one, as far as they are found and as stable."""
+    found: list[Balance] = []
+    for travel in travels:
+        coarse = guide.interpolate(travel)
+        more = _difference(found[-1], guide.interpolate(found[-1].travel)).unknowns if found else 0.0
+        pose = guide.meshed.problem.solve(coarse.unknowns + more, travel)
+        if pose is not None and pose.unstable <= coarse.unstable:
+            found.append(pose.kept())
+    return tuple(found)
+
+
+def follow_some(
+    guide: PoseGuide, poses: Sequence[Balance], stops: Sequence[float], allowed: float, report: Callable[[float], None]
+) -> MeshSolution | None:
+    """Return the path on a fine mesh at all travels of the coarse one; None where it has not the same course.
+
+    Parameters
+    ----------
+    guide : PoseGuide
+        With the path on the coarse mesh.
+    poses : sequence of Balance
+        That are solved on the fine mesh, the first and the last one of the path among them.
+    stops : sequence of float
+        Travels at which poses were wanted, before steps were cut [m or rad].
+    allowed : float
+        Difference of the cubics and a pose, in parts of the largest effort, below which enough are solved.
+    report : callable
+        Is given the share that is done.
+    """
+    course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
+    if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
+        return None
+    if _is_sharp(np.abs(travels), np.abs(stops)):
+        return None
+    if (poses[0].travel, poses[-1].travel) != (travels[0], travels[-1]):
+        return None
+    size = max(abs(pose.effort) for pose in course.poses)
+    correction = Correction(guide, tuple(poses))
+    off: list[float] = []
+    while len(off) < CORRECTION_CHECKS or max(off[-CORRECTION_CHECKS:]) > allowed:
+        if (travel := correction.next_travel(travels)) is None:
+            break
+        guess = correction.pose_at(travel)
+        pose = guide.meshed.problem.solve(guess.unknowns, travel)
+        if pose is None or pose.unstable > guess.unstable:
+            return None
+        off.append(abs(pose.effort - guess.effort) / size if size else 0.0)
+        along = sorted([*correction.solved, pose.kept()], key=lambda one: travels.index(one.travel))
+        correction = Correction(guide, tuple(along))
+        report(len(along) / len(travels))
+    known = {pose.travel: pose for pose in correction.solved}
+    whole = tuple(known.get(travel) or correction.pose_at(travel) for travel in travels)
+    between = float(np.nan_to_num(guide.coarse.between)) + max(off[-CORRECTION_CHECKS:], default=0.0)
+    return MeshSolution(
+        guide.meshed.part, guide.meshed.problem, replace(course, poses=whole), guide.meshed.unjudged, between
+    )
+
+
+def _is_sharp(travels: FloatArray, stops: FloatArray) -> bool:
+    """Return True if two steps in a row had to be much shorter than those between stops; one may be what was left."""
+    interval = np.clip(np.searchsorted(stops, travels[1:], side="left"), 1, len(stops) - 1)
+    steps = np.diff(stops)[interval - 1]
+    short = np.diff(travels) < SHARP * (1.0 - 1e-9) * steps
+    return bool((short[:-1] & short[1:]).any())
