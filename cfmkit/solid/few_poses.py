@@ -200,7 +200,7 @@ def follow_some(
     course, travels = guide.coarse.course, guide.coarse.course.travel.tolist()
     if course.ending is not PathEnd.COMPLETE or course.bifurcations or len(poses) < 3:
         return None
-    if _is_sharp(np.abs(travels), np.abs(stops)):
+    if is_sharp(np.abs(travels), np.abs(stops)):
         return None
     if (poses[0].travel, poses[-1].travel) != (travels[0], travels[-1]):
         return None
@@ -226,7 +226,7 @@ def follow_some(
     )
 
 
-def _is_sharp(travels: FloatArray, stops: FloatArray) -> bool:
+def is_sharp(travels: FloatArray, stops: FloatArray) -> bool:
     """Return True if two steps in a row had to be much shorter than those between stops; one may be what was left."""
     interval = np.clip(np.searchsorted(stops, travels[1:], side="left"), 1, len(stops) - 1)
     steps = np.diff(stops)[interval - 1]

@@ -13,7 +13,7 @@ from cfmkit.families import family
 from cfmkit.solid import adaptive_solution
 from cfmkit.solid.adaptive_solution import DrivenPart, MeshError
 from cfmkit.solid.boundary_and_element_sizes import Ring
-from cfmkit.solid.few_poses import PoseGuide, follow_some, solve_some
+from cfmkit.solid.few_poses import PoseGuide, follow_some, is_sharp, solve_some
 from cfmkit.solid.meshed_part import HeldOrDriven, Part
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 
@@ -180,16 +180,9 @@ def test_a_path_with_a_bifurcation_is_solved_at_every_pose():
     assert solved.critical_points[0].error < 2e-3
 
 
-@pytest.mark.slow
-def test_a_path_that_nearly_bifurcates_has_the_forces_of_all_poses():
-    """A strut that leans by a thirtieth buckles gently, within few poses: cubics across them missed the force."""
-    lean = strip(30e-3, 0.8e-3, direction=(-1.0, -0.03))
-    meshed = lean.meshed()
-    stops = np.linspace(0.0, 0.2e-3, 5).tolist()
-    coarse = meshed.followed(stops)
-    assert len(coarse.course.poses) > len(stops)
-    solved = DrivenPart("strip", lean, 0.1, tuple(stops)).solved()
-    every = DrivenPart("strip", lean, 0.1, tuple(stops), every_pose=True).solved()
-    places = np.linspace(0.0, 0.2e-3, 101)
-    force, truth = (found.solution.course.effort(places) for found in (solved, every))
-    assert force == pytest.approx(truth, abs=1e-4 * np.abs(truth).max())
+def test_steps_cut_over_and_over_show_a_corner_but_a_check_or_a_remainder_does_not():
+    """The leaf of `vcfm_straight` nearly bifurcates on its first mesh: cubics across that made it 24 % too stiff."""
+    stops = np.array([0.0, 1.0, 2.0, 3.0])
+    assert not is_sharp(np.array([0.0, 1.0, 1.25, 1.5, 2.0, 3.0]), stops)
+    assert not is_sharp(np.array([0.0, 0.95, 1.0, 2.0, 3.0]), stops)
+    assert is_sharp(np.array([0.0, 1.0, 1.5, 1.6, 1.7, 2.0, 3.0]), stops)
