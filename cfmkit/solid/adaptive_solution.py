@@ -60,7 +60,7 @@ SINGULAR_AFTER_SPLIT, SMOOTH_AFTER_SPLIT = 0.5, 1.0 / 8.0
 """Error expected in a triangle once it is split, in what it was."""
 CORRECTION_SHARE, CORRECTION_LARGEST = 0.04, 2e-5
 """Of the allowed error, that the difference of meshes may have between the poses that are solved on both; and how much
-of the largest force that may be, however little is asked for: a curve's shape is not to suffer."""
+of the largest force that may be, whatever target is requested: a curve's shape is not to suffer."""
 BETWEEN_SHARE = 0.2
 """Of the allowed error, that cubics between poses may have."""
 
