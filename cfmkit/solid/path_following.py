@@ -34,9 +34,11 @@ FARTHEST = 2.5
 """Step, in those of the last one, up to which a cubic is a better prediction than a tangent."""
 GROWTH = 2.0
 """Of the step after one that was easy."""
-CORNER, SEEN = 0.3, 0.1
+CORNER, SEEN = 0.3, 0.05
 """Change of the stiffness, in parts of the larger one and of the largest so far, for which steps are cut: that of a
 smooth curve gets smaller and smaller, one that does not has a corner, as at a bifurcation."""
+ROUNDED = 8.0
+"""Smallest steps over which a corner may be rounded: where a branch ends, a mesh is an imperfection."""
 CORNERS_APART = 2.0**-6
 """Distance between corners, in parts of the whole travel: a corner is seen by its neighbours, too."""
 CORNER_WIDTH = 1e-9
@@ -180,13 +182,17 @@ def follow(
                 if found is None:
                     return replace(course, ending=_ending(start, state, beyond))
             smooth.append(state.kept())
-            if bends(state, found, steepest):
+            before, upto = state, len(course.poses)
+            if not bends(state, found, steepest):
+                upto = _rounded_from(course, found, ROUNDED * SMALLEST * abs(span))
+                before = course.poses[upto - 1]
+            if bends(before, found, steepest):
                 smooth = []  # no cubic leads round a corner
                 last = course.bifurcations[-1] if course.bifurcations else math.inf
-                if abs(state.travel - last) > CORNERS_APART * abs(span):
-                    corner = _corner(problem, state, found, CORNER_WIDTH * span)
+                if abs(before.travel - last) > CORNERS_APART * abs(span):
+                    corner = _corner(problem, before, found, CORNER_WIDTH * span)
                     place = corner[0].travel if corner else state.travel
-                    poses = (*course.poses, *(pose.kept() for pose in corner))
+                    poses = (*course.poses[: upto if corner else None], *(pose.kept() for pose in corner))
                     course = replace(course, poses=poses, bifurcations=(*course.bifurcations, place))
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
@@ -283,6 +289,13 @@ def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balan
     moves = len(problem.supports.loose)  # behind them are turns, whose radians are no metres
     correction = float(np.abs((found.unknowns - state.unknowns - predicted)[:moves]).max())
     return found if correction <= STRAY * float(np.abs(predicted[:moves]).max()) + SOFTLY * size else None
+
+
+def _rounded_from(course: PosePath, found: Balance, width: float) -> int:
+    """Return how many poses of a course lead to where a corner before a new pose begins, of a width at most."""
+    last = course.bifurcations[-1] if course.bifurcations else math.inf
+    near = [abs(found.travel - pose.travel) <= width and abs(pose.travel - last) > width for pose in course.poses[:-1]]
+    return near.index(True) + 1 if True in near else len(course.poses)
 
 
 def _corner(problem: SolidProblem, state: Balance, found: Balance, width: float) -> tuple[Balance, ...]:

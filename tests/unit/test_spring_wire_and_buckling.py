@@ -292,8 +292,8 @@ def test_a_design_takes_springs_that_stand_alone_before_those_that_need_a_rod(vc
     alone = made(listed[1])
     assert alone.spec.mechanism.springs.guide_rod == pytest.approx(0.00225)
     assert "guided on a rod of 2.25 mm" in alone.message
-    held = made(listed[1] | {"guide_tube": "4.5 mm"})
-    assert held.spec.mechanism.springs.guide_tube == pytest.approx(0.0045)
+    held = made(listed[1] | {"guide_tube": "4 mm"})
+    assert held.spec.mechanism.springs.guide_tube == pytest.approx(0.004)
     assert held.spec.mechanism.springs.guide_rod is None
 
 

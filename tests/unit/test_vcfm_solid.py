@@ -174,3 +174,11 @@ def test_fillets_that_make_cuts_cross_are_refused_before_a_mesh_is_made():
     result = api.analyze(spec("ding2022", "analysis.fidelity=solid", "mechanism.part.fillet=200 mm"))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "cross or touch at" in result.message
+
+
+@pytest.mark.slow
+def test_a_corner_that_the_mesh_rounds_is_the_end_of_the_linear_range():
+    """The buckled path of a leaf on a mesh joins the straight one over a 500th of the travel: it was not seen."""
+    solid, exact = (api.analyze(spec("ding2022", f"analysis.fidelity={model}")).values for model in ("solid", "exact"))
+    assert solid["linear_end"].value == pytest.approx(exact["linear_end"].value, rel=0.02)
+    assert solid["negative_stiffness"].value == pytest.approx(exact["negative_stiffness"].value, rel=0.03)
