@@ -158,8 +158,8 @@ def follow(
     for stop in stops[1:]:
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
-            found = _guided(problem, state, ahead, guide)
-            found = advanced(problem, state, ahead, _base(smooth, state, ahead)) if found is None else found
+            guided = _guided(problem, state, ahead, guide)
+            found = advanced(problem, state, ahead, _base(smooth, state, ahead)) if guided is None else guided
             steepest = max(abs(pose.stiffness) for pose in course.poses)
             spot = None if found is None else touching(problem, found)
             if spot is not None:
@@ -182,6 +182,8 @@ def follow(
                 if found is None:
                     return replace(course, ending=_ending(start, state, beyond))
             smooth.append(state.kept())
+            if found is guided and float((found.unknowns - state.unknowns) @ state.slope) * (ahead - state.travel) < 0:
+                smooth = []  # a guide on the other side of a branch: no cubic leads there
             before, upto = state, len(course.poses)
             if not bends(state, found, steepest):
                 upto = _rounded_from(course, found, ROUNDED * SMALLEST * abs(span))
