@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class RowSamples:
     """Values over a motion, each curve a row: after the end of a row its last place and value are repeated."""
 
     motion: FloatArray  # (d, n), increasing [m or rad]
     values: FloatArray  # (d, n)
     count: NDArray[np.intp]  # (d,) of each row
 
-    def between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[Samples, NDArray[np.bool_]]:
+    def between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
         """Return the samples inside of windows, the ends left out; and which of the columns are of each row."""
         low, high = (end[:, None] for end in window)
         margin = np.reshape(slack, (-1, 1))
@@ -47,21 +47,21 @@ class Samples:
         inside &= np.arange(self.motion.shape[1]) < self.count[:, None]
         count, start = inside.sum(axis=1), inside.argmax(axis=1)
         index = np.minimum(start[:, None] + np.arange(count.max(initial=0)), self.motion.shape[1] - 1)
-        cut = Samples(np.take_along_axis(self.motion, index, 1), np.take_along_axis(self.values, index, 1), count)
+        cut = RowSamples(np.take_along_axis(self.motion, index, 1), np.take_along_axis(self.values, index, 1), count)
         return cut, np.arange(index.shape[1]) < count[:, None]
 
-    def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> Samples:
+    def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> RowSamples:
         """Return the samples inside of windows and their ends, with values (d, 2) there."""
         cut, own = self.between(window, slack)
         ends = np.stack(window, axis=1)
         motion, inner = (np.where(own, item, last[:, 1:]) for item, last in ((cut.motion, ends), (cut.values, values)))
-        return Samples(
+        return RowSamples(
             np.hstack([ends[:, :1], motion, ends[:, 1:]]),
             np.hstack([values[:, :1], inner, values[:, 1:]]),
             cut.count + 2,
         )
 
-    def joined(self, places: FloatArray, values: FloatArray) -> Samples:
+    def joined(self, places: FloatArray, values: FloatArray) -> RowSamples:
         """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
         motion, known = np.hstack([self.motion, places]), np.hstack([self.values, values])
         order = np.argsort(motion, axis=1, kind="stable")
@@ -73,7 +73,7 @@ class Samples:
         order = np.where(
             np.arange(order.shape[1]) < count[:, None], order, order[np.arange(len(count)), count - 1][:, None]
         )
-        return Samples(np.take_along_axis(motion, order, 1), np.take_along_axis(known, order, 1), count)
+        return RowSamples(np.take_along_axis(motion, order, 1), np.take_along_axis(known, order, 1), count)
 
     def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: bool = False) -> Ends:
         """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
@@ -84,12 +84,12 @@ class Samples:
 class StressRows:
     """The largest stress of many mechanisms."""
 
-    read: Callable[[], Sequence[Samples]]  # at the points of each load case, that of the curve first [Pa]
+    read: Callable[[], Sequence[RowSamples]]  # at the points of each load case, that of the curve first [Pa]
     at: Callable[[FloatArray, Any], FloatArray]  # of all load cases at places of some rows, (k, m), (k,) -> (k, m) [Pa]
     allowable: FloatArray  # (d,) NaN if there is none [Pa]
 
     @cached_property
-    def samples(self) -> Sequence[Samples]:
+    def samples(self) -> Sequence[RowSamples]:
         """What is known at the points."""
         return self.read()
 
@@ -98,7 +98,7 @@ class StressRows:
 class CurveRows:
     """One branch of many curves, one a row."""
 
-    samples: Samples  # efforts at the points [N or N m]
+    samples: RowSamples  # efforts at the points [N or N m]
     dense: FloatArray  # (d, q) increasing places, so dense that the effort hides nothing between two; may be repeated
     effort: Callable[[FloatArray, Any], FloatArray]  # at places of some rows, (k, m), (k,) or None for all -> (k, m)
     error: FloatArray  # (d,) numerical error of the effort
@@ -153,7 +153,7 @@ class RowsInWindow:
         return np.clip(self.ends[0], first, last), np.clip(self.ends[1], first, last)
 
     @cached_property
-    def inside(self) -> Samples:
+    def inside(self) -> RowSamples:
         """The efforts at the points in the window and at its ends."""
         low, high = self._cut
         at_ends = self.curves.all_at(np.stack([low, high], axis=1))
@@ -163,7 +163,7 @@ class RowsInWindow:
     def _dense(self) -> FloatArray:
         """The dense places in the window, (d, q); those of a row with fewer repeat its first."""
         dense = self.curves.dense
-        within, own = Samples(dense, dense, np.full(len(dense), dense.shape[1])).between(self._cut)
+        within, own = RowSamples(dense, dense, np.full(len(dense), dense.shape[1])).between(self._cut)
         return np.where(own, within.motion, self._cut[0][:, None])
 
     @property
@@ -200,7 +200,7 @@ class RowsInWindow:
         function = self.curves.part_efforts
         if function is None:
             return np.full(len(self.ends[0]), np.nan)
-        sizes = Samples(self.inside.motion, function(self.inside.motion), self.inside.count)
+        sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
         top, _ = sizes.joined(self._dense, function(self._dense)).extremes(function, self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
@@ -266,7 +266,7 @@ class RowsInWindow:
         return np.where(self._has_target, self.curves.target, level)
 
 
-def _at(samples: Samples, place: FloatArray) -> FloatArray:
+def _at(samples: RowSamples, place: FloatArray) -> FloatArray:
     """Return the value of each row at a place, (d,), by linear interpolation."""
     rows = np.arange(len(place))
     after = np.clip((samples.motion < place[:, None]).sum(axis=1), 1, np.maximum(samples.count - 1, 1))

@@ -20,7 +20,7 @@ from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
 from cfmkit.metrics.longest_interval_in_band import extremes
-from cfmkit.metrics.metrics_of_rows import CurveRows, Samples, StressRows
+from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
@@ -381,11 +381,11 @@ class Solution(ShortRepr):
         spring = np.where((travel < first) | (travel > last), 0.0, spring).reshape(len(chosen), count, -1)
         return np.asarray(np.maximum(self.nominal.sampler.of_rows(chosen).leaf_stress(places), spring.max(axis=1)))
 
-    def _stress_samples(self) -> list[Samples]:
+    def _stress_samples(self) -> list[RowSamples]:
         """Return the largest stress of leaves and spring at the points of each preload, the nominal one first [Pa]."""
         curves, every = self.curves, [slice(k, None, self.preloads) for k in range(self.preloads)]
         stress = np.maximum(curves.leaves.stress, curves.spring_samples.stress)
-        return [Samples(curves.travel[own], stress[own], curves.count[own]) for own in every]
+        return [RowSamples(curves.travel[own], stress[own], curves.count[own]) for own in every]
 
     @cached_property
     def branches(self) -> dict[str, CurveRows]:
@@ -393,7 +393,7 @@ class Solution(ShortRepr):
         curves = self.nominal
         low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
         found = CurveRows(
-            Samples(curves.travel, curves.force, curves.count),
+            RowSamples(curves.travel, curves.force, curves.count),
             self.dense,
             curves.force_at,
             self.effort_error,
