@@ -5,12 +5,14 @@ The full text of a result would have a million characters: what holds arrays, an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -81,6 +83,115 @@ class Several(tuple[T, ...]):
     def __repr__(self) -> str:
         """Return the first values, and how many more there are."""
         return "(" + _joined([brief(value) for value in self]) + ")"
+
+
+class LazyMapping(Mapping[str, T]):
+    """Values by name, each computed when it is first read.
+
+    Parameters
+    ----------
+    names : iterable of str
+        In the order in which they are shown.
+    compute : callable
+        Returns the value of a name.
+    known : mapping, optional
+        Values that are known already; they come last.
+
+    Examples
+    --------
+    >>> lengths = LazyMapping(["cam", "beam"], len)
+    >>> lengths["beam"], list(lengths | {"x": 1})
+    (4, ['cam', 'beam', 'x'])
+    """
+
+    def __init__(self, names: Iterable[str], compute: Callable[[str], T], known: Mapping[str, T] | None = None) -> None:
+        """Compute nothing yet."""
+        self._known = dict(known or {})
+        self._names = dict.fromkeys((*names, *self._known))
+        self._compute = compute
+
+    def __getitem__(self, name: str) -> T:
+        """Return a value; it is computed once."""
+        if name not in self._known:
+            if name not in self._names:
+                raise KeyError(name)
+            self._known[name] = self._compute(name)
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of names."""
+        return len(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        """Return True if there is a value of that name, without computing it."""
+        return name in self._names
+
+    def __or__(self, other: Mapping[str, T]) -> LazyMapping[T]:
+        """Return these values with others, which replace those of the same name."""
+        return LazyMapping(self._names, self._compute, {**self._known, **other})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what pickling needs: the values."""
+        return Named, (dict(self),)
+
+    def __repr__(self) -> str:
+        """Return the names; nothing is computed for a text."""
+        return f"<values by name: {_joined(list(self._names))}>"
+
+
+class LazySequence(Sequence[T]):
+    """Values in order, all computed when one of them, or their number, is first read.
+
+    Examples
+    --------
+    >>> squares = LazySequence(lambda: (n * n for n in range(4)))
+    >>> (*squares, 16)
+    (0, 1, 4, 9, 16)
+    """
+
+    def __init__(self, compute: Callable[[], Iterable[T]]) -> None:
+        """Compute nothing yet."""
+        self._compute: Callable[[], Iterable[T]] | None = compute
+        self._values: Several[T] = Several()
+
+    @property
+    def values(self) -> Several[T]:
+        """All of them."""
+        if self._compute is not None:
+            self._values, self._compute = Several(self._compute()), None
+        return self._values
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[T, ...]: ...
+    def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
+        """Return one of the values, or some."""
+        return self.values[index]
+
+    def __len__(self) -> int:
+        """Return their number."""
+        return len(self.values)
+
+    def __eq__(self, other: object) -> bool:
+        """Return True if the other sequence has the same values."""
+        return isinstance(other, Sequence) and self.values == tuple(other)
+
+    def __hash__(self) -> int:
+        """Return the hash of all values."""
+        return hash(self.values)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what pickling needs: the values."""
+        return Several, (tuple(self.values),)
+
+    def __repr__(self) -> str:
+        """Return the first values, and how many more there are."""
+        return repr(self.values)
 
 
 class ShortRepr:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from cfmkit.arrays import Named, Several, ShortRepr
+from cfmkit.arrays import LazyMapping, LazySequence, Named, Several, ShortRepr
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
@@ -246,9 +246,9 @@ class Result:
     curves : tuple of Curve
         All curves of the run, the nominal one first; empty if nothing was solved.
     values : mapping
-        Scalar results that the family computes itself, by name.
-    warnings : tuple of Finding
-        What the user must know; warnings never change the exit code.
+        Scalar results that the family computes itself, by name; a `LazyMapping` computes them when they are read.
+    warnings : sequence of Finding
+        What the user must know; warnings never change the exit code. A `LazySequence` composes them when they are read.
     travel : tuple of (float, float), optional
         Where the motion was to start and to end [m or rad]: shares of the travel are of this. Default: the
         nominal curve, as far as it goes.
@@ -292,7 +292,7 @@ class Result:
     message: str = ""
     curves: tuple[Curve, ...] = ()
     values: Mapping[str, Quantity] = field(default_factory=dict)
-    warnings: tuple[Finding, ...] = ()
+    warnings: Sequence[Finding] = ()
     travel: tuple[float, float] | None = None
     valid: tuple[tuple[float, float], ...] | None = None
     target: float | None = None
@@ -314,8 +314,10 @@ class Result:
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
         for name in ("curves", "warnings", "load_cases"):
-            object.__setattr__(self, name, Several(getattr(self, name)))
-        object.__setattr__(self, "values", Named(self.values))
+            if not isinstance(given := getattr(self, name), LazySequence):
+                object.__setattr__(self, name, Several(given))
+        if not isinstance(self.values, LazyMapping):
+            object.__setattr__(self, "values", Named(self.values))
 
     def __repr__(self) -> str:
         """Return the result in a line: what of, how it ended, how much there is."""

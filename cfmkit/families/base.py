@@ -12,13 +12,14 @@ from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WIND
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.elastica.beam_deck_for_abaqus import DrivenNetwork
+    from cfmkit.families.rows import SolvedRows
     from cfmkit.results import Design, Result
     from cfmkit.solid.adaptive_solution import DrivenPart
     from cfmkit.specs.spec import Spec
@@ -301,6 +302,9 @@ class Family:
     analyze_block : callable, optional
         ``analyze_block(spec, block) -> answer``: many variants of a specification at once;
         None where the model cannot vary these paths or measure these metrics.
+    rows : callable, optional
+        ``rows(specs) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
+        (`cfmkit.families.rows`); it takes the place of `analyze_block`.
     block_shares : bool
         Whether `analyze_block` takes windows whose ends are shares of the travel, which each variant has of its own.
     gradient : callable, optional
@@ -366,6 +370,7 @@ class Family:
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
+    rows: Callable[[Sequence[Any]], Iterator[tuple[NDArray[Any], SolvedRows[Any]]]] | None = None
     block_shares: bool = False
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     sampled: str | None = None
@@ -453,7 +458,7 @@ def sized(result: Result, space: Room | None) -> Result:
         name: Quantity(value, *about, "" if value is not None else reason)
         for (name, about), value in zip(ENVELOPE.items(), sides, strict=True)
     }
-    return replace(result, values={**result.values, **found})
+    return replace(result, values=result.values | found)  # type: ignore[operator]
 
 
 def packaged(name: str) -> str:

@@ -14,6 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -50,8 +52,23 @@ def mean(function: Callable[[FloatArray], FloatArray], places: FloatArray, low: 
     return float((half * (values @ _WEIGHTS)).sum() / (high - low))
 
 
+def mean_of_rows(
+    function: Callable[[FloatArray], FloatArray], places: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return `mean` of each row, (d,): of functions (d, m) -> (d, m) with places (d, n) and windows (d,)."""
+    ends = np.hstack([low[:, None], np.clip(places, low[:, None], high[:, None]), high[:, None]])
+    middle, half = 0.5 * (ends[:, 1:] + ends[:, :-1]), 0.5 * (ends[:, 1:] - ends[:, :-1])
+    at = (middle[..., None] + half[..., None] * _NODES).reshape(len(low), -1)
+    values = np.where(half > 0, function(at).reshape(*half.shape, -1) @ _WEIGHTS, 0.0)
+    return np.asarray((half * values).sum(axis=1) / (high - low))
+
+
 def extremes(
-    function: Callable[[FloatArray], FloatArray], motion: FloatArray, effort: FloatArray, uneven: bool = False
+    function: Callable[[FloatArray], FloatArray],
+    motion: FloatArray,
+    effort: FloatArray,
+    uneven: bool = False,
+    last: NDArray[np.intp] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest and the smallest value of each row next to its samples, (d,) each.
 
@@ -63,6 +80,8 @@ def extremes(
         Samples, monotonic in the motion; their values.
     uneven : bool
         Whether samples stand closer in some places than in others: then their number does not tell how close.
+    last : (d,) array, optional
+        Index of the last sample of each row; what follows repeats it.
 
     Examples
     --------
@@ -71,23 +90,29 @@ def extremes(
     >>> float(high[0].round(6)), float(low[0])
     (1.0, 0.0)
     """
-    last = effort.shape[1] - 1
+    end = np.full(len(effort), effort.shape[1] - 1) if last is None else last
     sign = np.array([1.0, -1.0])
-    if last < 2:
-        return effort.max(axis=1), effort.min(axis=1)
+    top, bottom = effort.max(axis=1), effort.min(axis=1)
+    if not (end >= 2).any():
+        return top, bottom
     highest = np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1)
-    near = np.clip(highest, 1, last - 1)[..., None] + np.arange(-1, 2)
+    middle = np.maximum(np.minimum(highest, end[:, None] - 1), 1)
+    near = np.minimum(middle[..., None] + np.arange(-1, 2), effort.shape[1] - 1)
     rows = np.arange(len(effort))[:, None, None]
     x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
     best = sign * effort[rows[..., 0], highest]
-    rounds, beside = (ROUNDS, BESIDE) if uneven or last < FEW else (1, np.zeros(1))
-    for _ in range(rounds):
+    few = (end < FEW) | uneven
+    rounds, beside = (ROUNDS, BESIDE) if few.any() else (1, np.zeros(1))
+    beside = np.where(few[:, None, None], beside, 0.0)
+    for number in range(rounds):
         places = _next(x, y, beside)
         found = sign[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
         found = np.where(np.isfinite(found), found, -np.inf)
-        best = np.maximum(best, found.max(axis=-1))
+        counts = few[:, None] if number else True  # of many samples one parabola is enough
+        best = np.where(counts, np.maximum(best, found.max(axis=-1)), best)
         x, y = _around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
-    return best[:, 0], -best[:, 1]
+    curved = end >= 2
+    return np.where(curved, best[:, 0], top), np.where(curved, -best[:, 1], bottom)
 
 
 def _next(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:

@@ -32,7 +32,10 @@ LOOKS, FINE, FINER = 6, np.linspace(-2.0, 2.0, 65), 16.0
 
 
 def extremes(
-    function: Callable[[FloatArray], FloatArray], place: FloatArray, step: float, span: tuple[FloatArray, FloatArray]
+    function: Callable[[FloatArray], FloatArray],
+    place: FloatArray,
+    step: FloatArray | float,
+    span: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
     """Return where functions are largest near places, (k,), within spans; `step` says how far off these may be.
 
@@ -42,7 +45,7 @@ def extremes(
         Values of each function, (k, m) -> (k, m).
     place : (k,) array
         Near which each is largest.
-    step : float
+    step : (k, 1) array or float
         How far off that may be.
     span : pair of (k,) array
         Within which it is looked for.

@@ -16,6 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
 
     Number = Any  # a float or a (d,) array: what goes in comes out
@@ -137,6 +139,8 @@ class ManyWindows:
         Returns their largest and smallest values, (d,) each, next to the samples as well; called when they are needed.
     error : (d,) array, optional
         Numerical error of the efforts [N or N m].
+    points : (d,) array, optional
+        How many of the efforts are of each curve; those behind repeat the last.
     """
 
     def __init__(
@@ -145,14 +149,23 @@ class ManyWindows:
         effort: FloatArray,
         extremes: Callable[[FloatArray, FloatArray], Pair],
         error: FloatArray | float = 0.0,
+        points: NDArray[np.intp] | None = None,
     ):
         """Keep the efforts."""
         self.motion, self.effort, self._extremes_of, self.error = motion, effort, extremes, error
+        self.points = points
 
     @cached_property
     def mean(self) -> FloatArray:
         """Mean effort of each curve, (d,)."""
-        return np.asarray(self.effort.mean(axis=1))
+        if self.points is None:
+            return np.asarray(self.effort.mean(axis=1))
+        return np.asarray(np.where(self._own, self.effort, 0.0).sum(axis=1) / self.points)
+
+    @property
+    def _own(self) -> NDArray[np.bool_]:
+        """Which efforts are not repeated last ones, (d, n)."""
+        return np.asarray(np.arange(self.effort.shape[1]) < np.reshape(np.asarray(self.points), (-1, 1)))
 
     @cached_property
     def extremes(self) -> Pair:
@@ -167,7 +180,10 @@ class ManyWindows:
     @property
     def deviation(self) -> FloatArray:
         """Sample standard deviation (n - 1) of each curve, (d,)."""
-        return np.asarray(deviation(self.effort, self.mean))
+        if self.points is None:
+            return np.asarray(deviation(self.effort, self.mean))
+        offset = np.where(self._own, self.effort - self.mean[:, None], 0.0)
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (self.points - 1)))
 
     @property
     def work(self) -> FloatArray:

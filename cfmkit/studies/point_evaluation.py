@@ -197,7 +197,12 @@ class Study:
         cfmkit.errors.SpecError
             If it is not valid.
         """
-        return self.spec.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
+        return self._plain.replace(dict(zip(self.paths, values, strict=True)), as_made=self.made)
+
+    @cached_property
+    def _plain(self) -> Spec:
+        """The specification without what is said of studies, which each variant would read again."""
+        return self.spec.model_copy(update={"sweep": None, "sensitivity": None})
 
     def evaluate(self, values: Sequence[Any]) -> Row:
         """Return what becomes of one point; nothing is raised but what ends the process."""
@@ -223,7 +228,7 @@ class Study:
 
     def row(self, result: Result) -> Row:
         """Return what is noted about a result."""
-        warnings = tuple(sorted({item.name for item in result.warnings}))
+        warnings = () if self.lean else tuple(sorted({item.name for item in result.warnings}))
         if not result.status.usable:
             return Row(result.status, message=result.message, warnings=warnings)
         extra = values_of_family(family(result.spec.family).values)

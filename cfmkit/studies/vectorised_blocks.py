@@ -13,6 +13,7 @@ from cfmkit.metrics.metric_values import worst_branch
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.specs.units import Share
 from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
+from cfmkit.studies.variants_in_rows import are_solved_together, evaluate_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,7 +35,9 @@ NOT_JUDGED = "not_judged"
 
 
 def vectorised(study: Study, plan: Plan) -> bool:
-    """Return whether the family's block model can do this study."""
+    """Return whether points are solved together: as rows, or by the family's block model."""
+    if family(study.spec.family).rows is not None:
+        return are_solved_together(study, plan)
     if family(study.spec.family).analyze_block is None or study.design or not len(plan):
         return False
     return _answer(study, plan, 0, 1) is not None
@@ -45,6 +48,8 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> ResultRow
 
     What the block model leaves undone is analysed point by point.
     """
+    if family(study.spec.family).rows is not None:
+        return evaluate_rows(study, plan, start, stop)
     answer = _answer(study, plan, start, stop)
     done = np.zeros(stop - start, dtype=bool) if answer is None else answer.done
     singly = np.flatnonzero(~done).tolist()

@@ -12,26 +12,27 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
-from cfmkit.families.base import Block, Measure
 from cfmkit.families.vcfm.bounding_box import room
-from cfmkit.families.vcfm.findings import extreme_sums
+from cfmkit.families.vcfm.flattening_widths_or_window import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
-from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
-from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of
+from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
 from cfmkit.families.vcfm.pose_outlines import centre_line
-from cfmkit.families.vcfm.scalar_results import forces, spread
-from cfmkit.families.vcfm.solution import force_of
+from cfmkit.families.vcfm.quantities import QUANTITIES
+from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import Window, evaluate
 from cfmkit.metrics.longest_interval_in_band import _levels, _reach, flat_window
+from cfmkit.metrics.metrics_of_rows import metric_of_branches
 from cfmkit.results import Status
+from cfmkit.specs.units import between
 from cfmkit.studies.choose_metrics_to_note import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.point_evaluation import Study
+from cfmkit.studies.variants_in_rows import evaluate_rows
 from cfmkit.studies.varied_axes import axes, wishes
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
@@ -45,12 +46,14 @@ def test_what_all_preloads_share_is_what_each_has_alone(name):
     preloads = tuple(spec.analysis.preloads)
     alone = [rest_of(solution.sampler, one, grid) for one in preloads]
     for found, wanted in zip(rests_of(solution.sampler, preloads, grid), alone, strict=True):
-        assert found == (None if wanted is None else pytest.approx(wanted, rel=1e-13))
-    for push, window in zip(solution.pushes, solution.windows, strict=True):
-        wanted = solution.flat_part(push, spec.analysis.flatness)
-        assert window == (None if wanted is None else pytest.approx(wanted, rel=1e-12))
+        assert found == pytest.approx(np.nan if wanted is None else wanted, rel=1e-13, nan_ok=True)
+    windows = np.transpose(solution.curves.flat_parts(spec.analysis.flatness))
+    for row, (push, window) in enumerate(zip(solution.pushes, windows, strict=True)):
+        one = solution.curves.of_rows(np.array([row]))
+        wanted = np.ravel(one.flat_parts(spec.analysis.flatness))
+        assert window == pytest.approx(wanted, rel=1e-12, nan_ok=True)
         if push.rest:
-            left = force_of(solution.sampler, np.array([push.rest]), push.preload)[0]
+            left = one.force_at(np.array([[push.rest]]))[0, 0]
             assert abs(left) < 1e-12 * np.abs(push.force).max()
 
 
@@ -201,7 +204,7 @@ def test_the_map_of_preloads_has_a_start_of_the_window_without_jags():
     assert np.abs(np.diff(steps)).max() < 0.02 * np.abs(steps).max()
 
 
-# --- blocks ----------------------------------------------------------------------------------------------------
+# --- rows ------------------------------------------------------------------------------------------------------
 
 RANGES = {
     "mechanism.positive.length": "22 mm:28 mm",
@@ -211,12 +214,13 @@ RANGES = {
     "mechanism.bistable.half_beams": [2, 4],
     "mechanism.material.youngs_modulus": "1200 MPa:2000 MPa",
 }
-NAMES = tuple(name for name in (*METRICS, *SCALARS) if name != "deviation_from_target")
+IN_WINDOW = ("force_mean", "force_sd", "force_max", "force_min", "force_ripple", "half_band", "deviation_from_mean")
+NAMES = (*IN_WINDOW, "static_balance", *QUANTITIES)
 
 
 @pytest.mark.parametrize("model", ["truss", "analytic"])
 @pytest.mark.parametrize("window", ["[2 mm, 4 mm]", "[1.003 mm, 4.111 mm]", "null"])
-def test_a_block_has_the_numbers_of_its_points(model, window):
+def test_rows_have_the_numbers_of_their_points(model, window):
     spec = table_i(f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]")
     ranges = {path: item for path, item in RANGES.items() if not path.endswith("modulus")}
     plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
@@ -228,7 +232,7 @@ def test_a_block_has_the_numbers_of_its_points(model, window):
         assert together.row(k).status(0) == (alone.status, alone.message)
         values = np.array([np.nan if value is None else value for value in alone.values])
         block = together.row(k).values[0]
-        wrong = ~np.isclose(block, values, rtol=1e-8, atol=1e-9, equal_nan=True)
+        wrong = ~np.isclose(block, values, rtol=1e-12, atol=1e-13, equal_nan=True)
         assert not wrong.any(), [(NAMES[m], block[m], values[m]) for m in np.flatnonzero(wrong)]
 
 
@@ -236,7 +240,7 @@ def test_a_block_has_the_numbers_of_its_points(model, window):
 @pytest.mark.parametrize(
     ("window", "preloads"), [("[2 mm, 4 mm]", "[0 mm]"), ("null", "[0 mm]"), ("[2 mm, 4 mm]", "[0 mm, 9 mm, 3 mm]")]
 )
-def test_a_block_has_the_warnings_of_its_points(model, window, preloads):
+def test_rows_have_the_warnings_of_their_points(model, window, preloads):
     spec = table_i(
         f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]",
         "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 30 MPa}", "analysis.flatness=5 %",
@@ -256,34 +260,112 @@ def test_a_block_has_the_warnings_of_its_points(model, window, preloads):
     assert len(seen) > (2 if model == "truss" else 6)
 
 
-def test_every_size_that_a_block_varies_is_one_of_the_spec():
-    spec = table_i("mechanism.material={youngs_modulus: 1477 MPa}")
-    for path in VARIED:
-        assert spec.at(path) is not None
+def of_widths(*changes, preloads="[0 mm]"):
+    """Return Table I with changes as rows of two widths; nothing where its model is not solved in rows."""
+    spec = table_i("analysis.window=[2 mm, 4 mm]", *changes, preloads=preloads)
+    return [rows for _, rows in solve_rows([spec.replace({"mechanism.bistable.width": w}) for w in (5e-3, 6e-3)])]
 
 
 @pytest.mark.parametrize(
     "changes",
     [
-        ["analysis.fidelity=exact"],
         ["mechanism.bistable.structure=cosine"],
+        ["mechanism.bistable.structure=hybrid", "mechanism.bistable.flexure_length=5 mm", "analysis.fidelity=analytic"],
+        ["mechanism.positive.structure=straight", "mechanism.positive.angle=0 deg"],
         ["analysis.preloads=[1 mm]"],
         ["analysis.preloads=[0 mm, -1 mm]"],
         ["mechanism.bistable.flexure_length=16 mm"],
     ],
 )
-def test_what_has_no_closed_form_over_arrays_is_left_to_the_model_of_one(changes):
-    block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)
-    assert analyze_block(table_i(*changes), block) is None
-    assert analyze_block(table_i(), block).done.all()
+def test_every_closed_form_is_solved_in_rows_at_any_preload(changes):
+    (rows,) = of_widths(*changes)
+    assert rows.complete.all()
 
 
-def test_a_block_warns_of_the_stress_at_all_preloads_and_leaves_springs_that_close_to_the_model_of_one():
-    block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)
+def test_what_has_no_closed_form_is_left_to_the_model_of_one():
+    assert not of_widths("analysis.fidelity=exact")
+
+
+def test_rows_warn_of_the_stress_at_all_preloads_and_leave_springs_that_close_to_the_model_of_one():
     made_of = "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 50 MPa}"
-    assert analyze_block(table_i(made_of, preloads="[0 mm, 7.5 mm]"), block).warnings["overstressed"].all()
-    assert not analyze_block(table_i(made_of), block).warnings["overstressed"].any()
-    assert not analyze_block(table_i(preloads="[0 mm, 12 mm]"), block).done.any()
+    (pushed,) = of_widths(made_of, preloads="[0 mm, 7.5 mm]")
+    assert pushed.findings()["overstressed"].all()
+    (free,) = of_widths(made_of)
+    assert "overstressed" not in free.findings()
+    (closed,) = of_widths(preloads="[0 mm, 12 mm]")
+    assert not closed.complete.any()
+
+
+def varied(spec, draw, count):
+    """Return some numbers of a specification at random, up to three of them: path -> values around its own."""
+    own = {
+        path: value
+        for path, value in spec.leaves()
+        if path.startswith(("mechanism.", "analysis.")) and isinstance(value, float) and value
+    }
+    chosen = draw.choice(sorted(own), draw.integers(1, 4), replace=False)
+    return {path: own[path] * draw.uniform(0.75, 1.3, count) for path in chosen.tolist()}
+
+
+CLOSED = [
+    "aluminium", "bought_springs", "cosine", "ding2022", "folded", "pa12", "pla", "pla_adjustable", "straight",
+    "titanium", "u_shape",
+]  # fmt: skip
+"""Configurations of closed form."""
+
+WINDOWS = (None, ("2 %", "71.3 %"), "its own")
+
+
+def rows_against_single_runs(stem, number):
+    """Compare the rows of a study over random numbers of a configuration with a run of each; return how many rows."""
+    draw, count = np.random.default_rng(number), 4
+    spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
+    window = WINDOWS[number % 3]
+    if window != "its own":
+        spec = spec.replace({"analysis.window": window})
+    values = varied(spec, draw, count)
+    plan = Plan(tuple(values), np.stack(list(values.values()), axis=1))
+    study = Study(spec, plan.paths, metrics_of(spec, ()))
+    together = evaluate_rows(study, plan, 0, count)
+    sizes = np.nan_to_num(np.abs(together.values)).max(axis=0)
+    sizes[[k for k, one in enumerate(study.metrics) if one.dimension == "force"]] = sizes[0]  # of what vanishes, too
+    for k in range(count):
+        alone = study.evaluate(plan.point(k))
+        assert not alone.bug
+        assert together.status(k) == (alone.status, alone.message)
+        assert {name for name, mask in together.warned.items() if mask[k]} == set(alone.warnings), (values, k)
+        if not alone.values:
+            continue
+        own = np.array([np.nan if value is None else value for value in alone.values])
+        wrong = ~((np.abs(together.values[k] - own) <= 1e-12 * sizes) | (np.isnan(own) & np.isnan(together.values[k])))
+        assert not wrong.any(), [(study.names[m], together.values[k, m], own[m], values) for m in np.flatnonzero(wrong)]
+        assert tuple(together.met[k].tolist()) == alone.met
+
+
+class Plan:
+    """Points of a study, one a row."""
+
+    def __init__(self, paths, values):
+        self.paths, self.values = paths, values
+
+    def __len__(self):
+        return len(self.values)
+
+    def point(self, index):
+        return tuple(self.values[index].tolist())
+
+
+@pytest.mark.parametrize("stem", ["bought_springs", "ding2022", "pla_adjustable", "u_shape"])
+def test_a_row_of_a_study_is_a_run_of_its_own(stem):
+    """Whatever is varied, with every metric that a sweep notes."""
+    rows_against_single_runs(stem, CLOSED.index(stem))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("stem", CLOSED)
+def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
+    rows_against_single_runs(stem, 100 + number)
 
 
 # --- curves and tables -----------------------------------------------------------------------------------------
@@ -492,8 +574,8 @@ def test_what_the_table_of_preloads_says_of_a_window_does_not_depend_on_the_poin
     """The curve turns a corner where the leaves buckle, inside this window: between points it is no straight line."""
     spec = cfmkit.load("configs/vcfm_pla_adjustable.yaml").replace({"analysis.window": ["1 mm", "4.4 mm"]})
     few, many = (cfmkit.analyze(spec.replace({"analysis.points": points})).state for points in (23, 801))
-    wanted = spread(forces(many, many.nominal))
-    assert spread(forces(few, few.nominal)) == pytest.approx(wanted, rel=1e-12)
+    wanted = spread(many.window_forces[0, 0])
+    assert spread(few.window_forces[0, 0]) == pytest.approx(wanted, rel=1e-12)
 
 
 @pytest.mark.parametrize("points", [23, 801])
@@ -501,10 +583,10 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
     solution = cfmkit.analyze(spec).state
     low, high = 0.61e-3, 3.33e-3
-    inside = solution.inside(solution.nominal, (low, high))
+    inside = solution.branches["load"].within((np.array([low]), np.array([high]))).inside.values[0]
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
-    assert np.isnan(solution.force_at(solution.nominal, np.array([-1e-3, 1.0]))).all()
+    assert np.isnan(solution.nominal.reached(np.array([[-1e-3, 1.0]]))).all()
 
 
 def test_a_bend_that_is_tighter_than_its_leaf_is_thick_is_not_drawn():
@@ -522,7 +604,7 @@ def test_a_travel_of_nanometres_behind_a_preload_needs_no_billion_points(config)
     assert all(len(curve) <= 30 * spec.analysis.points for curve in found.curves)
 
 
-def test_a_block_takes_windows_that_are_shares_of_the_travel():
+def test_rows_take_windows_that_are_shares_of_the_travel():
     spec = table_i().replace(
         {
             "analysis.fidelity": "analytic",
@@ -531,13 +613,12 @@ def test_a_block_takes_windows_that_are_shares_of_the_travel():
             "requirements": [],
         }
     )
-    widths = np.array([6e-3, 7e-3])
-    block = Block({"mechanism.bistable.width": widths}, (Measure("force_mean", spec.analysis.window),), 2)
-    found = analyze_block(spec, block)
-    assert found.done.all()
-    alone = [cfmkit.analyze(spec.replace({"mechanism.bistable.width": width})) for width in widths]
-    expected = [evaluate(one, ["force_mean"])["force_mean"].value for one in alone]
-    assert found.values[0]["load"].tolist() == pytest.approx(expected, rel=1e-12)
+    variants = [spec.replace({"mechanism.bistable.width": width}) for width in (6e-3, 7e-3)]
+    ((_, found),) = solve_rows(variants)
+    low, high = np.array([between(spec.analysis.window, (0.0, spec.travel)) for spec in variants]).T
+    mean = metric_of_branches("force_mean", {"load": found.branches["load"].within((low, high))})["load"]
+    expected = [evaluate(cfmkit.analyze(one), ["force_mean"])["force_mean"].value for one in variants]
+    assert mean.tolist() == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_room_of_a_mechanism_begins_where_a_preload_pushes_it_to_and_has_walls_as_thick_as_stated():

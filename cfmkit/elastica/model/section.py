@@ -148,7 +148,7 @@ def curling(width: Any, thickness: Any, poisson_ratio: Any) -> tuple[Any, Any]:
     return 3 * plane * (width**2 / thickness) ** 2, poisson_ratio**2 / plane
 
 
-def hindered_share(width: Any, thickness: Any, poisson_ratio: float, curvature: Any) -> Any:
+def hindered_share(width: Any, thickness: Any, poisson_ratio: Any, curvature: Any) -> Any:
     """Return by what share hindered curling raises the energy of a strip that is bent to half a sine, or more.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cfmkit.families.base import Family, when_called
 from cfmkit.families.vcfm.findings import FINDINGS
-from cfmkit.families.vcfm.scalar_results import DEFINITIONS
+from cfmkit.families.vcfm.quantities import DEFINITIONS
 from cfmkit.families.vcfm.spec import VcfmSpec
 
 FAMILY = Family(
@@ -29,8 +29,7 @@ FAMILY = Family(
     levels=("design.force",),
     propose="cfmkit.families.vcfm.proposals_for_wish:propose",
     room="cfmkit.families.vcfm.bounding_box:room",
-    analyze_block=when_called("cfmkit.families.vcfm.many_designs:analyze_block"),
-    block_shares=True,
+    rows=when_called("cfmkit.families.vcfm.model:solve_rows"),
     headline=(
         "constant_force",
         "window_force",

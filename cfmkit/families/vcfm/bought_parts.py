@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cfmkit.families.findings import mm, newton, rate
 from cfmkit.stock.parts_list import BoughtPart
 from cfmkit.stock.springs.guides import guide_cure, guide_needed, guide_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
 
@@ -34,32 +35,49 @@ def parts_of(spec: VcfmSpec) -> tuple[BoughtPart, ...]:
     return (BoughtPart(place, springs.name or "", springs.count, ", ".join(data)),)
 
 
-def spring_faults(solution: Solution) -> Iterator[tuple[str, ...]]:
-    """Yield (name, what is wrong, settings that cure it) of bought springs over the travel and all preloads."""
-    springs = solution.spec.mechanism.springs
-    if springs is None:
-        return
-    worst = max(solution.pushes, key=lambda push: push.preload)
-    most, limit = float(worst.travel[-1]) + worst.preload, springs.max_elongation
-    if limit and most > limit * (1 + 1e-9):
-        place = f"at {mm(limit - worst.preload)} of travel" if limit > worst.preload else "by the preload alone"
-        yield (
-            "spring_overstretched",
-            f"with a preload of {mm(worst.preload)} the springs are deflected by {mm(most)}, their limit is "
-            f"{mm(limit)}, reached {place} ('mechanism.springs.max_elongation')",
-        )
-    if not springs.is_guided and most > springs.unguided * (1 + 1e-9):
-        yield (
-            "spring_buckles",
-            f"a spring of {mm(springs.free_length or 0.0)} buckles when it is deflected by {mm(springs.unguided)} "
-            f"(ends {springs.seats}), and is deflected by {mm(most)} with a preload of {mm(worst.preload)}; "
-            f"{guide_needed(springs, springs.coil, 'mechanism.springs')}",
-            *guide_cure(springs.coil, "mechanism.springs"),
-        )
-    least = min(push.preload for push in solution.pushes)
-    if least < 0:
-        yield (
-            "spring_slack",
-            f"with a preload of {mm(least)} the springs carry no force up to {mm(-least)} of travel: bought springs do "
-            "not pull back",
-        )
+def _worst(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return the largest preload of each mechanism and the deflection at the end of its travel, (m,) each [m]."""
+    preload = solution.by_mechanism(solution.curves.preload[:, 0])
+    rows, most = np.arange(len(preload)), preload.argmax(axis=1)
+    last = solution.by_mechanism(solution.curves.ends[1])
+    return preload[rows, most], (last + preload)[rows, most]
+
+
+def is_overstretched(solution: Solution) -> Any:
+    """Return which mechanisms deflect bought springs beyond their limit, (m,)."""
+    limits = solution.column(
+        lambda spec: (None if spec.mechanism.springs is None else spec.mechanism.springs.max_elongation) or None
+    )
+    return _worst(solution)[1] > limits * (1 + 1e-9)
+
+
+def overstretching(solution: Solution) -> tuple[Any, ...]:
+    """Return by how much the springs of one mechanism are deflected, and where they reach their limit."""
+    springs, (preload, most) = solution.spec.mechanism.springs, (float(value[0]) for value in _worst(solution))
+    limit = springs.max_elongation if springs is not None and springs.max_elongation else 0.0
+    place = f"at {mm(limit - preload)} of travel" if limit > preload else "by the preload alone"
+    return (
+        f"with a preload of {mm(preload)} the springs are deflected by {mm(most)}, their limit is "
+        f"{mm(limit)}, reached {place} ('mechanism.springs.max_elongation')",
+    )
+
+
+def buckles(solution: Solution) -> Any:
+    """Return which mechanisms press springs without a guide so far that they buckle, (m,)."""
+    limits = solution.column(
+        lambda spec: None if spec.mechanism.springs is None or spec.mechanism.springs.is_guided
+        else spec.mechanism.springs.unguided
+    )  # fmt: skip
+    return _worst(solution)[1] > limits * (1 + 1e-9)
+
+
+def buckling(solution: Solution) -> tuple[Any, ...]:
+    """Return how far the springs of one mechanism are pressed, and what guides them."""
+    springs, (preload, most) = solution.spec.mechanism.springs, (float(value[0]) for value in _worst(solution))
+    assert springs is not None
+    return (
+        f"a spring of {mm(springs.free_length or 0.0)} buckles when it is deflected by {mm(springs.unguided)} "
+        f"(ends {springs.seats}), and is deflected by {mm(most)} with a preload of {mm(preload)}; "
+        f"{guide_needed(springs, springs.coil, 'mechanism.springs')}",
+        *guide_cure(springs.coil, "mechanism.springs"),
+    )

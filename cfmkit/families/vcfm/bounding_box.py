@@ -14,7 +14,8 @@ from cfmkit.families.vcfm.pose_outlines import scene
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.families.vcfm.solution import Push, Solution
+    from cfmkit.families.vcfm.curves_in_rows import Push
+    from cfmkit.families.vcfm.solution import Solution
     from cfmkit.results import Result
 
 POSES = 9

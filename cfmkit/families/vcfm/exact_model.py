@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
 from cfmkit.families.findings import mm
+from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
 from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, traced
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
-from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -189,22 +189,32 @@ class ExactSampler:
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
-        ahead, behind = self.pushed.at(np.maximum(travel, 0.0)), self.pulled.at(np.minimum(travel, 0.0))
-        back = travel < 0
-        force, stress, stable, buckled = (np.where(back, one, other) for one, other in zip(behind, ahead, strict=True))
+        place = np.ravel(travel)
+        ahead, behind = self.pushed.at(np.maximum(place, 0.0)), self.pulled.at(np.minimum(place, 0.0))
+        force, stress, stable, buckled = (
+            np.where(place < 0, one, other).reshape(np.shape(travel)) for one, other in zip(behind, ahead, strict=True)
+        )
         return LeafSamples(self.each * force, stress, stable, buckled)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:
         """Return the force of all leaves alone [N]."""
         return self.leaves(travel).force
 
+    def leaf_stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of the leaves [Pa]."""
+        return self.leaves(travel).stress
+
+    def of_rows(self, _rows: Any) -> Self:
+        """Return the same: all rows are curves of one mechanism."""
+        return self
+
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
         if self.coils is not None:
             return self.coils.force(compression), self.coils.stress(compression)
-        place = self.chain.travel * np.asarray(compression, dtype=float)
+        place = self.chain.travel * np.ravel(compression)
         pressed, stretched = self.sides[0].at(np.maximum(place, 0.0)), self.sides[1].at(np.minimum(place, 0.0))
-        force, stress = (np.where(place < 0, stretched[k], pressed[k]) for k in (0, 1))
+        force, stress = (np.where(place < 0, stretched[k], pressed[k]).reshape(np.shape(compression)) for k in (0, 1))
         return self.chain.count * force, stress
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
@@ -248,7 +258,7 @@ def problem_of(part: Literal["bistable", "positive"], paths: Sequence[Any], trav
     return f"the {subject} followed only to {mm(short.edges[-1] / travel)}: {short.problem}; check {keys}"
 
 
-def analyze(spec: VcfmSpec, run: Run) -> Result:
+def analyze(spec: VcfmSpec, _run: Run) -> Result:
     """Return the curves of a mechanism of beams in large deflection, with everything that is wrong with it.
 
     As `cfmkit.families.vcfm.model.analyze`; PARTIAL if a beam cannot be followed to the end of the travel.
@@ -256,7 +266,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     made = parts(spec)
     # the real shuttle goes back as far as that of the closed form within a few percent
     back = 1.2 * farthest_back(spec, spec.analysis.preloads)
-    return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)), run)
+    return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)))
 
 
 def farthest_back(spec: VcfmSpec, preloads: Sequence[float]) -> float:

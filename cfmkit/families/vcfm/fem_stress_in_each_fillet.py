@@ -113,7 +113,7 @@ def _largest(solution: Solution, one: FilletStress, place: str, of_spring: bool)
     found = []
     for push in solution.pushes:
         share, ahead = (solution.sampler.chain.travel, push.preload) if of_spring else (1.0, 0.0)  # type: ignore[attr-defined]
-        start, end = float(push.travel[0]), min(solution.window[1], float(push.travel[-1]))
+        start, end = float(push.travel[0]), min(solution.window_of_one[1], float(push.travel[-1]))
         if (worst := one.largest(share * (start + ahead), share * (end + ahead))) is not None:
             found.append(FilletRow(place, one.arc, worst[0], worst[1] / share - ahead, push.preload))
     return max(found, key=lambda row: abs(row.stress), default=None)

@@ -13,9 +13,8 @@ from cfmkit.families.fem_results import numbered
 from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
-from cfmkit.families.vcfm.model import rest_of
+from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.pose_outlines import scene
-from cfmkit.families.vcfm.solution import force_of
 from cfmkit.metrics.longest_interval_in_band import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.axis_labels_and_headings import Heading, value_text, write_heading
@@ -72,8 +71,8 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 def force(result: Result) -> Figure:
     """Return the nominal curve with the requirement bands."""
     solution: Solution = result.state
-    flat, alone = value_text(solution.parts.balance, "length"), solution.spring_alone
-    levels = () if alone is None else (Limit(alone, f"the spring alone, at {flat}"),)
+    flat, alone = value_text(solution.parts.balance, "length"), float(solution.spring_alone[0])
+    levels = () if np.isnan(alone) else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
     look = CurveLook(levels=levels, regions=_beyond(solution))
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
@@ -81,14 +80,14 @@ def force(result: Result) -> Figure:
 
 def _beyond(solution: Solution) -> tuple[MarkedRange, ...]:
     """Return the part of the travel where the leaves have straightened again."""
-    end, last = solution.character.linear[1], float(solution.nominal.travel[-1])
+    end, last = float(solution.linear[1][0]), float(solution.first.travel[-1])
     return (MarkedRange(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
 
 
 def split(result: Result) -> Figure:
     """Return what leaves and spring give, their sum, and the paper's law of the leaves [D, Fig. 3 and 11]."""
     solution: Solution = result.state
-    push = solution.nominal
+    push = solution.first
     series = [
         Series(push.force, "sum", BLACK, prefer=0.55),
         Series(push.spring_force, "spring", OCHRE, prefer=0.85),
@@ -98,7 +97,7 @@ def split(result: Result) -> Figure:
         bars = solution.parts.half_beams * np.asarray(TrussLeaf(solution.parts.strip).force(push.travel))
         series.append(Series(bars, "leaves by the truss law", GREY, dashed=True, prefer=0.4))
     found = list(_beyond(solution))
-    low, _ = solution.character.linear
+    low = float(solution.linear[0][0])
     if np.isfinite(low):
         found.insert(0, MarkedRange(push.travel[0], low, "not yet buckled"))
     diagram = Diagram(push.travel, TRAVEL, Scale("force", "force"), series, (), found)
@@ -109,7 +108,7 @@ def split(result: Result) -> Figure:
 def stress(result: Result) -> Figure:
     """Return the largest stress in leaves and spring over the travel, for the nominal and the largest preload."""
     solution: Solution = result.state
-    nominal, most = solution.nominal, max(solution.pushes, key=lambda push: push.preload)
+    nominal, most = solution.first, max(solution.pushes, key=lambda push: push.preload)
     over = most.travel
     series = [
         Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", BLUE, prefer=0.5),
@@ -150,9 +149,10 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
         back = (push.rest or 0.0) if shifted else 0.0
         curves.append(Curve(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
     plot_curve(curves, ax, CurveLook(arrows=False))
-    for number, (push, window) in enumerate(zip(solution.pushes, solution.windows, strict=True)):
-        if window is not None:  # both of its ends are marked on the curve
-            places, back = np.array(window), (push.rest or 0.0) if shifted else 0.0
+    windows = np.transpose(solution.curves.flat_parts(solution.spec.analysis.flatness))
+    for number, (push, places) in enumerate(zip(solution.pushes, windows, strict=True)):
+        if np.isfinite(places[0]):  # both of its ends are marked on the curve
+            back = (push.rest or 0.0) if shifted else 0.0
             ax.plot(
                 parts.mm(places - back), np.interp(places, push.travel, push.force), linestyle="", marker="|",
                 markersize=9, markeredgewidth=1.2, color=LINES[number % len(LINES)], zorder=4, gid="window",
@@ -168,15 +168,15 @@ def adjustability(result: Result) -> Figure:
     given = np.array([push.preload for push in solution.pushes])
     over = np.linspace(given.min(), given.max(), PRELOADS)
     one = solution.character
-    places = np.linspace(*solution.window, 41)
+    places = np.linspace(*solution.window_of_one, 41)
     leaves = solution.sampler.leaves(places).force
     mean = np.array([(leaves + solution.sampler.spring(places + preload)[0]).mean() for preload in over])
-    grid = np.linspace(0.0, float(solution.nominal.travel[-1]), 241)
-    rests = np.array([_shift(solution, float(preload), grid) for preload in over])
-    nominal = float(np.interp(solution.nominal.preload, over, mean))
-    straight = nominal + force_change(one.positive_stiffness, over - solution.nominal.preload)
+    grid = np.linspace(0.0, float(solution.first.travel[-1]), 241)
+    rests = -rests_of(solution.sampler, over, grid)
+    nominal = float(np.interp(solution.first.preload, over, mean))
+    straight = nominal + force_change(one.positive_stiffness, over - solution.first.preload)
     by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
-    constant = solution.constant_force is not None
+    constant = bool(np.isfinite(solution.constant_force[0]))
     x, first = Scale("preload", "length"), Scale("constant force" if constant else "mean force", "force")
     forces = [Series(mean, "mean in the window", BLUE, prefer=0.4)]
     if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():
@@ -198,19 +198,14 @@ def adjustability(result: Result) -> Figure:
 
 def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
     """Return where the longest window within the flatness starts at each preload [m]; NaN where there is none."""
-    travel = np.linspace(0.0, float(solution.nominal.travel[-1]), FINE)
+    travel = np.linspace(0.0, float(solution.first.travel[-1]), FINE)
 
     def force_at(places: FloatArray) -> FloatArray:
-        rows = zip(places, preloads, strict=True)
-        return np.array([force_of(solution.sampler, row, float(preload)) for row, preload in rows])
+        sampler = solution.sampler
+        return np.asarray(sampler.leaf_force(places) + sampler.spring(places + preloads[:, None])[0])
 
     forces = force_at(np.broadcast_to(travel, (len(preloads), FINE)))
     return flat_window(travel, forces, solution.spec.analysis.flatness, force_at)[0]
-
-
-def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:
-    rest = rest_of(solution.sampler, preload, grid)
-    return np.nan if rest is None else -rest
 
 
 def stress_map(result: Result) -> Figure:
@@ -265,8 +260,8 @@ def mechanism(result: Result) -> Figure:
 
 def _poses(solution: Solution) -> list[tuple[str, float, float]]:
     """Return four poses worth seeing: (what, travel, preload)."""
-    nominal, most = solution.nominal, max(solution.pushes, key=lambda push: abs(push.preload))
-    low, high = solution.window
+    nominal, most = solution.first, max(solution.pushes, key=lambda push: abs(push.preload))
+    low, high = solution.window_of_one
     middle = 0.5 * (low + high)
     reported, pushed = value_text(middle, "length"), value_text(most.preload, "length")
     first = [("as made", 0.0, 0.0), (f"pushed by {reported}", middle, nominal.preload)]
@@ -294,7 +289,7 @@ def _draw(ax: Axes, one: Scene) -> None:
 def moving(result: Result) -> Moving:
     """Return the mechanism over the travel of its nominal curve, for a film."""
     solution: Solution = result.state
-    nominal = solution.nominal
+    nominal = solution.first
     points = chosen(len(nominal.travel))
     scenes = [scene(solution, float(nominal.travel[point]), nominal.preload) for point in points]
     boxes = np.array([one.box for one in scenes])

@@ -1,36 +1,39 @@
-"""What a mechanism of snap-through leaves and a preloaded spring can suffer from, by name, and the checks for it."""
+"""What a mechanism of snap-through leaves and a preloaded spring can suffer from: when it does, and what is said of it.
+
+Predicates take the solution of any number of mechanisms, sentences that of one.
+"""
 
 from __future__ import annotations
 
-from math import degrees
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate, too_soft
-from cfmkit.families.vcfm.bought_parts import spring_faults
+from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton, percent, rate, too_soft
+from cfmkit.families.rows import FindingRule
+from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
+from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
 from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, spring_room
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond, measured_stiffness_for
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE
-from cfmkit.families.vcfm.leaves.v_beam import (
-    FLAT_BUCKLED_ABOVE,
-    LINEAR_ABOVE,
-    NEGATIVE_ABOVE,
-    RELIABLE,
-    STEEP,
-    STOCKY,
-    THICK,
-    VBeam,
+from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE, LINEAR_ABOVE, NEGATIVE_ABOVE, VBeam
+from cfmkit.families.vcfm.range_of_closed_forms import (
+    is_stocky,
+    leaves_out_of_range,
+    range_of_leaves,
+    range_of_spring,
+    spring_out_of_range,
+    stocky_leaves,
 )
-from cfmkit.families.vcfm.solution import ROUNDING, goes_beyond, leaves_plane
+from cfmkit.families.vcfm.solution import ROUNDING, goes_beyond
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.solution import Push, Solution
-    from cfmkit.results import Finding
+    from cfmkit.families.vcfm.solution import Solution
+
+    Sentence = tuple[Any, ...]
 
 
 TRACED = ("exact", "solid")
@@ -77,401 +80,80 @@ WAVY = 0.02
 TURNING = POLE / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
 
-PRESSED, STRETCHED = 0.3, 0.12
-"""Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
-
 ALIKE = 0.01
 """Stiffnesses that differ by less than this share cancel."""
-
-TRIED = (0.998, 0.99, 0.97, 0.94, 0.9)
-"""Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
-off, the whole must be kept."""
-
-WIDEST = 50.0
-"""Factor on a width up to which one is looked for that makes the force flat."""
 
 EXACT_FORM = 2e-4
 """Share of a stress that counts for nothing: designs are fitted to 1e-4."""
 
 
-def findings_of(solution: Solution) -> tuple[Finding, ...]:
-    """Return every finding about a solved mechanism, the gravest first."""
-    nature = (_measured, spring_closed, _truss, _leaf_shape, _flatness, _returns)
-    limits = (_preloads, _bought_springs, _strength, _buckling, _width, _imperfect, _range)
-    return tuple(found for check in (*nature, *limits) for found in check(solution))
+def _slenderness(solution: Solution) -> FloatArray:
+    """Return rise over thickness of the leaves, (m,)."""
+    return solution.of_mechanisms(solution.parts.strip.slenderness)
 
 
-def _leaf_shape(solution: Solution) -> Iterator[Finding]:
-    kind, one = solution.spec.mechanism.bistable.structure, solution.character
-    if kind == "hybrid" or solution.spec.analysis.fidelity == "truss":
-        return
-    q = float(solution.parts.strip.slenderness)
-    negative, straight = q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
-    reported = f"rise over thickness is {q:.4g}"
-    if kind == "cosine":  # whose limits depend on the angle: as the curve has it
-        negative, straight = one.negative_stiffness > 0, bool(np.isfinite(one.linear[0]))
-    limits = {"v-beam": (f", below {NEGATIVE_ABOVE}", ", not above pi"), "cosine": ("", "")}[kind]
-    if not negative:
-        yield finding(
-            "no_negative_stiffness",
-            f"{reported}{limits[0]}: the force of the leaves only rises and cannot cancel that of the spring; "
-            "use thinner or steeper leaves",
-        )
-    elif not straight:
-        yield finding(
-            "no_linear_region",
-            f"{reported}{limits[1]}: the leaves do not buckle and their force curve is rounded; the constant-force "
-            "window is only its maximum. Use thinner or steeper leaves",
-        )
+# --- what is reported of a built mechanism, and the spring's room ---------------------------------------------------
 
 
-def _flatness(solution: Solution) -> Iterator[Finding]:
-    push, (low, high) = solution.nominal, solution.window
-    force = solution.inside(push, (low, high))
-    if not len(force) or force.max() <= 0:
-        return
-    ripple, allowed = _ripple(force), solution.spec.analysis.flatness
-    if ripple <= allowed or solution.window_is_flat or solution.spec.target_curve is not None:
-        return
-    one = solution.character
-    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
-    reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
-    cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
-    low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
-    words, cures = _flattening(solution, ripple)
-    yield finding(
-        "not_flat",
-        f"{cause}: over {mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, "
-        f"{percent(allowed)} is allowed{words}",
-        *cures,
+def _contradicts(solution: Solution) -> Any:
+    if solution.spec.analysis.measured is None or solution.structure == "hybrid":
+        return False  # flexures push where such leaves are flat
+    balance = solution.of_mechanisms(solution.parts.balance)
+    stated = [spec.analysis.measured for spec in solution.specs]
+    stiffness, force = np.array([(one.positive_stiffness, one.force) for one in stated if one is not None]).T
+    apart = np.abs(stiffness * balance / force - 1.0) > solution.spec.analysis.flatness
+    return (_slenderness(solution) >= FLAT_BUCKLED_ABOVE) & apart
+
+
+def _contradiction(solution: Solution) -> Sentence:
+    reported = solution.spec.analysis.measured
+    assert reported is not None
+    balance = float(solution.parts.balance)
+    return (
+        f"the reported {newton(reported.force)} and K_p = {rate(reported.positive_stiffness)} "
+        f"contradict each other: at {mm(balance)} the leaves carry no force, "
+        f"for any number, width or modulus, and the force is K_p h = {newton(reported.positive_stiffness * balance)}; "
+        f"{newton(reported.force)} needs {rate(measured_stiffness_for(reported.force, balance))}",
     )
 
 
-def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
-    """Return what makes the force flat, in words and as changes of the specification: only what has been tried.
-
-    Forces are linear in the widths, so that other widths need no other solution. Where none is flat over the window,
-    the window is wrong: then the flat part is named.
-    """
-    factor, left = _better_width(solution)
-    allowed = solution.spec.analysis.flatness
-    if left <= allowed and left < ripple:
-        other = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
-        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {other}, make them equal"
-        return text, ()
-    (first, last), (low, high) = solution.character.linear, solution.window
-    why = ""
-    if np.isfinite(first) and (low < first or high > last):
-        why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
-    for share in TRIED:
-        flat = solution.flat_part(solution.nominal, share * allowed)
-        if flat is not None and _ripple(solution.inside(solution.nominal, flat)) <= (1.0 - ROUNDING) * allowed:
-            start, end = at_least(flat[0]), at_most(flat[1])
-            cure = f"analysis.window=[{start}, {end}]"
-            return f"{why}; the force is flat from {start} to {end}: use that as the window", (cure,)
-    return f"{why}; no width of leaves or spring makes it flat", ()
+def is_closed(solution: Solution) -> NDArray[np.bool_]:
+    """Return whether the spring is pressed together within the travel, (m,) of bool."""
+    if solution.spec.mechanism.kinds[0] in ("folded", "straight"):
+        return np.zeros(len(solution), dtype=bool)
+    most = solution.column(lambda spec: max(spec.analysis.preloads))
+    return np.asarray(most + solution.travel > solution.column(spring_room) * (1 + ROUNDING))
 
 
-def _ripple(force: FloatArray) -> float:
-    """Return (max - min)/max of some forces."""
-    return float((force.max() - force.min()) / force.max()) if len(force) and force.max() > 0 else np.inf
-
-
-def _better_width(solution: Solution) -> tuple[float, float]:
-    """Return the factor on the leaves' width that makes the force flattest in the window, and the ripple left."""
-    low, high = solution.window
-    travel = solution.nominal.travel
-    places = np.unique(np.concatenate([np.linspace(low, high, 201), travel[(travel > low) & (travel < high)]]))
-    leaves = solution.sampler.leaf_force(places)
-    spring = solution.sampler.spring(places + solution.nominal.preload)[0]
-    if not np.isfinite(leaves + spring).all():
-        return 1.0, np.inf
-    one = solution.character
-    factors = np.geomspace(1.0 / WIDEST, WIDEST, 801)
-    if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
-        factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
-    top, bottom = (extreme_sums(factors, leaves, spring, way) for way in (1.0, -1.0))
-    with np.errstate(all="ignore"):
-        left = np.where(bottom > 0, (top - bottom) / top, np.inf)
-    # stiffnesses that cancel are what a reader expects: another factor only where that one does not do
-    best = len(factors) - 1 if left[-1] <= solution.spec.analysis.flatness else int(left.argmin())
-    return float(factors[best]), float(left[best])
-
-
-def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, way: float) -> FloatArray:
-    """Return the largest (`way` 1) or smallest (-1) of factor * slope + offset over many lines, for each factor.
-
-    Only lines of the convex hull of (slope, offset) are ever extreme: some dozen of hundreds.
-
-    Examples
-    --------
-    >>> extreme_sums(np.array([0.0, 2.0]), np.array([1.0, -1.0, 0.5]), np.array([0.0, 3.0, 1.0]), 1.0).tolist()
-    [3.0, 2.0]
-    """
-    hull: list[int] = []
-    # Where leaves are buckled the lines meet in one point: without a margin, rounding keeps all of them.
-    margin = 1e-14 * float(np.ptp(slopes)) * float(np.abs(offsets).max(initial=0.0))
-    x, y = (way * slopes).tolist(), (way * offsets).tolist()
-    for k in np.lexsort((-way * offsets, way * slopes)).tolist():
-        if hull and x[k] == x[hull[-1]]:
-            continue
-        while len(hull) > 1:
-            i, j = hull[-2:]
-            if (x[j] - x[i]) * (y[k] - y[i]) < (y[j] - y[i]) * (x[k] - x[i]) - margin:
-                break
-            hull.pop()
-        hull.append(k)
-    sums = factors[:, None] * slopes[hull] + offsets[hull]
-    return np.asarray(way * (way * sums).max(axis=1))
-
-
-def _returns(solution: Solution) -> Iterator[Finding]:
-    push, (low, high) = solution.nominal, solution.window
-    if solution.least and not returns(solution.least[1], float(np.abs(push.force).max())):
-        place, force = solution.least
-        yield finding(
-            "bistable",
-            f"past the peak of the leaves the force falls to {newton(force)} at {mm(place)} (followed to "
-            f"{mm(float(push.travel[-1]))}): the mechanism stays there until it is pulled back; use a stiffer spring, "
-            "thicker or fewer leaves, or a preload",
-        )
-    inside = solution.inside(push, (low, high))
-    beyond = push.rest is None or push.rest > low
-    if beyond or (len(inside) and inside.min() <= 0):
-        reported = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
-        yield finding(
-            "force_reversal",
-            f"within {mm(low)} ... {mm(high)} the force falls to {reported}: no outward force remains; a preload "
-            f"above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
-        )
-    yield from _overload(solution, push)
-
-
-def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
-    """Return whether a mechanism comes back by itself: its least force past the peak of the leaves is above rounding.
-
-    Parameters
-    ----------
-    least, largest : float or array
-        That force, and the largest of the curve [N].
-    """
-    return np.asarray(least > ROUNDING * largest)
-
-
-def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
-    end = solution.character.linear[1]
-    if np.isfinite(end) and goes_beyond(push.travel[-1], end):
-        at_end, last = float(solution.force_at(push, np.array([end]))[0]), float(push.force[-1])
-        if last - at_end <= solution.spec.analysis.flatness * abs(last):
-            return
-        yield finding(
-            "overload",
-            f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
-            f"{newton(last)} at {mm(float(push.travel[-1]))}; a stop at {mm(end)} limits the travel to the linear "
-            "range",
-        )
-
-
-def _preloads(solution: Solution) -> Iterator[Finding]:
-    for push in solution.pushes:
-        if push.preload >= 0:
-            continue
-        inside = solution.inside(push, solution.window)
-        if push.rest is None or push.rest > solution.window[0] or inside.min(initial=np.inf) <= 0:
-            low, high = solution.window
-            yield finding(
-                "preload_out_of_range",
-                f"with a preload of {mm(push.preload)} no outward force remains somewhere in {mm(low)} ... "
-                f"{mm(high)}: where the leaves are flat the force is K_p (h + dr), which vanishes at "
-                f"{mm(-solution.parts.balance)}",
-            )
-            return
-
-
-def _bought_springs(solution: Solution) -> Iterator[Finding]:
-    for name, reported, *cures in spring_faults(solution):
-        yield finding(name, reported, *cures)
-
-
-def _strength(solution: Solution) -> Iterator[Finding]:
-    allowed = solution.spec.mechanism.allowable_stress
-    if allowed is None:
-        return
-    parts = [
-        (push, name, samples, top, allowed * (1 + slack))
-        for push, tops in zip(solution.pushes, solution.largest_stresses(solution.pushes, (np.inf,))[:, 0], strict=True)
-        for name, samples, top, slack in (
-            ("spring", push.spring_stress, float(tops[1]), EXACT_FORM),
-            ("leaves", push.leaves.stress, float(tops[0]), max(solution.overrating, EXACT_FORM)),
-        )
-    ]
-    push, name, stress, top, bound = max(parts, key=lambda part: part[3] / part[4])
-    if top > bound:
-        over = [*np.flatnonzero(stress > bound), int(stress.argmax())]  # none of them where it peaks between two
-        place = mm(float(push.travel[over[0]]))
-        passes = f"passes {mpa(allowed)} at {place}" if over[0] else f"is above {mpa(allowed)} from {place} on"
-        yield finding(
-            "overstressed",
-            f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches {mpa(top)} at "
-            f"{mm(float(push.travel[over[-1]]))}; use longer or thinner leaves, or less preload",
-        )
-
-
-def _buckling(solution: Solution) -> Iterator[Finding]:
-    about = solution.spec.mechanism.bistable
-    if not about.guided:
-        hint = "" if solution.spec.analysis.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
-        yield finding(
-            "asymmetric_buckling",
-            f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and their force "
-            f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
-            "mechanism.bistable.guided=true",
-        )
-    if leaves_plane(about.width, about.thickness):
-        yield finding(
-            "out_of_plane_buckling",
-            f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: leaves narrower than twice "
-            "their thickness buckle out of the plane; use wider (and longer) leaves",
-        )
-
-
-def _width(solution: Solution) -> Iterator[Finding]:
-    exact = solution.spec.analysis.fidelity == "exact"
-    wide, hint = "mechanism.wide_beams=true", "; only 'analysis.fidelity: exact' accounts for it"
-    cure = wide if exact else (wide, "analysis.fidelity=exact")
-    for name, share, place in solution.hindered_curling:
-        if reported := too_soft(share, f"in the {name} at {mm(place)}"):
-            yield finding("wide_beam", reported + ("" if exact else hint), cure)
-
-
-def _imperfect(solution: Solution) -> Iterator[Finding]:
-    about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity in TRACED
-    share = about.waviness / about.thickness
-    if share > WAVY or (about.waviness and not exact):
-        reported = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
-        effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
-        yield finding(
-            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {reported}{effect}"
-        )
-    push = solution.nominal
-    if not push.leaves.stable.all():
-        lost = push.travel[~push.leaves.stable]
-        text = f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
-        if solution.spec.analysis.branch == "stable":
-            yield finding("unstable_branch", f"{text}, which was not found")
-        else:
-            follow = "analysis.branch: stable follows them"
-            yield finding("unstable_branch", f"{text}: {follow}", "analysis.branch=stable")
-
-
-def _range(solution: Solution) -> Iterator[Finding]:
-    strip = solution.parts.strip
-    share = float(strip.thickness / strip.length)
-    if share > STOCKY and solution.spec.analysis.fidelity != "truss":
-        yield finding(
-            "theory_range",
-            f"leaves whose thickness is {percent(share)} of their length are not beams: no model here predicts "
-            "their force or stress; use longer or thinner leaves",
-        )
-        return
-    if solution.spec.analysis.fidelity != "analytic":
-        return
-    angle, reach = float(strip.angle), RELIABLE * solution.parts.balance
-    if isinstance(solution.parts.leaf, HybridLeaf):
-        much = (
-            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
-            f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
-            "pseudo-rigid bodies cannot: the force is overestimated, by up to several times"
-            if solution.parts.leaf.flexures_buckle
-            else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
-        )
-        yield finding(
-            "theory_range",
-            f"{much}; their stress is underestimated, by up to a half. Verify with 'analysis.fidelity: exact'",
-            "analysis.fidelity=exact",
-        )
-    elif share > THICK:
-        yield finding(
-            "theory_range",
-            f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "
-            "and are off by 5 to 10 % or more here; verify with 'analysis.fidelity: exact'",
-            "analysis.fidelity=exact",
-        )
-    elif angle > STEEP:
-        yield finding(
-            "theory_range",
-            f"leaves at {degrees(angle):.3g} deg: the closed forms hold for small angles, up to 15 deg; "
-            "verify with 'analysis.fidelity: exact'",
-            "analysis.fidelity=exact",
-        )
-    elif goes_beyond(solution.nominal.travel[-1], reach):
-        yield finding(
-            "theory_range",
-            f"the travel goes to {mm(float(solution.nominal.travel[-1]))}, beyond {RELIABLE} times the rise "
-            f"({mm(reach)}): the force there is off by several per cent; verify with 'analysis.fidelity: exact'",
-            "analysis.fidelity=exact",
-        )
-    yield from _spring_range(solution)
-
-
-def _spring_range(solution: Solution) -> Iterator[Finding]:
-    spring = solution.parts.spring
-    if not isinstance(spring, Diamond):
-        return
-    angle, length = float(spring.strip.angle), float(spring.strip.length)
-    ends = [push.preload + float(place) for push in solution.pushes for place in (push.travel[0], push.travel[-1])]
-    worst = max(ends, key=lambda end: end / PRESSED if end > 0 else -end / STRETCHED)
-    share = abs(worst) / (2.0 * length)
-    if angle > STEEP:
-        text = f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
-    elif share > (PRESSED if worst > 0 else STRETCHED):
-        what = "compressed" if worst > 0 else "stretched"
-        text = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
-    else:
-        return
-    yield finding(
-        "theory_range",
-        f"{text}; the closed form's constant stiffness is off by several per cent: verify with "
-        "'analysis.fidelity: exact'",
-        "analysis.fidelity=exact",
-    )
-
-
-def spring_closed(solution: Solution) -> Iterator[Finding]:
-    """Yield that the spring is pressed together, with the travel up to which the worst preload leaves it open."""
+def closed_spring(solution: Solution) -> Sentence:
+    """Return up to which travel the worst preload leaves the spring open, with what keeps it open."""
     spec, room = solution.spec, spring_room(solution.spec)
     most = max(spec.analysis.preloads)
-    if most + spec.travel <= room * (1 + ROUNDING):
-        return
     positive, bought, needed = spec.mechanism.positive, spec.mechanism.springs, most + spec.travel - room
     place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
-    meeting = "blocks" if bought is None else "turns"
     if bought is not None:
         key, size = "mechanism.springs.free_length", at_least(closed_length(bought) + most + spec.travel)
-    elif positive is None:
-        return
-    elif positive.structure == "diamond":
-        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
-    else:
+    elif positive is not None and positive.structure == "u-shape":
         key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
-    yield finding(
-        "spring_closed",
-        f"the spring closes: its {meeting} touch when it is compressed by {mm(room)}, with a preload of {mm(most)} "
-        f"{place}, and curves end there; use less preload ('analysis.preloads') or travel ('analysis.travel'), or "
-        f"'{key}' of {size}",
+    else:
+        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
+    return (
+        f"the spring closes: its {'blocks' if bought is None else 'turns'} touch when it is compressed by {mm(room)}, "
+        f"with a preload of {mm(most)} {place}, and curves end there; use less preload ('analysis.preloads') or travel "
+        f"('analysis.travel'), or '{key}' of {size}",
         f"{key}={size}",
     )
 
 
-def _truss(solution: Solution) -> Iterator[Finding]:
-    if solution.spec.analysis.fidelity != "truss":
-        return
+# --- the kind of law, and the kind of leaf --------------------------------------------------------------------------
+
+
+def _truss(solution: Solution) -> Sentence:
     law, places = VBeam(solution.parts.strip), np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise)
     bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
     high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
-    yield finding(
-        "truss_law",
+    return (
         f"the paper's laws include neither buckling nor clamping: compared with the corrected laws the peak of the "
         f"leaves is {percent(high)} higher, at {where:.2g} times the travel, their steepest slope is {steep:.2g} times "
         "as steep, and with a spring the force is never flat",
@@ -479,19 +161,292 @@ def _truss(solution: Solution) -> Iterator[Finding]:
     )
 
 
-def _measured(solution: Solution) -> Iterator[Finding]:
-    reported = solution.spec.analysis.measured
-    if reported is None or float(solution.parts.strip.slenderness) < FLAT_BUCKLED_ABOVE:
-        return
-    if solution.spec.mechanism.bistable.structure == "hybrid":  # whose flexures push where it is flat
-        return
-    balance = float(solution.parts.balance)
-    there, needed = reported.positive_stiffness * balance, measured_stiffness_for(reported.force, balance)
-    if abs(there / reported.force - 1.0) > solution.spec.analysis.flatness:
-        yield finding(
-            "measured_contradiction",
-            f"the reported {newton(reported.force)} and K_p = {rate(reported.positive_stiffness)} "
-            f"contradict each other: at {mm(balance)} the leaves carry no force, "
-            f"for any number, width or modulus, and the force is K_p h = {newton(there)}; "
-            f"{newton(reported.force)} needs {rate(needed)}",
-        )
+def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
+    """Return of which leaves the stiffness is negative anywhere, and constant there, (m,) each."""
+    if solution.structure == "hybrid" or solution.fidelity == "truss":
+        return True, True
+    if solution.structure == "cosine":  # whose limits depend on the angle: as the curve has it
+        return solution.of_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(solution.linear[0])
+    q = _slenderness(solution)
+    return q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
+
+
+def _only_rises(solution: Solution) -> Any:
+    return np.logical_not(_negative_and_straight(solution)[0])
+
+
+def _is_rounded(solution: Solution) -> Any:
+    negative, straight = _negative_and_straight(solution)
+    return np.logical_and(negative, np.logical_not(straight))
+
+
+def _rising_force(solution: Solution) -> Sentence:
+    limit = f", below {NEGATIVE_ABOVE}" if solution.structure == "v-beam" else ""
+    return (
+        f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the force of the leaves only rises and cannot "
+        "cancel that of the spring; use thinner or steeper leaves",
+    )
+
+
+def _rounded_force(solution: Solution) -> Sentence:
+    limit = ", not above pi" if solution.structure == "v-beam" else ""
+    return (
+        f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the leaves do not buckle and their force "
+        "curve is rounded; the constant-force window is only its maximum. Use thinner or steeper leaves",
+    )
+
+
+# --- flatness -------------------------------------------------------------------------------------------------------
+
+
+def _is_not_flat(solution: Solution) -> Any:
+    if solution.spec.target_curve is not None:
+        return False
+    top, bottom = solution.nominal.extremes_inside(solution.window)
+    return (top > 0) & ((top - bottom) / top > solution.spec.analysis.flatness) & ~solution.window_is_flat
+
+
+def _uneven_force(solution: Solution) -> Sentence:
+    push, (low, high), one = solution.first, solution.window_of_one, solution.character
+    ripple, allowed = ripple_inside(solution, solution.window), solution.spec.analysis.flatness
+    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
+    reported = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    cause = f"{reported} cancel, but not in the whole window" if alike else f"{reported} do not cancel"
+    low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
+    words, cures = flattening(solution, ripple)
+    return (
+        f"{cause}: over {mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, "
+        f"{percent(allowed)} is allowed{words}",
+        *cures,
+    )
+
+
+# --- the way back ---------------------------------------------------------------------------------------------------
+
+
+def _stays(solution: Solution) -> Any:
+    """Return which mechanisms do not come back by themselves, (m,): past its peak their force is not above rounding."""
+    least, largest = solution.least[1], np.nanmax(np.abs(solution.nominal.force), axis=1)
+    return np.isfinite(least) & ~(least > ROUNDING * largest)
+
+
+def _second_position(solution: Solution) -> Sentence:
+    place, force = (float(value[0]) for value in solution.least)
+    return (
+        f"past the peak of the leaves the force falls to {newton(force)} at {mm(place)} (followed to "
+        f"{mm(float(solution.first.travel[-1]))}): the mechanism stays there until it is pulled back; use a stiffer "
+        "spring, thicker or fewer leaves, or a preload",
+    )
+
+
+def _rests_beyond(solution: Solution) -> Any:
+    """Return whether nothing holds the shuttle before its window begins, (m,)."""
+    return ~(solution.nominal.rest <= solution.window[0])
+
+
+def _reverses(solution: Solution) -> Any:
+    return _rests_beyond(solution) | (solution.nominal.extremes_inside(solution.window)[1] <= 0)
+
+
+def _reversal(solution: Solution) -> Sentence:
+    (low, high), least = solution.window_of_one, float(solution.nominal.extremes_inside(solution.window)[1][0])
+    reported = newton(least) if np.isfinite(least) and not _rests_beyond(solution)[0] else "zero and below"
+    return (
+        f"within {mm(low)} ... {mm(high)} the force falls to {reported}: no outward force remains; a preload "
+        f"above {mm(-float(solution.parts.balance))} and K_p >= K_n keep it positive",
+    )
+
+
+def _forces_beyond_linear(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return the force where the leaves straighten again, NaN beyond the curve, and at the end, (m,) each [N]."""
+    curves = solution.nominal
+    return curves.reached(solution.linear[1][:, None])[:, 0], curves.force[np.arange(len(solution)), curves.count - 1]
+
+
+def _is_overloaded(solution: Solution) -> Any:
+    at_end, last = _forces_beyond_linear(solution)
+    beyond = goes_beyond(solution.nominal.ends[1], solution.linear[1])
+    return beyond & ~(last - at_end <= solution.spec.analysis.flatness * np.abs(last))
+
+
+def _overload(solution: Solution) -> Sentence:
+    end, (at_end, last) = float(solution.linear[1][0]), (float(force[0]) for force in _forces_beyond_linear(solution))
+    return (
+        f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
+        f"{newton(last)} at {mm(float(solution.first.travel[-1]))}; a stop at {mm(end)} limits the travel to the "
+        "linear range",
+    )
+
+
+def _pulled_out_of_range(solution: Solution) -> FloatArray:
+    """Return at which negative preloads no outward force remains somewhere in the window, (m, p) of bool."""
+    curves = solution.curves
+    pulled = solution.by_mechanism(curves.preload[:, 0] < 0)
+    if not pulled.any():
+        return np.zeros(pulled.shape, dtype=bool)
+    low, high = (np.repeat(end, solution.preloads) for end in solution.window)
+    lost = ~(curves.rest <= low) | (curves.extremes_inside((low, high))[1] <= 0)
+    return np.asarray(pulled & solution.by_mechanism(lost))
+
+
+def _pull(solution: Solution) -> Sentence:
+    preload = solution.pushes[int(_pulled_out_of_range(solution)[0].argmax())].preload
+    low, high = solution.window_of_one
+    return (
+        f"with a preload of {mm(preload)} no outward force remains somewhere in {mm(low)} ... "
+        f"{mm(high)}: where the leaves are flat the force is K_p (h + dr), which vanishes at "
+        f"{mm(-float(solution.parts.balance))}",
+    )
+
+
+def _least_preload(solution: Solution) -> FloatArray:
+    return np.asarray(solution.by_mechanism(solution.curves.preload[:, 0]).min(axis=1))
+
+
+def _slack(solution: Solution) -> Sentence:
+    least = float(_least_preload(solution)[0])
+    return (
+        f"with a preload of {mm(least)} the springs carry no force up to {mm(-least)} of travel: bought springs do "
+        "not pull back",
+    )
+
+
+# --- strength, buckling, shape --------------------------------------------------------------------------------------
+
+
+def _shares_of_stress(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return the largest stress of leaves (m,), and of the spring at each preload (m, p), over what is allowed."""
+    allowed = solution.allowable_stress
+    leaves = solution.travel_leaf_stress / (allowed * (1 + np.maximum(solution.overrating, EXACT_FORM)))
+    return leaves, solution.travel_spring_stress / (allowed * (1 + EXACT_FORM))[:, None]
+
+
+def _is_overstressed(solution: Solution) -> Any:
+    if np.isnan(solution.allowable_stress).all():
+        return False
+    leaves, spring = _shares_of_stress(solution)
+    return (leaves > 1.0) | (spring > 1.0).any(axis=1)
+
+
+def _overstress(solution: Solution) -> Sentence:
+    (leaves, spring), allowed = _shares_of_stress(solution), float(solution.allowable_stress[0])
+    number = int(spring[0].argmax())
+    if leaves[0] > spring[0, number]:  # at any preload: the first at which they are pushed so far
+        tops = solution.curves.leaf_stress()
+        number = int((tops >= (1.0 - ROUNDING) * tops.max()).argmax())
+        name, top, share = "leaves", float(solution.travel_leaf_stress[0]), float(leaves[0])
+    else:
+        name, top, share = "spring", float(solution.travel_spring_stress[0, number]), float(spring[0, number])
+    push = solution.pushes[number]
+    stress = push.leaves.stress if name == "leaves" else push.spring_stress
+    over = [*np.flatnonzero(stress > top / share), int(stress.argmax())]  # none of them where it peaks between two
+    place = mm(float(push.travel[over[0]]))
+    passes = f"passes {mpa(allowed)} at {place}" if over[0] else f"is above {mpa(allowed)} from {place} on"
+    return (
+        f"in the {name} the stress {passes} with a preload of {mm(push.preload)} and reaches {mpa(top)} at "
+        f"{mm(float(push.travel[over[-1]]))}; use longer or thinner leaves, or less preload",
+    )
+
+
+def _turning_shuttle(solution: Solution) -> Sentence:
+    hint = "" if solution.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
+    return (
+        f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and their force "
+        f"curve is no longer straight{hint}. Use two Vs at a distance, or a guide",
+        "mechanism.bistable.guided=true",
+    )
+
+
+def _leaves_plane(solution: Solution) -> Any:
+    """Return whether leaves buckle out of the plane first, (m,): narrower than twice their thickness."""
+    return solution.column(lambda spec: spec.mechanism.bistable.width - 2.0 * spec.mechanism.bistable.thickness) < 0
+
+
+def _narrow_leaves(solution: Solution) -> Sentence:
+    about = solution.spec.mechanism.bistable
+    return (
+        f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: leaves narrower than twice "
+        "their thickness buckle out of the plane; use wider (and longer) leaves",
+    )
+
+
+def _wide(name: str) -> FindingRule[Solution]:
+    """Return the rule on leaves, or a spring, that are too wide for beams."""
+
+    def holds(solution: Solution) -> Any:
+        found = solution.hindered_curling
+        return found[name][0] > TOO_SOFT if name in found else False
+
+    def sentence(solution: Solution) -> Sentence:
+        share, place = (float(value[0]) for value in solution.hindered_curling[name])
+        exact, wide = solution.fidelity == "exact", "mechanism.wide_beams=true"
+        hint = "" if exact else "; only 'analysis.fidelity: exact' accounts for it"
+        cure = wide if exact else (wide, "analysis.fidelity=exact")
+        return too_soft(share, f"in the {name} at {mm(place)}") + hint, cure
+
+    return FindingRule("wide_beam", holds, sentence)
+
+
+def _is_wavy(solution: Solution) -> Any:
+    waviness = solution.column(lambda spec: spec.mechanism.bistable.waviness)
+    share = waviness / solution.column(lambda spec: spec.mechanism.bistable.thickness)
+    return (share > WAVY) | ((waviness > 0) & (solution.fidelity not in TRACED))
+
+
+def _imperfection(solution: Solution) -> Sentence:
+    about = solution.spec.mechanism.bistable
+    share, exact = about.waviness / about.thickness, solution.fidelity in TRACED
+    reported = "is counted in" if exact else "is neglected: only 'analysis.fidelity: exact' includes it"
+    effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
+    return (f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {reported}{effect}",)
+
+
+def _is_unstable(solution: Solution) -> Any:
+    if solution.fidelity not in TRACED:
+        return False  # laws are those of stable branches
+    return (~solution.nominal.leaves.stable & solution.nominal.there).any(axis=1)
+
+
+def _unstable_branch(solution: Solution) -> Sentence:
+    push = solution.first
+    lost = push.travel[~push.leaves.stable]
+    text = f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
+    if solution.spec.analysis.branch == "stable":
+        return (f"{text}, which was not found",)
+    return f"{text}: analysis.branch: stable follows them", "analysis.branch=stable"
+
+
+RULES: tuple[FindingRule[Solution], ...] = (
+    FindingRule("measured_contradiction", _contradicts, _contradiction),
+    FindingRule("spring_closed", is_closed, closed_spring),
+    FindingRule("truss_law", lambda solution: solution.fidelity == "truss", _truss),
+    FindingRule("no_negative_stiffness", _only_rises, _rising_force),
+    FindingRule("no_linear_region", _is_rounded, _rounded_force),
+    FindingRule("not_flat", _is_not_flat, _uneven_force),
+    FindingRule("bistable", _stays, _second_position),
+    FindingRule("force_reversal", _reverses, _reversal),
+    FindingRule("overload", _is_overloaded, _overload),
+    FindingRule("preload_out_of_range", lambda solution: _pulled_out_of_range(solution).any(axis=1), _pull),
+    FindingRule("spring_overstretched", is_overstretched, overstretching),
+    FindingRule("spring_buckles", buckles, buckling),
+    FindingRule(
+        "spring_slack",
+        lambda solution: (_least_preload(solution) < 0) & (solution.spec.mechanism.springs is not None),
+        _slack,
+    ),
+    FindingRule("overstressed", _is_overstressed, _overstress),
+    FindingRule(
+        "asymmetric_buckling",
+        lambda solution: solution.column(lambda spec: not spec.mechanism.bistable.guided) > 0,
+        _turning_shuttle,
+    ),
+    FindingRule("out_of_plane_buckling", _leaves_plane, _narrow_leaves),
+    _wide("leaves"),
+    _wide("spring"),
+    FindingRule("imperfection", _is_wavy, _imperfection),
+    FindingRule("unstable_branch", _is_unstable, _unstable_branch),
+    FindingRule("theory_range", is_stocky, stocky_leaves),
+    FindingRule("theory_range", leaves_out_of_range, range_of_leaves),
+    FindingRule("theory_range", spring_out_of_range, range_of_spring),
+)
+"""Every finding of an analysis, the gravest first."""

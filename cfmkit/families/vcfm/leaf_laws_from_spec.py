@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf, sin
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -30,21 +31,11 @@ Leaf = VBeam | CosineLeaf | HybridLeaf | TrussLeaf
 
 @dataclass(frozen=True)
 class Parts:
-    """A mechanism's leaves, their laws and how many there are.
+    """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
 
-    Attributes
-    ----------
-    leaf : Leaf
-        Law of one half-beam of the snap-through structure.
-    spring : Spring or TrussDiamond
-        Law of the spring, as much of it as is loaded.
-    half_beams : int
-        Leaves that carry the shuttle.
-    """
-
-    leaf: Leaf
-    spring: Spring | TrussDiamond
-    half_beams: int
+    leaf: Leaf  # law of one half-beam of the snap-through structure
+    spring: Spring | TrussDiamond  # law of the spring, as much of it as is loaded
+    half_beams: Any  # leaves that carry the shuttle
 
     @property
     def strip(self) -> LeafStrip:
@@ -52,30 +43,29 @@ class Parts:
         return self.leaf.strip
 
     @property
-    def positive_stiffness(self) -> float:
+    def positive_stiffness(self) -> Any:
         """K_p as made [N/m]."""
-        return float(self.spring.stiffness)
+        return self.spring.stiffness
 
     @property
-    def negative_stiffness(self) -> float:
+    def negative_stiffness(self) -> Any:
         """K_n, the size of the negative stiffness of all leaves [N/m]; zero where there is none."""
-        return max(float(self.half_beams * self.leaf.negative_stiffness), 0.0)
+        return np.maximum(self.half_beams * self.leaf.negative_stiffness, 0.0)
 
     @property
-    def first_stiffness(self) -> float:
+    def first_stiffness(self) -> Any:
         """K_b1, the stiffness of all leaves as made [N/m]."""
-        return float(self.half_beams * self.leaf.first_stiffness)
-
-    @cached_property
-    def linear(self) -> tuple[float, float]:
-        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
-        first, last = self.leaf.linear
-        return float(first), float(last)
+        return self.half_beams * self.leaf.first_stiffness
 
     @property
-    def balance(self) -> float:
+    def linear(self) -> tuple[Any, Any]:
+        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        return self.leaf.linear
+
+    @property
+    def balance(self) -> Any:
         """Travel at which the leaves carry nothing, and the spring alone decides the force [m]."""
-        return float(self.leaf.balance)
+        return self.leaf.balance
 
 
 def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> LeafStrip:

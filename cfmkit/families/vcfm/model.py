@@ -1,40 +1,42 @@
-"""Analysis: the force of leaves and spring over the shuttle's travel, for each preload.
+"""Analysis: the force of leaves and spring over the shuttle's travel, for each preload, of one mechanism or of many.
 
-F(x) = F_b(x) + F_p(x + dr), x from the as-made pose, dr the preload of the spring's far end. Each curve begins where
-the shuttle rests under its preload: pulled back by it, with the leaves in tension. Where the leaves are flat they
-carry nothing and the spring alone decides: F = K_p (h + dr), whatever their number, width or modulus.
+Each curve begins where the shuttle rests under its preload: pulled back by it, with the leaves in tension.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import LazySequence, ShortRepr
 from cfmkit.curves import Column, Curve
+from cfmkit.families.rows import SolvedRows, findings_of_one, values_of_one
 from cfmkit.families.vcfm.bought_parts import parts_of
-from cfmkit.families.vcfm.findings import findings_of, spring_closed
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, spring_room
+from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, LeafSamples, Rows
+from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
+from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
+from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stacked
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
-from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_of
-from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
-from cfmkit.numerics.roots import bracketed_root
+from cfmkit.families.vcfm.quantities import QUANTITIES
+from cfmkit.families.vcfm.solution import Solution, target_of
+from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
 from cfmkit.numerics.where_condition_ends import last_places
 from cfmkit.results import ROUND_OFF, Result, Status
 from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Hashable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
+    from cfmkit.families.vcfm.curves_in_rows import PartSampler, Push
     from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
-    from cfmkit.families.vcfm.solution import PartSampler
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
@@ -42,19 +44,12 @@ MOST_BACK = 20
 """The way from the rest position to the as-made pose has at most so many times the points of the travel: a travel of
 some nanometres would take them by the billion."""
 
-LEAST = 5
-"""Points below which there is no curve to speak of."""
+MAX_SAMPLES = 60_000
+"""Samples that are worked on together: few enough to stay in a processor's cache."""
 
 
-def analyze(spec: VcfmSpec, run: Run) -> Result:
+def analyze(spec: VcfmSpec, _run: Run) -> Result:
     """Return the force-displacement curves of a mechanism by closed forms, with everything that is wrong with it.
-
-    Parameters
-    ----------
-    spec : VcfmSpec
-        The mechanism.
-    run : Run
-        Which metrics are looked at: values and findings that none of them needs are left out.
 
     Returns
     -------
@@ -62,64 +57,49 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
     made = parts(spec)
-    return result_of(solve(spec, made, LawSampler(made)), run)
+    return result_of(solve(spec, made, LawSampler(made)))
 
 
-def result_of(solution: Solution, run: Run) -> Result:
-    """Return the curves of a solved mechanism, with everything that is wrong with it, if all of it is looked at.
+def result_of(solution: Solution) -> Result:
+    """Return the curves of one solved mechanism, with everything that is wrong with it.
 
     PARTIAL if the spring closes within the travel, or a beam cannot be followed to its end.
     """
-    spec = solution.spec
-    if len(solution.nominal.travel) < LEAST:
-        closed = tuple(spring_closed(solution))
+    spec, nominal = solution.spec, solution.first
+    if len(nominal.travel) < LEAST_POINTS:
+        closed = (finding("spring_closed", *closed_spring(solution)),) if is_closed(solution).any() else ()
         return Result(spec, Status.NO_EQUILIBRIUM, _shortfall(solution), warnings=closed)
-    short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(_shortfall(solution))
-    status = Status.PARTIAL if short else Status.COMPLETE
+    reason = _shortfall(solution)
+    short = nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(reason)
     curves = tuple(_curve(push) for push in solution.pushes)
+    (low, high), dense = (float(end[0]) for end in solution.linear), DenseCurve(solution)
     return Result(
         spec=_as_run(spec),
-        status=status,
-        message=_shortfall(solution) if short else "",
+        status=Status.PARTIAL if short else Status.COMPLETE,
+        message=reason if short else "",
         curves=curves,
-        values=values_of(solution, run),
-        warnings=findings_of(solution) if run.wanted is None else (),
-        travel=solution.course,
-        valid=_valid(solution),
-        target=_target(spec),
+        values=values_of_one(QUANTITIES, solution),
+        warnings=LazySequence(partial(findings_of_one, RULES, finding, solution)),
+        travel=(float(nominal.travel[0]), spec.travel),
+        valid=((low, min(high, spec.travel)),) if solution.is_linear[0] else None,
+        target=target_of(spec),
         allowable_stress=spec.mechanism.allowable_stress,
-        stress_overrated=solution.overrating,
+        stress_overrated=float(solution.overrating[0]),
         load_cases=curves[1:],
-        closed=DenseCurve(solution),
-        effort_error=solution.effort_error,
-        part_efforts=solution.part_efforts,
+        closed=dense,
+        effort_error=float(solution.effort_error[0]),
+        part_efforts=dense.part_efforts,
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}
         | listed(parts_of(spec)),
         state=solution,
     )
 
 
-def _target(spec: VcfmSpec) -> float | None:
-    """Return the force that the nominal curve is to have [N]: that of the design, more by K_p times its preload.
-
-    None without a design, and where its K_p or a force above zero at that preload is not known.
-    """
-    design, preload = spec.design, spec.analysis.preloads[0]
-    if design is None or design.force is None or not preload:
-        return None if design is None else design.force
-    if spec.mechanism.springs is not None:
-        stiffness = coils(spec.mechanism.springs).stiffness
-    else:
-        stiffness = design.level / design.height if design.height else 0.0
-    target = design.force + stiffness * preload
-    return target if stiffness and target > 0 else None
-
-
 def _shortfall(solution: Solution) -> str:
     """Return why a curve ends before the travel does; empty if none does."""
     if solution.sampler.problem:
         return solution.sampler.problem
-    return next((found.message for found in spring_closed(solution)), "")
+    return str(closed_spring(solution)[0]) if is_closed(solution).any() else ""
 
 
 def travel_grid(spec: VcfmSpec) -> FloatArray:
@@ -128,106 +108,186 @@ def travel_grid(spec: VcfmSpec) -> FloatArray:
 
 
 def solve(spec: VcfmSpec, made: Parts, sampler: PartSampler) -> Solution:
-    """Return the curves at all preloads by a model of leaves and spring."""
-    grid = travel_grid(spec)
-    room, rests = spring_room(spec), rests_of(sampler, spec.analysis.preloads, grid)
-    poses = zip(spec.analysis.preloads, rests, strict=True)
-    nominal, *others = (_push(sampler, pose, grid, room) for pose in poses)
-    # a preload at which the spring cannot be followed, or is closed, has no curve; a message says so
-    pushes = (nominal, *(push for push in others if len(push.travel) >= LEAST))
-    return Solution(spec, made, sampler, sampler.character, pushes)
+    """Return the curves of one mechanism at all preloads by a model of leaves and spring.
 
-
-def rests_of(sampler: PartSampler, preloads: Sequence[float], grid: FloatArray) -> tuple[float | None, ...]:
-    """Return where the shuttle rests at each preload [m]: the first place without force, from the as-made pose on.
-
-    None where there is none, or where the spring could not be followed so far.
+    A preload at which the spring cannot be followed, or is closed, has no curve; a message says so.
     """
-    found: dict[float, float | None] = {preload: 0.0 if preload == 0 else None for preload in preloads}
-    for preload in (one for one in preloads if one < 0):
-        force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
-        beyond = np.flatnonzero(force >= 0)
-        if len(beyond) and beyond[0] == 0 and force[0] == 0:
-            found[preload] = 0.0  # springs that are bought hang slack: they do not pull
-        elif len(beyond) and beyond[0]:
-            found[preload] = _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]])
-    pressed = np.array([one for one in preloads if one > 0])
-    if len(pressed):
-        found |= dict(zip(pressed.tolist(), _pushed_back(sampler, pressed), strict=True))
-    return tuple(found[preload] for preload in preloads)
+    preloads = np.array(spec.analysis.preloads)
+    curves = _curves(sampler, preloads, travel_grid(spec)[None, :], np.full(len(preloads), spring_room(spec)))
+    curves.leaves  # noqa: B018  force and stress come of one root, and a curve has both
+    known = np.isfinite(curves.force)
+    if (known != curves.there).any():
+        curves = Rows(sampler, curves.preload, curves.rest, *_compressed(curves.travel, known))
+    kept = curves.count >= LEAST_POINTS
+    kept[0] = True
+    return Solution((spec,), made, curves if kept.all() else curves.of_rows(np.flatnonzero(kept)), int(kept.sum()))
 
 
-def _pushed_back(sampler: PartSampler, preloads: FloatArray) -> Iterator[float | None]:
-    """Yield where the shuttle rests at positive preloads [m]: all are solved for together."""
+def solve_rows(specs: Sequence[VcfmSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
+    """Yield (indices, mechanisms that are solved together) of those that have closed forms; others are left out."""
+    kinds = {index: kind for index, spec in enumerate(specs) if (kind := _kind(spec)) is not None}
+    order = sorted(kinds, key=lambda index: repr(kinds[index]))
+    for _, alike in groupby(order, key=lambda index: repr(kinds[index])):
+        members = list(alike)
+        first = specs[members[0]].analysis
+        size = max(1, MAX_SAMPLES // first.points)
+        for start in range(0, len(members), size):
+            chosen = members[start : start + size]
+            solution = _solved([specs[index] for index in chosen])
+            yield np.array(chosen), SolvedRows(solution, QUANTITIES, RULES, _is_complete(solution))
 
-    def force(travel: FloatArray, compression: FloatArray) -> FloatArray:
-        return np.asarray(
-            (sampler.leaf_force(travel.ravel()) + sampler.spring(compression.ravel())[0]).reshape(travel.shape)
-        )
 
-    there, behind = force(0.0 * preloads, preloads), force(-preloads, 0.0 * preloads)
+def _is_complete(solution: Solution) -> NDArray[np.bool_]:
+    """Return which mechanisms have all of their curves, each up to the end of the travel, (m,)."""
+    curves, nominal = solution.curves, solution.nominal
+    spring = curves.spring_samples.force.sum(axis=1) + curves.sampler.leaf_force(curves.travel[:, :1])[:, 0]
+    known = (curves.count >= LEAST_POINTS) & np.isfinite(spring)
+    reached = nominal.ends[1] >= solution.travel * (1 - 1e-9)
+    finite = np.isfinite(nominal.force).sum(axis=1) == nominal.count
+    return np.asarray(solution.by_mechanism(known).all(axis=1) & reached & finite & ~is_closed(solution))
+
+
+def _kind(spec: VcfmSpec) -> Hashable | None:
+    """Return what mechanisms that are solved together have in common; None if the model of one is not a closed form."""
+    analysis = spec.analysis
+    if analysis.fidelity not in ("truss", "analytic") or spec.target_curve is not None:
+        return None
+    stated = analysis.window is None, analysis.measured is None
+    settings = analysis.points, len(analysis.preloads), analysis.flatness, analysis.band
+    return analysis.fidelity, spec.mechanism.kinds, *stated, *settings
+
+
+def _solved(specs: Sequence[VcfmSpec]) -> Solution:
+    """Return mechanisms of one kind as rows."""
+    made, count = stacked([parts(spec) for spec in specs]), len(specs[0].analysis.preloads)
+    preloads = np.concatenate([spec.analysis.preloads for spec in specs])
+    each = np.repeat(np.arange(len(specs)), count)
+    grid, room = np.stack([travel_grid(spec) for spec in specs]), np.array([spring_room(spec) for spec in specs])
+    made.linear  # noqa: B018  once for all preloads
+    sampler = LawSampler(made)
+    sampler = sampler if count == 1 or len(specs) == 1 else sampler.of_rows(each)
+    return Solution(tuple(specs), made, _curves(sampler, preloads, grid[each], room[each]), count)
+
+
+def _curves(sampler: PartSampler, preloads: FloatArray, grid: FloatArray, room: FloatArray) -> Rows:
+    """Return one curve for each preload (r,), from where the shuttle rests up to where the spring is closed [m]."""
+    rest = rests_of(sampler, preloads, grid)
+    travel, count = _travels(np.nan_to_num(rest), np.broadcast_to(grid, (len(preloads), grid.shape[1])))
+    is_open = (travel + preloads[:, None] <= room[:, None] * (1 + 1e-12)) & (
+        np.arange(travel.shape[1]) < count[:, None]
+    )
+    return Rows(sampler, preloads[:, None], rest, *_compressed(travel, is_open))
+
+
+def _travels(start: FloatArray, grid: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the travels of curves that start at rest (r,), (r, n), and how many each has [m]."""
+    step = np.maximum(grid[:, 1], -start / (MOST_BACK * grid.shape[1]))
+    backs = np.where(start < 0, -start / step, 0.0).astype(np.intp)
+    number = np.arange(backs.max(initial=0), 0, -1)
+    back = -step[:, None] * number
+    kept = [
+        np.ones((len(start), 1), dtype=bool),
+        (number <= backs[:, None]) & (back > (start + 1e-9 * step)[:, None]),
+        grid > start[:, None] + 1e-12,
+    ]
+    return _compressed(np.hstack([start[:, None], back, grid]), np.hstack(kept))
+
+
+def _compressed(travel: FloatArray, kept: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return what is kept of each row, its last place repeated, and how much that is."""
+    count = kept.sum(axis=1)
+    if kept.all():
+        return travel, count
+    size = max(int(count.max()), 1)
+    travel = np.take_along_axis(travel, np.argsort(~kept, axis=1, kind="stable"), 1)[:, :size]
+    last = travel[np.arange(len(count)), np.maximum(count - 1, 0)][:, None]
+    return np.where(np.arange(size) < count[:, None], travel, last), count
+
+
+def rests_of(sampler: PartSampler, preloads: FloatArray | Sequence[float], grid: FloatArray) -> FloatArray:
+    """Return where the shuttle rests at each preload, (r,) [m]: the first place without force from the as-made pose on.
+
+    NaN where there is none, or where the spring could not be followed so far.
+
+    Parameters
+    ----------
+    sampler : PartSampler
+        Of one mechanism, or of one for each preload.
+    preloads : (r,) array
+        [m].
+    grid : (n,) or (r, n) array
+        Travels at which a shuttle whose spring is pulled is looked for first [m].
+    """
+    preload = np.asarray(preloads, dtype=float)
+    grid = np.broadcast_to(grid, (len(preload), np.shape(grid)[-1]))
+    rest = np.where(preload == 0, 0.0, np.nan)
+    for rows, search in ((np.flatnonzero(preload < 0), _pulled_ahead), (np.flatnonzero(preload > 0), _pushed_back)):
+        if rows.size:
+            rest[rows] = search(sampler.of_rows(rows), preload[rows], grid[rows])
+    return rest
+
+
+def _force(sampler: PartSampler, travel: FloatArray, preload: FloatArray) -> FloatArray:
+    """Return the force at travels (r, n) and preloads (r,) [N]."""
+    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload[:, None])[0])
+
+
+def _pulled_ahead(sampler: PartSampler, preload: FloatArray, grid: FloatArray) -> FloatArray:
+    """Return where the shuttle rests at negative preloads, (r,) [m]."""
+    force, rows = _force(sampler, grid, preload), np.arange(len(preload))
+    beyond = force >= 0
+    first = beyond.argmax(axis=1)
+    before = np.maximum(first - 1, 0)
+    # springs that are bought hang slack: they do not pull
+    slack = beyond[:, 0] & (force[:, 0] == 0)
+    some = beyond.any(axis=1) & (first > 0)
+
+    def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
+        found = _force(sampler.of_rows(ends), travel, preload[ends]) / np.abs(force[ends, first[ends]])[:, None]
+        # no value: farther back than the leaves were followed, where they pull still harder
+        return np.where(np.isfinite(found), found, -1.0)
+
+    low, high = grid[rows, before], grid[rows, first]
+    some &= force[rows, first] != 0
+    exact = beyond.any(axis=1) & (first > 0) & ~some
+    place = last_places(excess, low[:, None], np.where(some, high, low)[:, None])[:, 0]
+    place = _polished(sampler, preload, place, 1e-9 * (high - low))
+    return np.where(slack, 0.0, np.where(exact, high, np.where(some, place, np.nan)))
+
+
+def _pushed_back(sampler: PartSampler, preload: FloatArray, _grid: FloatArray) -> FloatArray:
+    """Return where the shuttle rests at positive preloads, (r,) [m]."""
+    nothing = np.zeros((len(preload), 1))
+    there, behind = (_force(sampler, at, preload)[:, 0] for at in (nothing, -preload[:, None]))
     # No number as made: leaves too thin for the engine could not be moved at all. No number farther back: than they
     # were followed, where they pull still harder. The closed form of arches pulls the wrong way far out of its range.
     rests = (there > 0) & ~(behind > 0)
 
     def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
-        return -force(travel, travel + preloads[ends][:, None]) / there[ends][:, None]
+        return -_force(sampler.of_rows(ends), travel, preload[ends]) / there[ends][:, None]
 
-    places = last_places(excess, 0.0 * preloads[:, None], np.where(rests, -preloads, 0.0)[:, None])[:, 0]
-    # One secant more over what is left of the brackets: rests are known to rounding.
-    step = 1e-9 * preloads
-    here, ahead = (force(at, at + preloads) for at in (places, places + step))
+    place = last_places(excess, nothing, np.where(rests, -preload, 0.0)[:, None])[:, 0]
+    return np.where(rests, _polished(sampler, preload, place, 1e-9 * preload), np.nan)
+
+
+def _polished(sampler: PartSampler, preload: FloatArray, place: FloatArray, step: FloatArray) -> FloatArray:
+    """Return rest positions after one secant more over what is left of their brackets: known to rounding."""
+    here, ahead = (_force(sampler, at[:, None], preload)[:, 0] for at in (place, place + step))
     with np.errstate(all="ignore"):
         change = here * step / (ahead - here)
-    places = places - np.where(np.abs(change) < step, change, 0.0)
-    yield from (place if some else None for place, some in zip(places.tolist(), rests.tolist(), strict=True))
-
-
-def _balanced(sampler: PartSampler, preload: float, low: float, high: float) -> float | None:
-    """Return where the force vanishes between a place where it is negative and one where it is not, if any."""
-
-    def force(travel: float) -> float:
-        place = np.array([travel])
-        found = float((sampler.leaf_force(place) + sampler.spring(place + preload)[0])[0])
-        # no value: farther back than the leaves were followed, where they pull still harder
-        return found if np.isfinite(found) else -1e30
-
-    if force(low) > 0 or force(high) < 0:  # far outside of its range the closed form of arches pulls the wrong way
-        return None
-    return bracketed_root(force, float(low), float(high))
+    return place - np.where(np.abs(change) < step, change, 0.0)
 
 
 def rest_of(sampler: PartSampler, preload: float, grid: FloatArray) -> float | None:
-    """Return `rests_of` for one preload [m]."""
-    return rests_of(sampler, (preload,), grid)[0]
-
-
-def _push(sampler: PartSampler, pose: tuple[float, float | None], grid: FloatArray, room: float) -> Push:
-    preload, rest = pose
-    start = rest or 0.0
-    if start < 0:
-        step = max(grid[1], -start / (MOST_BACK * len(grid)))
-        back = -step * np.arange(int(-start / step), 0, -1)
-        grid = np.concatenate([back[back > start + 1e-9 * step], grid])
-    travel = np.concatenate([[start], grid[grid > start + 1e-12]])
-    leaves = sampler.leaves(travel)
-    force, stress = sampler.spring(travel + preload)
-    known = np.isfinite(leaves.force + force) & (travel + preload <= room * (1 + 1e-12))
-    if not known.all():
-        travel, force, stress = travel[known], force[known], stress[known]
-        leaves = type(leaves)(leaves.force[known], leaves.stress[known], leaves.stable[known], leaves.buckled[known])
-    return Push(preload, travel, leaves, force, stress, rest, sampler.solved(travel, preload))
+    """Return `rests_of` for one preload [m]; None where the shuttle does not rest."""
+    rest = float(rests_of(sampler, [preload], grid)[0])
+    return None if np.isnan(rest) else rest
 
 
 def _as_run(spec: VcfmSpec) -> VcfmSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     analysis = spec.analysis.model_copy(update={"travel": spec.travel})
     return spec.model_copy(update={"analysis": analysis})
-
-
-def _valid(solution: Solution) -> tuple[tuple[float, float], ...] | None:
-    low, high = solution.character.linear
-    return ((low, min(high, solution.spec.travel)),) if np.isfinite(low) and low < solution.spec.travel else None
 
 
 def _curve(push: Push) -> Curve:
@@ -246,15 +306,18 @@ def _curve(push: Push) -> Curve:
     return Curve(push.travel, push.force, branch, leaves.stable, extra, label={"preload": (push.preload, "length")})
 
 
+@dataclass(frozen=True)
 class LawSampler:
-    """Samples of closed forms."""
+    """Samples of closed forms: of one mechanism, or of one for each row (`laws_in_rows`)."""
+
+    parts: Parts
 
     problem = ""
     accuracy = ROUND_OFF
 
-    def __init__(self, parts: Parts) -> None:
-        """Keep the laws."""
-        self.parts = parts
+    def of_rows(self, rows: Any) -> Self:
+        """Return the laws of some rows."""
+        return type(self)(rows_of(self.parts, rows))
 
     def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
         """Return None: closed forms know every travel."""
@@ -271,6 +334,10 @@ class LawSampler:
         """Return the force of all leaves alone [N]."""
         return np.asarray(self.parts.half_beams * np.asarray(self.parts.leaf.force(travel), dtype=float))
 
+    def leaf_stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of the leaves [Pa]."""
+        return np.asarray(self.parts.leaf.stress(travel), dtype=float)
+
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
         spring = self.parts.spring
@@ -283,28 +350,16 @@ class LawSampler:
         return Characteristics(parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear)
 
 
-EVEN = 257
-"""Places at even steps: the force beyond the peak is smooth, and the leaves' law has no shorter waves."""
-
-CROWDED = np.geomspace(1e-6, 1.0, 73)
-"""Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class DenseCurve(ShortRepr):
-    """The force at the nominal preload (a `cfmkit.results.ClosedForm`), with the stress of all preloads."""
+    """The force of one mechanism at the nominal preload (a `cfmkit.results.ClosedForm`), with the stress of all."""
 
     solution: Solution
 
     @cached_property
     def places(self) -> FloatArray:
         """Increasing travels of the shuttle [m]."""
-        travel = self.solution.nominal.travel
-        low, high = float(travel[0]), float(travel[-1])
-        marks = [mark for mark in (*self.solution.character.linear, 0.0) if np.isfinite(mark) and low <= mark < high]
-        around = [mark + sign * CROWDED * (high - low) for mark in marks for sign in (-1.0, 1.0)]
-        grid = np.unique(np.concatenate([np.linspace(low, high, EVEN), marks, *around]))
-        return grid[(grid >= low) & (grid <= high)]
+        return np.unique(self.solution.dense)
 
     @property
     def peaks(self) -> FloatArray:
@@ -323,24 +378,16 @@ class DenseCurve(ShortRepr):
         return self._force(self.places)
 
     def _force(self, places: FloatArray) -> FloatArray:
-        sampler, travel = self.solution.sampler, np.ravel(places)
-        force = sampler.leaf_force(travel) + sampler.spring(travel + self.solution.nominal.preload)[0]
-        return np.asarray(force.reshape(np.shape(places)))
+        return self.solution.nominal.force_at(np.reshape(places, (1, -1))).reshape(np.shape(places))
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of all preloads there [Pa]."""
-        travel = np.ravel(places)
-        leaves = self.solution.sampler.leaves(travel).stress
-        found = np.max([np.maximum(leaves, self._spring(push, travel)) for push in self.solution.pushes], axis=0)
-        return np.asarray(found.reshape(np.shape(places)))
+        return self.solution.stress(np.reshape(places, (1, -1))).reshape(np.shape(places))
 
     def own_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of leaves and spring at travels of any shape, of the nominal preload [Pa]."""
-        travel, one = np.ravel(places), self.solution
-        found = np.maximum(one.sampler.leaves(travel).stress, self._spring(one.nominal, travel))
-        return np.asarray(found.reshape(np.shape(places)))
+        return self.solution.stress(np.reshape(places, (1, -1)), alone=True).reshape(np.shape(places))
 
-    def _spring(self, push: Push, travel: FloatArray) -> FloatArray:
-        """Return the stress of the spring at a preload, none beyond its curve [Pa]."""
-        beyond = (travel < push.travel[0]) | (travel > push.travel[-1])
-        return np.where(beyond, 0.0, self.solution.sampler.spring(travel + push.preload)[1])
+    def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest force of one leaf, or of one spring, at travels of any shape [N]."""
+        return self.solution.part_efforts(np.reshape(places, (1, -1))).reshape(np.shape(places))

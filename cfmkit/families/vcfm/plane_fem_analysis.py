@@ -238,14 +238,15 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, message)
     except SolutionError as error:
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}")
-    found = result_of(solution := solve(spec, made, sampler), run)
+    found = result_of(solution := solve(spec, made, sampler))
     warnings = (*found.warnings, *_findings(spec, sampler))
     if not found.curves:
         return replace(found, warnings=warnings)
     rows = sum(fillets(solution), ())
     tables = dict(found.tables)
     tables["fillets"] = partial(fillet_table, rows)
-    return replace(found, values={**found.values, **largest_concentration(rows)}, warnings=warnings, tables=tables)
+    values = {**found.values, **largest_concentration(rows)}
+    return replace(found, values=values, warnings=warnings, tables=tables)
 
 
 def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:

@@ -146,7 +146,7 @@ def _add_coils(found: Scene, solution: Solution, bottom: float, deflection: floa
     assert springs is not None
     hangs = springs.kind == "extension"
     across = springs.outer_diameter or 1.5 * frame.block
-    farthest = max(push.preload for push in solution.pushes) + float(solution.nominal.travel[-1])
+    farthest = max(push.preload for push in solution.pushes) + float(solution.first.travel[-1])
     length = (springs.free_length or max(2.0 * frame.corner, 1.5 * farthest)) + (deflection if hangs else -deflection)
     start = found.top[1] if hangs else bottom
     end = start + length if hangs else start - length

@@ -1,164 +1,196 @@
-"""What is known of a solved mechanism: its parts, what a model gives at some travels, and one curve per preload.
+"""Solved mechanisms: F(x) = F_b(x) + F_p(x + dr), x from the as-made pose, dr the preload of the spring's far end.
 
-Every other file of this family may import these types.
+Of m mechanisms with p preloads each, curves are m p rows, those of one mechanism together and the nominal preload
+first; of one mechanism m is 1. Everything that results, findings and studies read is computed here, when it is first
+read. Where the leaves are flat they carry nothing and the spring alone decides: F = K_p (h + dr), whatever their
+number, width or modulus.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
+from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils
 from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
-from cfmkit.metrics.continuous_means_and_extremes import extremes
-from cfmkit.metrics.longest_interval_in_band import extreme, flat_window
+from cfmkit.metrics.longest_interval_in_band import extremes
+from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.curves_in_rows import Characteristics, PartSampler, Rows
     from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
     from cfmkit.families.vcfm.spec import VcfmSpec
 
-
-@dataclass(frozen=True, repr=False)
-class LeafSamples(ShortRepr):
-    """All leaves at some travels: force [N], largest stress [Pa], whether stable, whether buckled; (n,) each."""
-
-    force: FloatArray
-    stress: FloatArray
-    stable: Any
-    buckled: Any
+    Ends = tuple[FloatArray, FloatArray]
 
 
-@dataclass(frozen=True)
-class Characteristics:
-    """Stiffness of spring and leaves [N/m], and where the negative one is constant [m] (NaN: nowhere).
+FLAT_PLACES = 401
+"""Even places of a constant-force window over which its mean is taken."""
 
-    `negative_stiffness` is a size: positive, or zero where there is none.
+MEAN_PLACES = 201
+"""Even places of the window at which the forces of all preloads are averaged."""
+
+ROUNDING = 1e-9
+"""A force or a travel beyond its limit by this share is on it: conversions of units and sums leave less."""
+
+EVEN = 257
+"""Places at even steps: the force beyond the peak is smooth, and the leaves' law has no shorter waves."""
+
+CROWDED = np.geomspace(1e-6, 1.0, 73)
+"""Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
+
+
+def goes_beyond(travel: FloatArray, end: FloatArray) -> Any:
+    """Return whether travels go beyond ends [m], by more than rounding."""
+    return travel > end * (1 + ROUNDING)
+
+
+def target_of(spec: VcfmSpec) -> float | None:
+    """Return the force that the nominal curve is to have [N]: that of the design, more by K_p times its preload.
+
+    None without a design, and where its K_p or a force above zero at that preload is not known.
     """
+    design, preload = spec.design, spec.analysis.preloads[0]
+    if design is None or design.force is None or not preload:
+        return None if design is None else design.force
+    if spec.mechanism.springs is not None:
+        stiffness = coils(spec.mechanism.springs).stiffness
+    else:
+        stiffness = design.level / design.height if design.height else 0.0
+    target = design.force + stiffness * preload
+    return target if stiffness and target > 0 else None
 
-    positive_stiffness: float
-    negative_stiffness: float
-    first_stiffness: float
-    linear: tuple[float, float]
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(ShortRepr):
+    """Solved mechanisms that differ in numbers only: their specifications, their laws and all of their curves."""
 
-class PartSampler(Protocol):
-    """A model of leaves and spring."""
+    specs: tuple[VcfmSpec, ...]
+    parts: Parts  # of one mechanism with plain numbers, of several with columns (m, 1)
+    curves: Rows
+    preloads: int  # curves of each mechanism
+
+    def __len__(self) -> int:
+        """Return the number of mechanisms."""
+        return len(self.specs)
+
+    def column(self, read: Callable[[VcfmSpec], float | None]) -> FloatArray:
+        """Return a number of each specification, (m,); NaN for None."""
+        return np.array([read(spec) for spec in self.specs], dtype=float)
+
+    def of_mechanisms(self, value: Any) -> FloatArray:
+        """Return what laws give, a number or a column, as (m,)."""
+        return np.broadcast_to(np.ravel(value), len(self))
+
+    def by_mechanism(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return what is known of each curve, (m p, ...), as (m, p, ...)."""
+        return values.reshape(len(self), self.preloads, *values.shape[1:])
+
+    # --- of one mechanism -------------------------------------------------------------------------------------------
 
     @property
-    def problem(self) -> str:
-        """Why a part could not be followed to the end; empty if all could."""
+    def spec(self) -> VcfmSpec:
+        """The specification of the first mechanism: words and settings are the same in all."""
+        return self.specs[0]
 
     @property
-    def accuracy(self) -> float:
-        """Error of the force, in parts of what leaves and spring bear."""
+    def fidelity(self) -> str:
+        """The model that was requested."""
+        return self.spec.analysis.fidelity
 
     @property
-    def character(self) -> Characteristics:
-        """Stiffnesses and linear range."""
+    def structure(self) -> str:
+        """The kind of the leaves."""
+        return self.spec.mechanism.bistable.structure
 
-    def leaves(self, travel: FloatArray) -> LeafSamples:
-        """Return what all leaves do at some travels [m]."""
-
-    def leaf_force(self, travel: FloatArray) -> FloatArray:
-        """Return the force of all leaves alone [N]."""
-
-    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
-
-    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
-        """Tell at which travels [m] leaves and spring were solved for, not interpolated; None where all are known."""
-
-
-@dataclass(frozen=True, repr=False)
-class Push(ShortRepr):
-    """One curve: the mechanism at one preload.
-
-    Attributes
-    ----------
-    preload : float
-        Of the spring's far end [m].
-    travel : (n,) array
-        Of the shuttle from the as-made pose, increasing [m].
-    leaves : LeafSamples
-        All leaves.
-    spring_force, spring_stress : (n,) array
-        Of the spring [N, Pa].
-    rest : float or None
-        Where the shuttle rests [m]; None where nothing holds it short of the end.
-    solved : (n,) array of bool or None
-        Where leaves and spring were solved for, not interpolated; None where all is known.
-    """
-
-    preload: float
-    travel: FloatArray
-    leaves: LeafSamples
-    spring_force: FloatArray
-    spring_stress: FloatArray
-    rest: float | None
-    solved: NDArray[np.bool_] | None = None
+    @property
+    def sampler(self) -> PartSampler:
+        """The model of the parts."""
+        return self.curves.sampler
 
     @cached_property
-    def force(self) -> FloatArray:
-        """Force on the shuttle [N]."""
-        total: FloatArray = np.add(self.leaves.force, self.spring_force)
-        return total
-
-
-@dataclass(frozen=True, repr=False)
-class Solution(ShortRepr):
-    """A solved mechanism: its parts, the model used, what characterises it, and one curve per preload."""
-
-    spec: VcfmSpec
-    parts: Parts
-    sampler: PartSampler
-    character: Characteristics
-    pushes: tuple[Push, ...]
+    def pushes(self) -> tuple[Push, ...]:
+        """The curves of the first mechanism, the nominal one first."""
+        return tuple(self._push(row) for row in range(self.preloads))
 
     @property
-    def nominal(self) -> Push:
-        """The curve of the first preload."""
+    def first(self) -> Push:
+        """The nominal curve of the first mechanism."""
         return self.pushes[0]
 
-    @property
-    def effort_error(self) -> float:
-        """Rounding of the sum of the forces of leaves and spring, or what the path of each is solved to [N]."""
-        push = self.nominal
-        return self.sampler.accuracy * float((np.abs(push.leaves.force) + np.abs(push.spring_force)).max())
+    def _push(self, row: int) -> Push:
+        curves, size = self.curves, int(self.curves.count[row])
+        leaves = LeafSamples(*(one[row, :size] for one in vars(curves.leaves).values()))
+        force, stress = (one[row, :size] for one in vars(curves.spring_samples).values())
+        travel, preload, rest = curves.travel[row, :size], float(curves.preload[row, 0]), float(curves.rest[row])
+        known = None if np.isnan(rest) else rest
+        return Push(preload, travel, leaves, force, stress, known, curves.sampler.solved(travel, preload))
 
-    def part_efforts(self, _branch: str, travel: FloatArray, /) -> FloatArray:
-        """Return the largest force of one leaf, or of one spring, at some travels and the nominal preload [N]."""
-        places = np.ravel(travel)
-        leaf = self.sampler.leaf_force(places) / self.parts.half_beams
-        spring = self.sampler.spring(places + self.nominal.preload)[0] / self.springs
-        return np.asarray(np.maximum(np.abs(leaf), np.abs(spring)).reshape(np.shape(travel)))
-
-    @property
-    def springs(self) -> int:
-        """Number of springs side by side: of those that are bought; a flexure spring is one."""
-        bought = self.spec.mechanism.springs
-        return 1 if bought is None else bought.count
+    # --- what characterises each mechanism, (m,) --------------------------------------------------------------------
 
     @cached_property
-    def constant_force(self) -> float | None:
-        """That of `spring_alone` [N], where the curve is flat at it; None where it only passes through it.
+    def nominal(self) -> Rows:
+        """The curves of the first preload, one for each mechanism."""
+        return self.curves if self.preloads == 1 else self.curves.of_rows(slice(None, None, self.preloads))
 
-        Leaves that are too stiff for the spring have their flat part at their peak, which is another force; a spring
-        that is too stiff for them leaves next to nothing flat.
-        """
-        alone, flat, part = self.spring_alone, self.window_force, self.windows[0]
-        if alone is None or flat is None or part is None:
-            return None
-        return alone if is_constant(alone, flat, self._flatness, (part, self.window)) else None
+    @cached_property
+    def character(self) -> Characteristics:
+        """Stiffnesses and linear ranges."""
+        return self.nominal.sampler.character
+
+    @cached_property
+    def linear(self) -> Ends:
+        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        first, last = map(self.of_mechanisms, self.character.linear)
+        return first, last
+
+    @cached_property
+    def travel(self) -> FloatArray:
+        """How far the shuttles are to go [m]."""
+        return self.column(lambda spec: spec.travel)
+
+    @cached_property
+    def allowable_stress(self) -> FloatArray:
+        """Yield strength over safety factor [Pa]; NaN where no strength is known."""
+        return self.column(lambda spec: spec.mechanism.allowable_stress)
+
+    @cached_property
+    def target(self) -> FloatArray:
+        """Force that the nominal curve is to have [N]; NaN if none is known (`target_of`)."""
+        return self.column(target_of)
+
+    @cached_property
+    def effort_error(self) -> FloatArray:
+        """Rounding of the sum of the forces of leaves and spring, or what the path of each is solved to [N]."""
+        curves = self.nominal
+        return np.asarray(
+            self.sampler.accuracy * (np.abs(curves.leaf_force) + np.abs(curves.spring_samples.force)).max(axis=1)
+        )
+
+    def part_efforts(self, travel: FloatArray) -> FloatArray:
+        """Return the largest force of one leaf, or of one spring, at travels (m, n) and the nominal preload [N]."""
+        curves = self.nominal
+        leaf = np.abs(curves.sampler.leaf_force(travel)) / self.parts.half_beams
+        count = self.column(lambda spec: 1 if spec.mechanism.springs is None else spec.mechanism.springs.count)
+        spring = np.abs(curves.sampler.spring(travel + curves.preload)[0]) / count[:, None]
+        return np.asarray(np.maximum(leaf, spring))
+
+    @cached_property
+    def flat(self) -> Ends:
+        """From where to where the nominal force is constant [m]; NaN where it is nowhere positive."""
+        return self.nominal.flat_parts(self._flatness)
 
     @property
     def _flatness(self) -> float:
@@ -166,201 +198,209 @@ class Solution(ShortRepr):
         return self.spec.analysis.flatness
 
     @cached_property
-    def spring_alone(self) -> float | None:
-        """Force of the spring at the nominal preload where the leaves carry nothing [N]; None if they do carry there.
+    def is_linear(self) -> NDArray[np.bool_]:
+        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
+        return np.isfinite(self.linear[0]) & (self.linear[0] < self.travel)
+
+    @cached_property
+    def window(self) -> Ends:
+        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat part."""
+        if self.spec.analysis.window is not None:
+            starts = self.nominal.ends[0].tolist()
+            stated = [
+                (spec.analysis.window, (start, spec.travel)) for spec, start in zip(self.specs, starts, strict=True)
+            ]
+            low, high = np.array([between(ends, travel) for ends, travel in stated if ends is not None]).T
+            return low, high
+        if self.is_linear.all():  # nothing flat needs to be looked for
+            return self.linear[0], np.minimum(self.linear[1], self.travel)
+        some, (first, last) = np.isfinite(self.flat[0]), self.linear
+        return (
+            np.where(self.is_linear, first, np.where(some, self.flat[0], 0.0)),
+            np.where(self.is_linear, np.minimum(last, self.travel), np.where(some, self.flat[1], self.travel)),
+        )
+
+    @property
+    def window_of_one(self) -> tuple[float, float]:
+        """The window of the first mechanism [m]."""
+        low, high = self.window
+        return float(low[0]), float(high[0])
+
+    @property
+    def window_is_flat(self) -> NDArray[np.bool_]:
+        """Whether `window` is the longest flat part itself: flat by what it is, whatever the last digit says."""
+        if self.spec.analysis.window is not None or self.is_linear.all():
+            return np.zeros(len(self), dtype=bool)
+        return ~self.is_linear & np.isfinite(self.flat[0])
+
+    @cached_property
+    def window_force(self) -> FloatArray:
+        """Mean of the nominal force over its longest flat part [N]; NaN where there is none."""
+        (low, high), curves = self.flat, self.nominal
+        with np.errstate(all="ignore"):
+            places = np.linspace(low, high, FLAT_PLACES, axis=1)
+            known = np.isfinite(low)[:, None]
+            force = curves.force_at(np.where(known, places, curves.travel[:, :1]))
+            mean = np.trapezoid(np.where(known, force, np.nan), places, axis=1) / (places[:, -1] - places[:, 0])
+        return np.where(high > low, mean, np.nan)
+
+    @cached_property
+    def spring_alone(self) -> FloatArray:
+        """Force of the spring at the nominal preload where the leaves carry nothing [N]; NaN if they do carry there.
 
         Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
         constant stiffness. Then no single number stands for the curve.
         """
-        kinds = self.spec.mechanism.kinds
-        place = np.array([self.parts.balance])
-        force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
+        kinds, curves = self.spec.mechanism.kinds, self.nominal
+        place = self.of_mechanisms(self.parts.balance)[:, None]
+        force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
-        bears = abs(float(self.sampler.leaf_force(place)[0])) > self._flatness * abs(force) and not (
-            np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
-        )
-        return None if bears or kinds[0] == "straight" else force
+        buckles = np.isfinite(self.linear[0]) & (kinds[1] != "hybrid")
+        bears = (np.abs(curves.sampler.leaf_force(place)[:, 0]) > self._flatness * np.abs(force)) & ~buckles
+        return np.where(bears | (kinds[0] == "straight"), np.nan, force)
+
+    @cached_property
+    def constant_force(self) -> FloatArray:
+        """That of `spring_alone` [N], where the curve is flat at it; NaN where it only passes through it.
+
+        Leaves that are too stiff for the spring have their flat part at their peak, which is another force; a spring
+        that is too stiff for them leaves next to nothing flat: at least half of the window is to be.
+        """
+        (start, end), (low, high), alone = self.flat, self.window, self.spring_alone
+        with np.errstate(all="ignore"):
+            common = np.minimum(end, high) - np.maximum(start, low)
+            near = np.abs(alone - self.window_force) <= self._flatness * np.maximum(alone, self.window_force)
+            return np.where(near & (common >= 0.5 * (high - low)), alone, np.nan)
+
+    @cached_property
+    def least(self) -> Ends:
+        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; NaN without one."""
+        curves, rows = self.nominal, np.arange(len(self))
+        travel, (first, end) = curves.travel, curves.ends
+        falls = (np.diff(curves.leaf_force, axis=1) < 0) & (travel[:, :-1] >= 0) & curves.there[:, 1:]
+        some = falls.any(axis=1)
+        step = (travel[rows, curves.count - 1] - travel[rows, curves.count - 2])[:, None]
+        # thin leaves have their peak between the first two points: it is looked for, not taken from them
+        nearest = travel[rows, falls.argmax(axis=1)]
+        peak = extremes(curves.sampler.leaf_force, nearest, step, (np.maximum(first, 0.0), end))
+        beyond = curves.there & (travel >= peak[:, None])
+        lowest = travel[rows, np.where(beyond, curves.force, np.inf).argmin(axis=1)]
+        lowest = np.where(beyond.any(axis=1), lowest, peak)
+        pull = lambda places: -curves.force_at(places)  # noqa: E731  what is smallest is pulled back most
+        place = extremes(pull, np.maximum(lowest, peak), step, (peak, end))
+        force = curves.force_at(place[:, None])[:, 0]
+        return np.where(some, place, np.nan), np.where(some, force, np.nan)
+
+    @cached_property
+    def leaf_rows(self) -> Rows:
+        """Curves that go wherever the leaves go at any preload: of each mechanism one, or all where some end early."""
+        first, last = (self.by_mechanism(end) for end in self.curves.ends)
+        if (last != last[:, :1]).any():
+            return self.curves
+        return self.curves.of_rows(np.arange(len(self)) * self.preloads + first.argmin(axis=1))
+
+    def leaf_stress(self, end: FloatArray | float = np.inf) -> FloatArray:
+        """Return the largest stress of the leaves up to travels, (m,) or one, over all preloads, (m,) [Pa]."""
+        ends = np.repeat(np.broadcast_to(end, len(self)), len(self.leaf_rows.travel) // len(self))
+        return np.asarray(self.leaf_rows.leaf_stress(ends).reshape(len(self), -1).max(axis=1))
+
+    @cached_property
+    def travel_leaf_stress(self) -> FloatArray:
+        """The same over the whole travel, (m,) [Pa]."""
+        return self.leaf_stress()
+
+    @cached_property
+    def travel_spring_stress(self) -> FloatArray:
+        """Largest stress of the spring over the whole travel at each preload, (m, p) [Pa]."""
+        return self.by_mechanism(self.curves.spring_stress())
 
     @property
-    def overrating(self) -> float:
+    def overrating(self) -> FloatArray:
         """By what share the model overestimates the stress of the leaves at most, where that is known; else zero."""
         closed = isinstance(self.parts.leaf, VBeam) and self.spec.analysis.fidelity == "analytic"
-        return float(overrated(self.parts.strip.angle)) if closed else 0.0
+        return self.of_mechanisms(overrated(self.parts.strip.angle) if closed else 0.0)
 
-    @property
-    def hindered_curling(self) -> Iterator[tuple[str, float, float]]:
+    @cached_property
+    def hindered_curling(self) -> dict[str, Ends]:
         """By what share leaves and spring are too soft at most, as wide strips, and at which travel [m].
 
         Their curvature is taken from the stress at any preload, as if they were bent to half a sine.
         """
-        about = self.spec.mechanism
+        about, curves = self.spec.mechanism, self.curves
         if about.wide_beams or self.spec.analysis.fidelity in ("truss", "solid"):
-            return
-        own, nu = about.material.modulus, about.material.poisson
-        travel = np.concatenate([push.travel for push in self.pushes])
-        leaves, spring = (
-            np.concatenate([np.asarray(one) for one in found])
-            for found in zip(*((push.leaves.stress, push.spring_stress) for push in self.pushes), strict=True)
+            return {}
+        nu, found = self.column(lambda spec: spec.mechanism.material.poisson), {}
+        modulus = self.column(lambda spec: spec.mechanism.material.modulus)
+        leaves = ("leaves", "bistable", self.leaf_rows, self.leaf_rows.leaves.stress)
+        for name, key, rows, samples in (leaves, ("spring", "positive", curves, curves.spring_samples.stress)):
+            if getattr(about, key) is None:  # a bought spring is none
+                continue
+            sizes = [getattr(spec.mechanism, key) for spec in self.specs]
+            width, thickness = (np.array([getattr(one, size) for one in sizes]) for size in ("width", "thickness"))
+            stress = np.where(rows.there, samples, -np.inf).reshape(len(self), -1)
+            worst = np.nanargmax(stress, axis=1)[:, None]
+            curvature = 2.0 * np.take_along_axis(stress, worst, 1)[:, 0] / (modulus * thickness)
+            share = np.asarray(hindered_share(width, thickness, nu, curvature))
+            found[name] = share, np.take_along_axis(rows.travel.reshape(len(self), -1), worst, 1)[:, 0]
+        return found
+
+    @cached_property
+    def window_forces(self) -> FloatArray:
+        """Force of each curve at even places of the mechanism's window, (m, p, MEAN_PLACES) [N]; NaN beyond it."""
+        places = np.linspace(*self.window, MEAN_PLACES, axis=1)
+        leaves = self.nominal.sampler.leaf_force(places)[:, None]
+        spring = self.curves.sampler.spring(np.repeat(places, self.preloads, axis=0) + self.curves.preload)[0]
+        first, last = (self.by_mechanism(end)[..., None] for end in self.curves.ends)
+        inside = (places[:, None] >= first) & (places[:, None] <= last)
+        return np.where(inside, leaves + self.by_mechanism(spring), np.nan)
+
+    # --- the nominal curves, as metrics see them --------------------------------------------------------------------
+
+    @cached_property
+    def dense(self) -> FloatArray:
+        """Increasing travels of each shuttle, (m, q), so dense that the force hides nothing between two [m]."""
+        low, high = (end[:, None] for end in self.nominal.ends)
+        grid = [np.linspace(low[:, 0], high[:, 0], EVEN, axis=1)]
+        with np.errstate(all="ignore"):
+            for mark in (*(end[:, None] for end in self.linear), np.zeros_like(low)):
+                crowd = np.hstack([mark, mark - CROWDED * (high - low), mark + CROWDED * (high - low)])
+                inside = (mark >= low) & (mark < high) & (crowd >= low) & (crowd <= high)
+                grid.append(np.where(inside, crowd, low))
+        return np.sort(np.hstack(grid), axis=1)
+
+    def stress(self, places: FloatArray, rows: Any = None, alone: bool = False) -> FloatArray:
+        """Return the largest stress of leaves and spring at travels of all mechanisms, or of some, (k, n) [Pa].
+
+        Of all preloads whose curves go there; `alone`: of the nominal one.
+        """
+        curves, count = (self.nominal, 1) if alone else (self.curves, self.preloads)
+        chosen = np.arange(len(self)) if rows is None else rows
+        each = (chosen[:, None] * count + np.arange(count)).ravel()
+        travel, (first, last) = np.repeat(places, count, axis=0), (end[each, None] for end in curves.ends)
+        spring = curves.sampler.of_rows(each).spring(travel + curves.preload[each])[1]
+        spring = np.where((travel < first) | (travel > last), 0.0, spring).reshape(len(chosen), count, -1)
+        return np.asarray(np.maximum(self.nominal.sampler.of_rows(chosen).leaf_stress(places), spring.max(axis=1)))
+
+    def _stress_samples(self) -> list[RowSamples]:
+        """Return the largest stress of leaves and spring at the points of each preload, the nominal one first [Pa]."""
+        curves, every = self.curves, [slice(k, None, self.preloads) for k in range(self.preloads)]
+        stress = np.maximum(curves.leaves.stress, curves.spring_samples.stress)
+        return [RowSamples(curves.travel[own], stress[own], curves.count[own]) for own in every]
+
+    @cached_property
+    def branches(self) -> dict[str, CurveRows]:
+        """The nominal curves by branch, as metrics see them."""
+        curves = self.nominal
+        low, high = (np.where(self.is_linear, *ends) for ends in zip(self.linear, curves.ends, strict=True))
+        found = CurveRows(
+            RowSamples(curves.travel, curves.force, curves.count),
+            self.dense,
+            curves.force_at,
+            self.effort_error,
+            self.target,
+            self.spec.analysis.band,
+            (low, np.minimum(high, self.travel)),
+            self.part_efforts,
+            StressRows(self._stress_samples, self.stress, self.allowable_stress),
         )
-        for name, leaf, stress in (("leaves", about.bistable, leaves), ("spring", about.positive, spring)):
-            if leaf is not None:  # a bought spring is none
-                worst = int(np.nanargmax(stress))
-                curvature = 2.0 * float(stress[worst]) / (own * leaf.thickness)
-                yield name, float(hindered_share(leaf.width, leaf.thickness, nu, curvature)), float(travel[worst])
-
-    @cached_property
-    def windows(self) -> tuple[tuple[float, float] | None, ...]:
-        """Constant-force window of each curve [m]; None where the force is nowhere positive."""
-        return self._flat(self.pushes, self._flatness)
-
-    def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
-        """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
-        return self._flat((push,), flatness)[0]
-
-    def _flat(self, pushes: tuple[Push, ...], flatness: float) -> tuple[tuple[float, float] | None, ...]:
-        """Return `flat_part` of some curves: all together, because calls of the model are what takes the time."""
-        most, preload = max(len(push.travel) for push in pushes), np.array([[push.preload] for push in pushes])
-        travel = np.stack([np.pad(push.travel, (0, most - len(push.travel)), "edge") for push in pushes])
-        force = np.full(travel.shape, np.nan)
-        for row, push in zip(force, pushes, strict=True):
-            row[: len(push.force)] = push.force
-
-        def force_at(places: FloatArray) -> FloatArray:
-            shuttle = self.sampler.leaf_force(places.ravel())
-            spring = self.sampler.spring((places + preload).ravel())[0]
-            return np.asarray((shuttle + spring).reshape(places.shape))
-
-        ends = zip(*flat_window(travel, force, flatness, force_at), strict=True)
-        return tuple((float(low), float(high)) if np.isfinite(low) else None for low, high in ends)
-
-    @cached_property
-    def least(self) -> tuple[float, float] | None:
-        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; None without one."""
-        push, sampler = self.nominal, self.sampler
-        falls = np.flatnonzero((np.diff(push.leaves.force) < 0) & (push.travel[:-1] >= 0))
-        if not len(falls):
-            return None
-        step, end = float(push.travel[-1] - push.travel[-2]), float(push.travel[-1])
-        # thin leaves have their peak between the first two points: it is looked for, not taken from them
-        peak = extreme(sampler.leaf_force, float(push.travel[falls[0]]), step, (max(float(push.travel[0]), 0.0), end))
-        beyond = np.flatnonzero(push.travel >= peak)
-        lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
-        place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
-        return place, float(force_of(sampler, np.array([place]), push.preload)[0])
-
-    def force_at(self, push: Push, travel: FloatArray) -> FloatArray:
-        """Return the force of a curve at some travels, by the model, (n,) [N]; NaN beyond its ends."""
-        reached = (travel >= push.travel[0]) & (travel <= push.travel[-1])
-        force = np.full(travel.shape, np.nan)
-        force[reached] = force_of(self.sampler, travel[reached], push.preload)
-        return force
-
-    def inside(self, push: Push, window: tuple[float, float]) -> FloatArray:
-        """Return the forces of a curve at its samples in a window and at the window's ends [N]."""
-        low, high = window
-        own = push.force[(push.travel > low) & (push.travel < high)]
-        ends = self.force_at(push, np.array(window))
-        found = np.concatenate([ends[:1], own, ends[1:]])
-        known: FloatArray = found[np.isfinite(found)]
-        return known
-
-    def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
-        """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
-        leaves, spring = self.largest_stresses((push,), (end,))[0, 0].tolist()
-        return leaves, spring
-
-    def largest_stresses(self, pushes: tuple[Push, ...], ends: tuple[float, ...]) -> FloatArray:
-        """Return the same of some curves up to some travels, (curves, travels, 2): together, as calls take the time."""
-        owners = [push for push in pushes for _ in ends]
-        travels = [_up_to(push.travel, end) for push in pushes for end in ends]
-        preload = np.array([[push.preload] for push in owners])
-        laws: tuple[Callable[[FloatArray], FloatArray], ...] = (
-            lambda places: self.sampler.leaves(places.ravel()).stress.reshape(places.shape),
-            lambda places: self.sampler.spring((places + preload).ravel())[1].reshape(places.shape),
-        )
-        some = np.array([bool(len(travel)) for travel in travels])
-        filled = [travel if len(travel) else push.travel[:1] for travel, push in zip(travels, owners, strict=True)]
-        most = max(map(len, filled))
-        motion = np.stack([np.pad(travel, (0, most - len(travel)), "edge") for travel in filled])
-        found = [np.maximum(some * extremes(law, motion, law(motion), uneven=True)[0], 0.0) for law in laws]
-        return np.stack(found, axis=-1).reshape(len(pushes), len(ends), 2)
-
-    @cached_property
-    def window_force(self) -> float | None:
-        """Mean of the nominal force over its constant-force window [N]; None where there is none."""
-        if self.windows[0] is None or not self.windows[0][1] > self.windows[0][0]:
-            return None
-        places = np.linspace(*self.windows[0], FLAT_PLACES)
-        force = force_of(self.sampler, places, self.nominal.preload)
-        return float(np.trapezoid(force, places) / (places[-1] - places[0]))
-
-    @property
-    def course(self) -> tuple[float, float]:
-        """Where the shuttle starts from at the nominal preload, and where it was to go [m]."""
-        return float(self.nominal.travel[0]), self.spec.travel
-
-    @property
-    def window(self) -> tuple[float, float]:
-        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat stretch."""
-        if self.spec.analysis.window is not None:
-            return between(self.spec.analysis.window, self.course)
-        low, high = self.character.linear
-        if self.is_linear:
-            return low, min(high, self.spec.travel)
-        return self.windows[0] or (0.0, self.spec.travel)
-
-    @property
-    def is_linear(self) -> bool:
-        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
-        low = self.character.linear[0]
-        return bool(np.isfinite(low) and low < self.spec.travel)
-
-    @property
-    def window_is_flat(self) -> bool:
-        """Whether `window` is the longest flat stretch itself: flat by what it is, whatever the last digit says."""
-        return self.spec.analysis.window is None and not self.is_linear and self.windows[0] is not None
-
-
-FLAT_PLACES = 401
-"""Even places of a constant-force window over which its mean is taken."""
-
-ROUNDING = 1e-9
-"""A force or a travel beyond its limit by this share is on it: conversions of units and sums leave less."""
-
-
-def goes_beyond(travel: FloatArray | float, end: FloatArray | float) -> Any:
-    """Return whether a travel goes beyond an end [m], by more than rounding."""
-    return np.asarray(travel > end * (1 + ROUNDING))
-
-
-def leaves_plane(width: FloatArray | float, thickness: FloatArray | float) -> Any:
-    """Return whether leaves buckle out of the plane first: narrower than twice their thickness."""
-    return np.asarray(width < 2.0 * thickness)
-
-
-def is_constant(alone: Any, flat: Any, flatness: float, ranges: tuple[tuple[Any, Any], tuple[Any, Any]]) -> Any:
-    """Return whether the force of the spring alone is the force of a curve.
-
-    Parameters
-    ----------
-    alone, flat : float or array
-        Force of the spring where the leaves carry nothing, mean of the flat part of the curve [N].
-    flatness : float
-        By how much forces that count as one differ, as a share of the larger.
-    ranges : tuple
-        From where to where the curve is flat, and where it is judged [m]: at least half of that is to be flat.
-    """
-    (start, end), (low, high) = ranges
-    common = np.minimum(end, high) - np.maximum(start, low)
-    return (np.abs(alone - flat) <= flatness * np.maximum(alone, flat)) & (common >= 0.5 * (high - low))
-
-
-def force_of(sampler: PartSampler, travel: FloatArray, preload: float) -> FloatArray:
-    """Return the force on the shuttle at some travels and a preload [N]."""
-    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
-
-
-def _up_to(travel: FloatArray, end: float) -> FloatArray:
-    """Return the places of a curve up to a travel, that one included where the curve goes beyond it."""
-    within = travel[travel <= end]
-    return np.append(within, end) if travel[0] < end < travel[-1] else within
+        return {"load": found}

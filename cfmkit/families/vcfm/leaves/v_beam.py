@@ -22,12 +22,8 @@ import numpy as np
 from cfmkit.families.vcfm.leaves.s_form import pose, s_force
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-
-    Law = Callable[[LeafStrip, FloatArray], Any]
 
 NEGATIVE_ABOVE = 1.4246
 """Rise over thickness above which a V-beam has a negative stiffness anywhere."""
@@ -129,10 +125,13 @@ class VBeam:
         The S form has its steepest fall near 2/3 of the rise.
         """
         line, strip = negative_stiffness(self.strip), self.strip
-        places = np.linspace(0.3, 1.1, 161) * strip.rise
-        if np.ndim(strip.slenderness) or strip.slenderness > LINEAR_ABOVE:
+        bent = np.ravel(strip.slenderness) <= LINEAR_ABOVE
+        if not bent.any():
             return line
-        return max(0.0, -float(np.gradient(self.s_force(places), places).min()))
+        places = np.atleast_2d(np.linspace(0.3, 1.1, 161) * strip.rise)
+        falls = [-np.gradient(*row).min() for row in zip(np.atleast_2d(self.s_force(places)), places, strict=True)]
+        steepest = np.maximum(falls, 0.0).reshape(np.shape(line))
+        return np.where(strip.slenderness > LINEAR_ABOVE, line, steepest)
 
     def s_force(self, travel: Any) -> FloatArray:
         """Return the force of the S form, stable or not [N]."""
@@ -183,7 +182,15 @@ class VBeam:
         travel : array
             Of the shuttle from the as-made pose, positive towards the flat pose [m].
         """
-        return np.asarray(self._joined(travel, (_buckled_force, _bent_force))[0])
+        strip, bent = self.strip, ~np.asarray(self.buckled(travel))
+        drop = strip.rise - np.asarray(travel, dtype=float)
+        force = np.array(np.broadcast_to(critical_force(strip) * (drop / np.hypot(strip.reach, drop)), bent.shape))
+        if bent.any():
+            unit = strip.bending / strip.length**2
+            sizes = unit, strip.angle, strip.thickness / strip.length, travel / strip.length
+            unit, *pose = (item if np.ndim(item) == 0 else np.broadcast_to(item, bent.shape)[bent] for item in sizes)
+            force[bent] = unit * s_force(*pose).along
+        return force
 
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the leaf, bending and axial [Pa]."""
@@ -191,26 +198,16 @@ class VBeam:
 
     def state(self, travel: Any) -> tuple[FloatArray, FloatArray]:
         """Return `force` and `stress` at once: both come of one root."""
-        force, stress = self._joined(travel, (_buckled, _bent))
-        return force, stress
-
-    def _joined(self, travel: Any, laws: tuple[Law, Law]) -> FloatArray:
-        """Return what the laws of the buckled and of the bent leaf give, (k, ...), each where it holds."""
-        buckled = self.buckled(travel)
+        buckled = np.asarray(self.buckled(travel))
         strip, one = self.strip, all(np.ndim(item) == 0 for item in vars(self.strip).values())
         wide = [] if one else [np.broadcast_to(np.asarray(item), buckled.shape) for item in vars(strip).values()]
         place = np.broadcast_to(np.asarray(travel, dtype=float), buckled.shape)
-        found = np.empty((2, *buckled.shape))  # a law without stress fills both rows
-        for chosen, law in zip((buckled, ~buckled), laws, strict=True):
+        force, stress = np.empty((2, *buckled.shape))
+        for chosen, law in ((buckled, _buckled), (~buckled, _bent)):
             if chosen.any():
                 about = strip if one else type(strip)(*(item[chosen] for item in wide))
-                found[:, chosen] = law(about, place[chosen])
-        return found
-
-
-def _buckled_force(strip: LeafStrip, travel: FloatArray) -> Any:
-    drop = strip.rise - travel
-    return critical_force(strip) * (drop / np.hypot(strip.reach, drop))
+                force[chosen], stress[chosen] = law(about, place[chosen])
+        return force, stress
 
 
 def _buckled(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
@@ -218,12 +215,8 @@ def _buckled(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
     # (2 pi/L) sqrt(alpha^2 + 4 r) with r = shortening - P/EA - alpha^2/4: the tilt drops out
     curvature = 4.0 * np.pi / strip.length * np.sqrt(np.maximum(at.shortening - force / strip.axial, 0.0))
     stress = 0.5 * strip.youngs_modulus * strip.thickness * curvature + force / strip.area
-    return _buckled_force(strip, travel), stress
-
-
-def _bent_force(strip: LeafStrip, travel: FloatArray) -> Any:
-    unit = strip.bending / strip.length**2
-    return unit * s_force(strip.angle, strip.thickness / strip.length, travel / strip.length).along
+    drop = strip.rise - travel
+    return force * (drop / np.hypot(strip.reach, drop)), stress
 
 
 def _bent(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:

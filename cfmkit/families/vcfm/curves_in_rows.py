@@ -1,0 +1,216 @@
+"""Curves of mechanisms as rows: the model of leaves and spring at any travels, and what a curve of forces shows.
+
+Curves are (r, n) arrays, one preload of one mechanism a row, from where the shuttle rests to the end of its travel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+import numpy as np
+
+from cfmkit.arrays import ShortRepr
+from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of
+from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.metrics.longest_interval_in_band import flat_window
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+
+    Ends = tuple[FloatArray, FloatArray]
+    Law = Callable[[FloatArray], FloatArray]
+
+
+LEAST_POINTS = 5
+"""Points below which there is no curve to speak of."""
+
+
+@dataclass(frozen=True, repr=False)
+class LeafSamples(ShortRepr):
+    """All leaves at some travels: force [N], largest stress [Pa], whether stable, whether buckled; of one shape."""
+
+    force: FloatArray
+    stress: FloatArray
+    stable: Any
+    buckled: Any
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """Stiffness of spring and leaves [N/m], and where the negative one is constant [m] (NaN: nowhere).
+
+    `negative_stiffness` is a size: positive, or zero where there is none. Of several mechanisms, columns (m, 1).
+    """
+
+    positive_stiffness: Any
+    negative_stiffness: Any
+    first_stiffness: Any
+    linear: tuple[Any, Any]
+
+
+class PartSampler(Protocol):
+    """A model of leaves and spring: at travels of any shape of one mechanism, or (r, n) of r mechanisms."""
+
+    @property
+    def problem(self) -> str:
+        """Why a part could not be followed to the end; empty if all could."""
+
+    @property
+    def accuracy(self) -> float:
+        """Error of the force, in parts of what leaves and spring bear."""
+
+    @property
+    def character(self) -> Characteristics:
+        """Stiffnesses and linear range."""
+
+    def leaves(self, travel: FloatArray) -> LeafSamples:
+        """Return what all leaves do at some travels [m]."""
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+
+    def leaf_stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of the leaves [Pa]."""
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+
+    def solved(self, travel: FloatArray, preload: float) -> NDArray[np.bool_] | None:
+        """Return at which travels [m] leaves and spring were solved for, not interpolated; None if all are known."""
+
+    def of_rows(self, rows: Any) -> Self:
+        """Return the model of some of the rows."""
+
+
+@dataclass(frozen=True, repr=False)
+class Push(ShortRepr):
+    """One curve of one mechanism: what figures draw and sentences name."""
+
+    preload: float  # of the spring's far end [m]
+    travel: FloatArray  # of the shuttle from the as-made pose, increasing, (n,) [m]
+    leaves: LeafSamples  # all of them, (n,) each
+    spring_force: FloatArray  # (n,) [N]
+    spring_stress: FloatArray  # (n,) [Pa]
+    rest: float | None  # where the shuttle rests [m]; None if nothing holds it short of the end
+    solved: NDArray[np.bool_] | None = None  # where parts were solved for, not interpolated; None if all is known
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Force on the shuttle [N]."""
+        total: FloatArray = np.add(self.leaves.force, self.spring_force)
+        return total
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rows(ShortRepr):
+    """Curves of one model, one preload of one mechanism a row."""
+
+    sampler: PartSampler
+    preload: FloatArray  # (r, 1) [m]
+    rest: FloatArray  # (r,) where the shuttle rests [m]; NaN if nothing holds it short of the end
+    travel: FloatArray  # (r, n), increasing; after the end of a row its last place is repeated [m]
+    count: NDArray[np.intp]  # (r,) points of each row
+
+    def of_rows(self, rows: Any) -> Rows:
+        """Return some of the curves, with what is known of them."""
+        chosen = Rows(
+            self.sampler.of_rows(rows), self.preload[rows], self.rest[rows], self.travel[rows], self.count[rows]
+        )
+        for name in ("leaves", "leaf_force", "spring_samples"):
+            if name in self.__dict__:
+                chosen.__dict__[name] = rows_of(self.__dict__[name], rows)
+        return chosen
+
+    @cached_property
+    def leaves(self) -> LeafSamples:
+        """All leaves at the points, (r, n) each: force and stress come of one root."""
+        return self.sampler.leaves(self.travel)
+
+    @cached_property
+    def leaf_force(self) -> FloatArray:
+        """Force of all leaves alone at the points, (r, n) [N]."""
+        return self.leaves.force if "leaves" in self.__dict__ else self.sampler.leaf_force(self.travel)
+
+    @cached_property
+    def spring_samples(self) -> SpringSamples:
+        """The spring at the points, (r, n) each."""
+        return SpringSamples(*self.sampler.spring(self.travel + self.preload))
+
+    @cached_property
+    def there(self) -> NDArray[np.bool_]:
+        """Which points are not repeated last ones, (r, n)."""
+        return np.asarray(np.arange(self.travel.shape[1]) < self.count[:, None])
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Force on the shuttle at the points, (r, n) [N]; NaN after the end of a row."""
+        return np.where(self.there, self.leaf_force + self.spring_samples.force, np.nan)
+
+    @property
+    def ends(self) -> Ends:
+        """First and last travel of each row, (r,) [m]."""
+        return self.travel[:, 0], self.travel[:, -1]
+
+    def force_at(self, places: FloatArray, rows: Any = None) -> FloatArray:
+        """Return the force at some travels of each row, or of some rows, (k, m), by the model [N]."""
+        sampler, preload = self.sampler, self.preload
+        if rows is not None:
+            sampler, preload = sampler.of_rows(rows), preload[rows]
+        return np.asarray(sampler.leaf_force(places) + sampler.spring(places + preload)[0])
+
+    def reached(self, places: FloatArray) -> FloatArray:
+        """Return the same, NaN beyond the ends of a row [N]."""
+        first, last = (end[:, None] for end in self.ends)
+        inside = (places >= first) & (places <= last)
+        return np.where(inside, self.force_at(np.where(inside, places, first)), np.nan)
+
+    def extremes_inside(self, window: Ends) -> Ends:
+        """Return the largest and the smallest force at the points in windows and at their ends, (r,) each [N].
+
+        Minus and plus infinity where the curve does not reach there.
+        """
+        low, high = (end[:, None] for end in window)
+        own = np.where((self.travel > low) & (self.travel < high), self.force, np.nan)
+        force = np.hstack([own, self.reached(np.hstack([low, high]))])
+        known = np.isfinite(force)
+        return np.where(known, force, -np.inf).max(axis=1), np.where(known, force, np.inf).min(axis=1)
+
+    def flat_parts(self, flatness: float) -> Ends:
+        """Return from where to where (max - min)/max of the force is longest within `flatness` [m]; NaN: nowhere."""
+        return flat_window(self.travel, self.force, flatness, self.force_at)
+
+    def leaf_stress(self, end: FloatArray | float = np.inf) -> FloatArray:
+        """Return the largest stress of the leaves up to travels, (r,) or one, these included [Pa]."""
+        return self._largest(self.sampler.leaf_stress, lambda: self.leaves.stress, end)
+
+    def spring_stress(self, end: FloatArray | float = np.inf) -> FloatArray:
+        """Return the same of the spring, (r,) [Pa]."""
+        law: Law = lambda places: self.sampler.spring(places + self.preload)[1]  # noqa: E731
+        return self._largest(law, lambda: self.spring_samples.stress, end)
+
+    def _largest(self, law: Law, samples: Callable[[], FloatArray], end: FloatArray | float) -> FloatArray:
+        """Return the largest value of a law of the travel that is not negative, up to some ends."""
+        last = np.broadcast_to(np.reshape(end, (-1, 1)), (len(self.travel), 1))
+        motion = np.minimum(self.travel, np.maximum(last, self.travel[:, :1]))
+        values = law(motion) if (self.travel > motion).any() else samples()
+        count = np.minimum((self.travel < last).sum(axis=1) + 1, self.count)
+        top = extremes(law, motion, values, uneven=True, last=count - 1)[0]
+        return np.where(motion[:, 0] <= last[:, 0], np.maximum(top, 0.0), 0.0)
+
+
+@dataclass(frozen=True, repr=False)
+class SpringSamples(ShortRepr):
+    """A spring at some compressions: force [N] and largest stress [Pa], of one shape."""
+
+    force: FloatArray
+    stress: FloatArray
+
+
+def _parts(samples: Any) -> tuple[Any, ...]:
+    return tuple(vars(samples).values())

@@ -1,0 +1,102 @@
+"""What would make the force of a mechanism flat over its window: other widths, or another window; only what was tried.
+
+Forces are linear in the widths, so that other widths need no other solution.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.vcfm.solution import ROUNDING
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.solution import Solution
+
+TRIED = (0.998, 0.99, 0.97, 0.94, 0.9)
+"""Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
+off, the whole must be kept."""
+
+WIDEST = 50.0
+"""Factor on a width up to which one is looked for that makes the force flat."""
+
+
+def flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
+    """Return what makes the force flat, in words and as changes of the specification: only what has been tried.
+
+    Where no width makes the force flat over the window, the window is wrong: then the flat part is named.
+    """
+    factor, left = _better_width(solution)
+    allowed = solution.spec.analysis.flatness
+    if left <= allowed and left < ripple:
+        other = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
+        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {other}, make them equal"
+        return text, ()
+    (first, last), (low, high) = (float(end[0]) for end in solution.linear), solution.window_of_one
+    why = ""
+    if np.isfinite(first) and (low < first or high > last):
+        why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
+    for share in TRIED:
+        flat = solution.nominal.flat_parts(share * allowed)
+        if np.isfinite(flat[0][0]) and ripple_inside(solution, flat) <= (1.0 - ROUNDING) * allowed:
+            start, end = at_least(float(flat[0][0])), at_most(float(flat[1][0]))
+            cure = f"analysis.window=[{start}, {end}]"
+            return f"{why}; the force is flat from {start} to {end}: use that as the window", (cure,)
+    return f"{why}; no width of leaves or spring makes it flat", ()
+
+
+def ripple_inside(solution: Solution, window: tuple[FloatArray, FloatArray]) -> float:
+    """Return (max - min)/max of the force of one mechanism in a window; infinite where none is positive."""
+    top, bottom = (float(end[0]) for end in solution.nominal.extremes_inside(window))
+    return (top - bottom) / top if 0 < top < np.inf else np.inf
+
+
+def _better_width(solution: Solution) -> tuple[float, float]:
+    """Return the factor on the leaves' width that makes the force flattest in the window, and the ripple left."""
+    low, high = solution.window_of_one
+    travel = solution.first.travel
+    places = np.unique(np.concatenate([np.linspace(low, high, 201), travel[(travel > low) & (travel < high)]]))
+    leaves = solution.sampler.leaf_force(places)
+    spring = solution.sampler.spring(places + solution.first.preload)[0]
+    if not np.isfinite(leaves + spring).all():
+        return 1.0, np.inf
+    one = solution.character
+    factors = np.geomspace(1.0 / WIDEST, WIDEST, 801)
+    if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
+        factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
+    top, bottom = (extreme_sums(factors, leaves, spring, way) for way in (1.0, -1.0))
+    with np.errstate(all="ignore"):
+        left = np.where(bottom > 0, (top - bottom) / top, np.inf)
+    # stiffnesses that cancel are what a reader expects: another factor only where that one does not do
+    best = len(factors) - 1 if left[-1] <= solution.spec.analysis.flatness else int(left.argmin())
+    return float(factors[best]), float(left[best])
+
+
+def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, way: float) -> FloatArray:
+    """Return the largest (`way` 1) or smallest (-1) of factor * slope + offset over many lines, for each factor.
+
+    Only lines of the convex hull of (slope, offset) are ever extreme: some dozen of hundreds.
+
+    Examples
+    --------
+    >>> extreme_sums(np.array([0.0, 2.0]), np.array([1.0, -1.0, 0.5]), np.array([0.0, 3.0, 1.0]), 1.0).tolist()
+    [3.0, 2.0]
+    """
+    hull: list[int] = []
+    # Where leaves are buckled the lines meet in one point: without a margin, rounding keeps all of them.
+    margin = 1e-14 * float(np.ptp(slopes)) * float(np.abs(offsets).max(initial=0.0))
+    x, y = (way * slopes).tolist(), (way * offsets).tolist()
+    for k in np.lexsort((-way * offsets, way * slopes)).tolist():
+        if hull and x[k] == x[hull[-1]]:
+            continue
+        while len(hull) > 1:
+            i, j = hull[-2:]
+            if (x[j] - x[i]) * (y[k] - y[i]) < (y[j] - y[i]) * (x[k] - x[i]) - margin:
+                break
+            hull.pop()
+        hull.append(k)
+    sums = factors[:, None] * slopes[hull] + offsets[hull]
+    return np.asarray(way * (way * sums).max(axis=1))

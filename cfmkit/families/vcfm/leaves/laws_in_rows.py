@@ -1,0 +1,94 @@
+"""Laws of several leaves as one law, one leaf a row: numbers become columns (r, 1), and travels are (r, n)."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+
+T = TypeVar("T")
+
+ONE_BY_ONE = (CosineLeaf, HybridLeaf)
+"""Laws of one leaf only: their tables and searches are not arrays over leaves."""
+
+
+def stacked(laws: Sequence[T]) -> T:
+    """Return laws of one kind as one law with a row for each; one alone is returned as it is, with plain numbers.
+
+    Examples
+    --------
+    >>> from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
+    >>> stacked([Coils(100.0), Coils(200.0)]).force(0.1).tolist()
+    [[10.0], [20.0]]
+    """
+    first: Any = laws[0]
+    if len(laws) == 1:
+        return laws[0]
+    if isinstance(first, ONE_BY_ONE):
+        return LawsOneByOne(tuple(laws))  # type: ignore[return-value]
+    if not is_dataclass(first):
+        return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
+    columns = {item.name: stacked([getattr(law, item.name) for law in laws]) for item in fields(first)}
+    return type(laws[0])(**columns)
+
+
+def rows_of(law: T, rows: Any) -> T:
+    """Return the law of some rows; a law of plain numbers holds for every row."""
+    found: Any = law
+    if isinstance(law, np.ndarray):
+        found = law[rows] if law.ndim == 2 else law
+    elif isinstance(law, tuple):
+        found = tuple(rows_of(item, rows) for item in law)
+    elif isinstance(law, LawsOneByOne):
+        found = LawsOneByOne(tuple(law.laws[row] for row in np.arange(len(law.laws))[rows]))
+    elif is_dataclass(law):
+        found = copy(law)
+        for name, value in vars(law).items():  # with what was computed already
+            object.__setattr__(found, name, rows_of(value, rows))
+    return found  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class LawsOneByOne:
+    """Laws that are asked one after the other, each for its row of travels (r, n)."""
+
+    laws: tuple[Any, ...]
+
+    @cached_property
+    def strip(self) -> Any:
+        """The leaves' dimensions, a row each."""
+        return stacked([law.strip for law in self.laws])
+
+    def force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of each leaf along the motion [N]."""
+        return np.asarray(self._each("force", travel))
+
+    def stress(self, travel: FloatArray) -> FloatArray:
+        """Return the largest stress of each leaf [Pa]."""
+        return np.asarray(self._each("stress", travel))
+
+    def buckled(self, travel: FloatArray) -> Any:
+        """Return whether each leaf is buckled."""
+        return self._each("buckled", travel)
+
+    def _each(self, name: str, travel: FloatArray) -> Any:
+        own = np.broadcast_to(travel, (len(self.laws), travel.shape[1]))
+        return np.stack([np.asarray(getattr(law, name)(row)) for law, row in zip(self.laws, own, strict=True)])
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the laws know of themselves: a column, or a column for each of several numbers."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        values = np.array([np.ravel(getattr(law, name)) for law in self.laws], dtype=float)
+        return values if values.shape[1] == 1 else tuple(column[:, None] for column in values.T)

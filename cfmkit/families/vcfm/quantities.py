@@ -1,0 +1,272 @@
+"""Scalar results of a mechanism, beside the constant-force metrics of every family."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.fem_results import DEFINITIONS as OF_SOLIDS
+from cfmkit.families.findings import newton
+from cfmkit.families.rows import ScalarQuantity
+from cfmkit.stock.springs.stress_and_life import WIRE_DEFINITIONS, SpringInUse, wire_quantities
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.solution import Solution
+
+
+def _of_mesh(name: str) -> Callable[[Solution], float]:
+    """Return what reads an error of the mesh: solids alone have one."""
+
+    def read(solution: Solution) -> float:
+        error = getattr(solution.sampler, "mesh_error", None)
+        value = None if error is None else error.values().get(name)
+        return np.nan if value is None else value
+
+    return read
+
+
+def _is_solid(solution: Solution) -> bool:
+    return hasattr(solution.sampler, "mesh_error")
+
+
+def _linear_stroke(solution: Solution) -> FloatArray:
+    low, high = solution.linear
+    return np.where(np.isfinite(high - low), high - low, 0.0)
+
+
+def _window_length(solution: Solution) -> FloatArray:
+    return np.nan_to_num(solution.flat[1] - solution.flat[0])
+
+
+def _why_not_constant(solution: Solution) -> str:
+    """Return why no single force stands for the curve."""
+    alone, flat = float(solution.spring_alone[0]), float(solution.window_force[0])
+    if np.isnan(alone):
+        return "the leaves carry a force where they are flat, or the spring has no constant stiffness"
+    found = "" if np.isnan(flat) else f"; its flat part is at {newton(flat)}"
+    return f"where the leaves carry nothing the force is {newton(alone)}, but the curve is not flat there{found}"
+
+
+def _rest_position(solution: Solution) -> FloatArray:
+    return solution.nominal.rest
+
+
+def _rest_shift_max(solution: Solution) -> FloatArray:
+    shift = np.abs(solution.by_mechanism(solution.curves.rest))
+    return np.where(np.isnan(shift).all(axis=1), np.nan, np.where(np.isnan(shift), 0.0, shift).max(axis=1))
+
+
+def _stiffness_mismatch(solution: Solution) -> FloatArray:
+    character, alone = solution.character, solution.spring_alone
+    difference = solution.of_mechanisms(np.abs(character.positive_stiffness - character.negative_stiffness))
+    known = np.abs(alone) > solution.effort_error
+    return np.where(known, difference * (solution.window[1] - solution.window[0]) / np.where(known, alone, 1.0), np.nan)
+
+
+def _travel_stress_max(solution: Solution) -> FloatArray:
+    return np.asarray(np.maximum(solution.travel_leaf_stress, solution.travel_spring_stress.max(axis=1)))
+
+
+def _travel_safety_factor(solution: Solution) -> FloatArray:
+    stress = _travel_stress_max(solution)
+    return np.where(stress > 0, solution.allowable_stress / np.where(stress > 0, stress, 1.0), np.nan)
+
+
+def _spring_stress_max(solution: Solution) -> FloatArray:
+    ends = np.repeat(solution.window[1], solution.preloads)
+    stress = solution.by_mechanism(solution.curves.spring_stress(ends)).max(axis=1)
+    return stress if solution.spec.mechanism.springs is None else np.full(len(solution), np.nan)
+
+
+def _largest_change(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return the largest change of the mean force due to a preload [N], and the change of that preload [m]."""
+    means = solution.window_forces.mean(axis=2)
+    changes, preload = means - means[:, :1], solution.by_mechanism(solution.curves.preload[:, 0])
+    sizes = np.where(np.isnan(changes), -1.0, np.abs(changes))[:, 1:]
+    if not sizes.shape[1]:
+        return np.full(len(means), np.nan), np.full(len(means), np.nan)
+    rows, largest = np.arange(len(means)), sizes.argmax(axis=1) + 1
+    return changes[rows, largest], (preload - preload[:, :1])[rows, largest]
+
+
+def _force_per_preload(solution: Solution) -> FloatArray:
+    change, preload = _largest_change(solution)
+    return change / preload
+
+
+def _adjusted(solution: Solution, read: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return a value of the forces (m, p, places) of all preloads; NaN where one of them has no force in the window."""
+    forces = solution.window_forces
+    known = (np.isfinite(forces).all(axis=2) & (forces.max(axis=2) > 0)).all(axis=1)
+    return np.where(known, read(forces), np.nan)
+
+
+def _spring_deflection_max(solution: Solution) -> FloatArray:
+    curves = solution.curves
+    return np.asarray(np.maximum(solution.by_mechanism(curves.ends[1] + curves.preload[:, 0]).max(axis=1), 0.0))
+
+
+def _is_bought(solution: Solution) -> bool:
+    return solution.spec.mechanism.springs is not None
+
+
+def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
+    """Return what bought springs of a mechanism are put through between rest and the end of the travel."""
+    springs = solution.specs[number].mechanism.springs
+    if springs is None:
+        return []
+    fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
+    used, curves = [], solution.curves
+    for row in range(number * solution.preloads, (number + 1) * solution.preloads):
+        ends = (float(end[row] + curves.preload[row, 0]) for end in curves.ends)
+        least, most = (springs.load(deflection) for deflection in ends)
+        used.append(SpringInUse(springs.coil, least, most, fatigue, springs.life))
+    return used
+
+
+def _of_wire(name: str) -> ScalarQuantity[Solution]:
+    """Return the largest stress in the wire of bought springs, or their shortest life."""
+
+    def read(solution: Solution) -> FloatArray:
+        found = [wire_quantities(_in_use(solution, number)).get(name) for number in range(len(solution))]
+        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
+
+    return ScalarQuantity(
+        *WIRE_DEFINITIONS[name],
+        read,
+        lambda solution: wire_quantities(_in_use(solution, 0))[name].reason,
+        lambda solution: name in wire_quantities(_in_use(solution, 0)),
+    )
+
+
+QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+    **{
+        name: ScalarQuantity(
+            *about,
+            _of_mesh(name),
+            lambda solution: "there is none" if _is_solid(solution) else "only the model of the part as a solid has it",
+        )
+        for name, about in OF_SOLIDS.items()
+    },
+    "positive_stiffness": ScalarQuantity(
+        "stiffness", "K_p of the spring as made", lambda solution: solution.character.positive_stiffness
+    ),
+    "negative_stiffness": ScalarQuantity(
+        "stiffness",
+        "size of the leaves' negative stiffness: constant where they are buckled",
+        lambda solution: solution.character.negative_stiffness,
+    ),
+    "first_stiffness": ScalarQuantity(
+        "stiffness", "stiffness K_b1 of the leaves as made", lambda solution: solution.character.first_stiffness
+    ),
+    "rise": ScalarQuantity(
+        "length", "h of the leaves: travel to the flat pose", lambda solution: solution.parts.strip.rise
+    ),
+    "slenderness": ScalarQuantity(
+        "factor",
+        "rise over thickness of the leaves, Q: above pi they buckle, above 3.195 they are bistable",
+        lambda solution: solution.parts.strip.slenderness,
+    ),
+    "linear_start": ScalarQuantity("length", "travel at which the leaves buckle", lambda solution: solution.linear[0]),
+    "linear_end": ScalarQuantity(
+        "length", "travel at which they straighten again", lambda solution: solution.linear[1]
+    ),
+    "linear_stroke": ScalarQuantity("length", "length of the linear negative stiffness", _linear_stroke),
+    "constant_force": ScalarQuantity(
+        "force",
+        "force of the spring where the leaves carry no force, K_p (h + dr) for straight leaves; none unless at least "
+        "half of the window is flat at that force",
+        lambda solution: solution.constant_force,
+        _why_not_constant,
+    ),
+    "window_start": ScalarQuantity(
+        "length", "start of the longest window within analysis.flatness", lambda solution: solution.flat[0]
+    ),
+    "window_end": ScalarQuantity(
+        "length", "end of the longest window within analysis.flatness", lambda solution: solution.flat[1]
+    ),
+    "window_length": ScalarQuantity(
+        "length", "length of the longest window within analysis.flatness; 0 if there is none", _window_length
+    ),
+    "window_force": ScalarQuantity(
+        "force", "mean force in the longest window within analysis.flatness", lambda solution: solution.window_force
+    ),
+    "rest_position": ScalarQuantity(
+        "length", "rest position of the shuttle at the nominal preload, from the as-made position", _rest_position
+    ),
+    "rest_shift_max": ScalarQuantity(
+        "length", "largest distance of a rest position from the as-made position, over all preloads", _rest_shift_max
+    ),
+    "force_change_max": ScalarQuantity(
+        "force",
+        "largest change of the mean force due to a preload, relative to the nominal one",
+        lambda solution: _largest_change(solution)[0],
+    ),
+    "adjusted_force_min": ScalarQuantity(
+        "force",
+        "smallest mean force over the window, of all preloads",
+        lambda solution: _adjusted(solution, lambda forces: forces.mean(axis=2).min(axis=1)),
+    ),
+    "adjusted_force_max": ScalarQuantity(
+        "force",
+        "largest mean force over the window, of all preloads",
+        lambda solution: _adjusted(solution, lambda forces: forces.mean(axis=2).max(axis=1)),
+    ),
+    "adjusted_ripple_max": ScalarQuantity(
+        "ratio",
+        "largest (max - min)/max of the force over the window, of all preloads",
+        lambda solution: _adjusted(
+            solution, lambda forces: (1.0 - forces.min(axis=2) / forces.max(axis=2)).max(axis=1)
+        ),
+    ),
+    "force_per_preload": ScalarQuantity(
+        "stiffness",
+        "largest change of the mean force due to a preload, over the change of the preload",
+        _force_per_preload,
+    ),
+    "least_force": ScalarQuantity(
+        "force",
+        "smallest force beyond the peak of the leaves; positive: the shuttle returns by itself",
+        lambda solution: solution.least[1],
+    ),
+    "stiffness_mismatch": ScalarQuantity(
+        "ratio",
+        "|K_p - K_n| times the length of the window over the force of the spring where the leaves carry none",
+        _stiffness_mismatch,
+    ),
+    "allowable_stress": ScalarQuantity(
+        "stress", "yield strength over `mechanism.safety_factor`", lambda solution: solution.allowable_stress
+    ),
+    "spring_stress_max": ScalarQuantity(
+        "stress", "largest stress of the spring up to the end of the window, over all preloads", _spring_stress_max
+    ),
+    "bistable_stress_max": ScalarQuantity(
+        "stress",
+        "largest stress of the leaves up to the end of the window, over all preloads",
+        lambda solution: solution.leaf_stress(solution.window[1]),
+    ),
+    "travel_stress_max": ScalarQuantity(
+        "stress",
+        "largest stress of leaves and spring over the whole travel and all preloads; decisive unless a stop ends "
+        "the travel at the end of the window",
+        _travel_stress_max,
+    ),
+    "travel_safety_factor": ScalarQuantity(
+        "factor", "allowable stress over `travel_stress_max`", _travel_safety_factor
+    ),
+    "spring_deflection_max": ScalarQuantity(
+        "length",
+        "largest deflection of bought springs over the travel and all preloads",
+        _spring_deflection_max,
+        applies=_is_bought,
+    ),
+    **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
+}
+"""Every scalar result of the family, in the order in which they are shown."""
+
+DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+"""Name -> dimension and definition."""

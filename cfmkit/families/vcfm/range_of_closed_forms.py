@@ -1,0 +1,121 @@
+"""Where the closed forms of leaves and spring hold, and what is said of a mechanism that is beyond.
+
+Predicates take the solution of any number of mechanisms, sentences that of one.
+"""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.findings import mm, percent
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
+from cfmkit.families.vcfm.leaves.v_beam import RELIABLE, STEEP, STOCKY, THICK
+from cfmkit.families.vcfm.solution import goes_beyond
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.solution import Solution
+
+    Sentence = tuple[Any, ...]
+
+PRESSED, STRETCHED = 0.3, 0.12
+"""Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
+
+
+def _slimness(solution: Solution) -> FloatArray:
+    """Return thickness over length of the leaves, (m,)."""
+    return solution.of_mechanisms(solution.parts.strip.thickness / solution.parts.strip.length)
+
+
+def is_stocky(solution: Solution) -> Any:
+    """Return which leaves are so thick that no model here is for them, (m,)."""
+    return (_slimness(solution) > STOCKY) & (solution.fidelity != "truss")
+
+
+def leaves_out_of_range(solution: Solution) -> Any:
+    """Return which leaves the closed form is not for, (m,)."""
+    if solution.fidelity != "analytic":
+        return False
+    if solution.structure == "hybrid":
+        return ~is_stocky(solution)
+    reach = RELIABLE * solution.of_mechanisms(solution.parts.balance)
+    steep = solution.of_mechanisms(solution.parts.strip.angle) > STEEP
+    far = goes_beyond(solution.nominal.ends[1], reach)
+    return ~is_stocky(solution) & ((_slimness(solution) > THICK) | steep | far)
+
+
+def range_of_leaves(solution: Solution) -> Sentence:
+    """Return why the closed form is not for these leaves."""
+    strip, share, cure = solution.parts.strip, float(_slimness(solution)[0]), "analysis.fidelity=exact"
+    verify = "verify with 'analysis.fidelity: exact'"
+    if isinstance(law := solution.parts.leaf, HybridLeaf):
+        much = (
+            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
+            f"{percent(law.crushing)} of the flexures' own buckling load these bend and buckle, which "
+            "pseudo-rigid bodies cannot: the force is overestimated, by up to several times"
+            if law.flexures_buckle
+            else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
+        )
+        return f"{much}; their stress is underestimated, by up to a half. V{verify[1:]}", cure
+    if share > THICK:
+        return (
+            f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "
+            f"and are off by 5 to 10 % or more here; {verify}",
+            cure,
+        )
+    if float(strip.angle) > STEEP:
+        text = f"leaves at {degrees(strip.angle):.3g} deg: the closed forms hold for small angles, up to 15 deg"
+        return f"{text}; {verify}", cure
+    return (
+        f"the travel goes to {mm(float(solution.first.travel[-1]))}, beyond {RELIABLE} times the rise "
+        f"({mm(RELIABLE * float(solution.parts.balance))}): the force there is off by several per cent; {verify}",
+        cure,
+    )
+
+
+def _worst_compression(solution: Solution) -> FloatArray:
+    """Return by how much the spring is compressed, or negative stretched, where that matters most, (m,) [m]."""
+    ends = np.stack([end + solution.curves.preload[:, 0] for end in solution.curves.ends], axis=1)
+    ends = solution.by_mechanism(ends).reshape(len(solution), -1)
+    worst = np.where(ends > 0, ends / PRESSED, -ends / STRETCHED).argmax(axis=1)
+    return np.asarray(ends[np.arange(len(ends)), worst])
+
+
+def spring_out_of_range(solution: Solution) -> Any:
+    """Return which springs the closed form is not for, (m,)."""
+    spring = solution.parts.spring
+    if solution.fidelity != "analytic" or not isinstance(spring, Diamond):
+        return False
+    worst = _worst_compression(solution)
+    share = np.abs(worst) / (2.0 * solution.of_mechanisms(spring.strip.length))
+    steep = solution.of_mechanisms(spring.strip.angle) > STEEP
+    return ~is_stocky(solution) & (steep | (share > np.where(worst > 0, PRESSED, STRETCHED)))
+
+
+def range_of_spring(solution: Solution) -> Sentence:
+    """Return why the closed form is not for this spring."""
+    spring, worst = solution.parts.spring, float(_worst_compression(solution)[0])
+    assert isinstance(spring, Diamond)
+    if spring.strip.angle > STEEP:
+        angle = degrees(spring.strip.angle)
+        text = f"the leaves of the spring are at {angle:.3g} deg: its stiffness changes with its compression"
+    else:
+        what, share = "compressed" if worst > 0 else "stretched", abs(worst) / (2.0 * float(spring.strip.length))
+        text = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
+    return (
+        f"{text}; the closed form's constant stiffness is off by several per cent: verify with "
+        "'analysis.fidelity: exact'",
+        "analysis.fidelity=exact",
+    )
+
+
+def stocky_leaves(solution: Solution) -> Sentence:
+    """Return how thick these leaves are."""
+    return (
+        f"leaves whose thickness is {percent(float(_slimness(solution)[0]))} of their length are not beams: no model "
+        "here predicts their force or stress; use longer or thinner leaves",
+    )

@@ -1,0 +1,341 @@
+"""Metrics of many curves at once, each of them a row, of models that know the effort at every place.
+
+The values are those of `metric_values` for each curve alone: the same samples in the window, the same places next to
+which an extreme may stand, the same ends that are solved for. Curves may have different grids and numbers of points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.metrics import ranges_many
+from cfmkit.metrics.branch_views import ZERO
+from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
+from cfmkit.metrics.continuous_means_and_extremes import FEW, extremes, mean_of_rows
+from cfmkit.metrics.ranges_many import RANGES, ManyBranches
+from cfmkit.metrics.spread import STATIC_BALANCE, ManyWindows, metric_of, metrics_of, static_balance
+from cfmkit.metrics.window_metrics import NO_STRESS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+
+    Ends = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class RowSamples:
+    """Values over a motion, each curve a row: after the end of a row its last place and value are repeated."""
+
+    motion: FloatArray  # (d, n), increasing [m or rad]
+    values: FloatArray  # (d, n)
+    count: NDArray[np.intp]  # (d,) of each row
+
+    def between(self, window: Ends, slack: FloatArray | float = 0.0) -> tuple[RowSamples, NDArray[np.bool_]]:
+        """Return the samples inside of windows, the ends left out; and which of the columns are of each row."""
+        low, high = (end[:, None] for end in window)
+        margin = np.reshape(slack, (-1, 1))
+        inside = (self.motion > low + margin) & (self.motion < high - margin)
+        inside &= np.arange(self.motion.shape[1]) < self.count[:, None]
+        count, start = inside.sum(axis=1), inside.argmax(axis=1)
+        index = np.minimum(start[:, None] + np.arange(count.max(initial=0)), self.motion.shape[1] - 1)
+        cut = RowSamples(np.take_along_axis(self.motion, index, 1), np.take_along_axis(self.values, index, 1), count)
+        return cut, np.arange(index.shape[1]) < count[:, None]
+
+    def with_ends(self, window: Ends, values: FloatArray, slack: FloatArray | float = 0.0) -> RowSamples:
+        """Return the samples inside of windows and their ends, with values (d, 2) there."""
+        cut, own = self.between(window, slack)
+        ends = np.stack(window, axis=1)
+        motion, inner = (np.where(own, item, last[:, 1:]) for item, last in ((cut.motion, ends), (cut.values, values)))
+        return RowSamples(
+            np.hstack([ends[:, :1], motion, ends[:, 1:]]),
+            np.hstack([values[:, :1], inner, values[:, 1:]]),
+            cut.count + 2,
+        )
+
+    def joined(self, places: FloatArray, values: FloatArray) -> RowSamples:
+        """Return these samples and others, in order and without doubles; others must lie between the ends of a row."""
+        motion, known = np.hstack([self.motion, places]), np.hstack([self.values, values])
+        order = np.argsort(motion, axis=1, kind="stable")
+        motion, known = (np.take_along_axis(item, order, 1) for item in (motion, known))
+        new = np.ones(motion.shape, dtype=bool)
+        new[:, 1:] = motion[:, 1:] > motion[:, :-1]
+        count = new.sum(axis=1)
+        order = np.argsort(~new, axis=1, kind="stable")[:, : count.max()]
+        order = np.where(
+            np.arange(order.shape[1]) < count[:, None], order, order[np.arange(len(count)), count - 1][:, None]
+        )
+        return RowSamples(np.take_along_axis(motion, order, 1), np.take_along_axis(known, order, 1), count)
+
+    def extremes(self, function: Callable[[FloatArray], FloatArray], uneven: bool = False) -> Ends:
+        """Return the largest and the smallest value of a function of each row next to its samples, (d,) each."""
+        return extremes(function, self.motion, self.values, uneven, self.count - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class StressRows:
+    """The largest stress of many mechanisms."""
+
+    read: Callable[[], Sequence[RowSamples]]  # at the points of each load case, that of the curve first [Pa]
+    at: Callable[[FloatArray, Any], FloatArray]  # of all load cases at places of some rows, (k, m), (k,) -> (k, m) [Pa]
+    allowable: FloatArray  # (d,) NaN if there is none [Pa]
+
+    @cached_property
+    def samples(self) -> Sequence[RowSamples]:
+        """What is known at the points."""
+        return self.read()
+
+
+@dataclass(frozen=True, eq=False)
+class CurveRows:
+    """One branch of many curves, one a row."""
+
+    samples: RowSamples  # efforts at the points [N or N m]
+    dense: FloatArray  # (d, q) increasing places, so dense that the effort hides nothing between two; may be repeated
+    effort: Callable[[FloatArray, Any], FloatArray]  # at places of some rows, (k, m), (k,) or None for all -> (k, m)
+    error: FloatArray  # (d,) numerical error of the effort
+    target: FloatArray  # (d,) effort that is wanted, NaN if there is none
+    band: float  # half width of the band of `usable_stroke`, as a fraction
+    valid: Ends  # (d,) each, from where to where the mechanism works as intended
+    part_efforts: Callable[[FloatArray], FloatArray] | None = None  # largest of one spring or member, (d, m) -> (d, m)
+    stress: StressRows | None = None
+    kind: Kind = "force"
+    _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
+
+    def all_at(self, places: FloatArray) -> FloatArray:
+        """Return the effort at places of every row, (d, m)."""
+        return self.effort(places, None)
+
+    @cached_property
+    def dense_effort(self) -> FloatArray:
+        """The effort at the dense places."""
+        return self.all_at(self.dense)
+
+    @property
+    def extent(self) -> Ends:
+        """First and last place of each row."""
+        return self.samples.motion[:, 0], self.samples.motion[:, -1]
+
+    def within(self, window: Ends | None) -> RowsInWindow:
+        """Return the curves in windows, (d,) each; None: over their full travel."""
+        key = None if window is None else tuple(end.tobytes() for end in window)
+        if key not in self._windows:
+            self._windows[key] = RowsInWindow(self, self.extent if window is None else window)
+        return self._windows[key]
+
+
+@dataclass(frozen=True, eq=False)
+class RowsInWindow:
+    """Curves that are measured between two places, (d,) each."""
+
+    curves: CurveRows
+    ends: Ends
+
+    @cached_property
+    def covered(self) -> NDArray[np.bool_]:
+        """Which curves reach both ends."""
+        (first, last), (low, high) = self.curves.extent, self.ends
+        slack = TOLERANCE * (high - low)
+        return (first <= low + slack) & (last >= high - slack)
+
+    @cached_property
+    def _cut(self) -> Ends:
+        """The ends, not beyond those of the curves."""
+        first, last = self.curves.extent
+        return np.clip(self.ends[0], first, last), np.clip(self.ends[1], first, last)
+
+    @cached_property
+    def inside(self) -> RowSamples:
+        """The efforts at the points in the window and at its ends."""
+        low, high = self._cut
+        at_ends = self.curves.all_at(np.stack([low, high], axis=1))
+        return self.curves.samples.with_ends((low, high), at_ends, TOLERANCE * (high - low))
+
+    @cached_property
+    def _dense(self) -> FloatArray:
+        """The dense places in the window, (d, q); those of a row with fewer repeat its first."""
+        dense = self.curves.dense
+        within, own = RowSamples(dense, dense, np.full(len(dense), dense.shape[1])).between(self._cut)
+        return np.where(own, within.motion, self._cut[0][:, None])
+
+    @property
+    def _uneven(self) -> bool:
+        return bool(self.curves.dense.shape[1] < FEW)
+
+    def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
+        known = self.inside.joined(self._dense, self.curves.all_at(self._dense))
+        return known.extremes(self.curves.all_at, self._uneven)
+
+    @cached_property
+    def many(self) -> ManyWindows:
+        """Mean, extremes and deviation."""
+        return ManyWindows(self.inside.motion, self.inside.values, self._extremes, self.curves.error, self.inside.count)
+
+    @cached_property
+    def branches(self) -> ManyBranches:
+        """The whole curves, with the ends of the window."""
+        curves, stress = self.curves, self.curves.stress
+        excess = None
+        if stress is not None and np.isfinite(stress.allowable).any():
+
+            def excess(at: FloatArray, rows: Any) -> FloatArray:
+                allowable = stress.allowable[rows, None]
+                share = stress.at(at, rows) / allowable - (1 + ROUNDING)
+                return np.where(np.isfinite(allowable), share, -np.inf)
+
+        return ManyBranches(curves.dense, curves.dense_effort, *self.ends, curves.effort, excess, error=curves.error)
+
+    # --- metrics, (d,) each -----------------------------------------------------------------------------------------
+
+    def static_balance(self) -> FloatArray:
+        """Return the largest effort over the largest of one spring or member."""
+        function = self.curves.part_efforts
+        if function is None:
+            return np.full(len(self.ends[0]), np.nan)
+        sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
+        top, _ = sizes.joined(self._dense, function(self._dense)).extremes(function, self._uneven)
+        return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
+
+    def stress_max(self) -> FloatArray:
+        """Return the largest stress in the window, of all load cases [Pa]."""
+        stress, (low, high) = self.curves.stress, self._cut
+        if stress is None:
+            return np.full(len(low), np.nan)
+        slack, ends = TOLERANCE * (high - low), np.stack([low, high], axis=1)
+        points, *beside = stress.samples
+        at_point = (np.abs(points.motion[:, :, None] - ends[:, None]) <= slack[:, None, None]).any(axis=1)
+        own = np.stack([_at(points, end) for end in (low, high)], axis=1)
+        rows = np.arange(len(low))
+        known = points.with_ends((low, high), np.where(at_point, own, stress.at(ends, rows)), slack)
+        top = known.extremes(lambda places: stress.at(places, rows))[0]
+        for other in beside:
+            start, stop = np.maximum(other.motion[:, 0], low), np.minimum(other.motion[:, -1], high)
+            within, inside = other.between((start, stop))
+            inner = np.where(inside, within.values, -np.inf).max(axis=1, initial=-np.inf)
+            most = np.maximum(inner, np.maximum(_at(other, start), _at(other, stop)))
+            top = np.where(start < stop, np.maximum(top, most), top)
+        return top
+
+    def safety_factor(self) -> FloatArray:
+        """Return the allowable stress over the largest stress in the window."""
+        if self.curves.stress is None:
+            return np.full(len(self.ends[0]), np.nan)
+        allowable, top = self.curves.stress.allowable, self.stress_max()
+        return np.where(top > NO_STRESS * allowable, allowable / top, np.nan)
+
+    def range_of(self, name: str) -> FloatArray:
+        """Return one of `RANGES`."""
+        (first, last), (low, high), many = self.curves.extent, self.ends, self.branches
+        slack = TOLERANCE * (last - first)
+        place = high if name.startswith("range_95") else 0.5 * (low + high)
+        reached = (place >= first - slack) & (place <= last + slack)
+        found = RANGES[name](many)
+        if not name.startswith("range_95"):
+            here = np.abs(many.at(many.reference[:, None])[:, 0])
+            largest = np.nanmax(np.abs(self.curves.samples.values), axis=1)
+            reached &= here > np.maximum(self.curves.error, ZERO * largest)
+        return np.where(reached, found, np.nan)
+
+    def rms_to_target(self) -> FloatArray:
+        """Return the root mean square of F - target at places uniform in the motion."""
+        return np.where(self._has_target, ranges_many.rms_to_target(self.branches, self.curves.target), np.nan)
+
+    @property
+    def _has_target(self) -> NDArray[np.bool_]:
+        return np.abs(self.curves.target) > self.curves.error
+
+    @cached_property
+    def level(self) -> FloatArray:
+        """Mean effort over the way in the window [N or N m]; NaN if the curve does not cover it."""
+        return np.where(self.covered, mean_of_rows(self.curves.all_at, self.curves.dense, *self._cut), np.nan)
+
+    @property
+    def reference(self) -> FloatArray:
+        """What efforts are compared with: the target, else the mean; NaN if that is zero [N or N m]."""
+        if self._has_target.all():
+            return self.curves.target
+        level = np.where(np.abs(self.level) > self.curves.error, self.level, np.nan)
+        return np.where(self._has_target, self.curves.target, level)
+
+
+def _at(samples: RowSamples, place: FloatArray) -> FloatArray:
+    """Return the value of each row at a place, (d,), by linear interpolation."""
+    rows = np.arange(len(place))
+    after = np.clip((samples.motion < place[:, None]).sum(axis=1), 1, np.maximum(samples.count - 1, 1))
+    x0, x1 = samples.motion[rows, after - 1], samples.motion[rows, after]
+    y0, y1 = samples.values[rows, after - 1], samples.values[rows, after]
+    with np.errstate(all="ignore"):
+        inner = y0 + (place - x0) / (x1 - x0) * (y1 - y0)
+    return np.asarray(np.where(place == x1, y1, np.where(place == x0, y0, inner)))
+
+
+def _usable(branches: Mapping[str, RowsInWindow]) -> Ends:
+    """Return start and end of the largest interval in which every branch keeps its limits, (d,) each."""
+    first = next(iter(branches.values()))
+    levels = np.mean([one.reference for one in branches.values()], axis=0)
+    known = np.isfinite(levels)
+    many = [one.branches for one in branches.values()]
+    start, end = ranges_many.usable_interval(many, np.where(known, levels, 1.0), first.curves.band, *first.curves.valid)
+    return np.where(known, start, np.nan), np.where(known, end, np.nan)
+
+
+def _usable_stroke(branches: Mapping[str, RowsInWindow]) -> FloatArray:
+    known = np.all([np.isfinite(one.reference) for one in branches.values()], axis=0)
+    return np.where(known, ranges_many.usable_stroke(*_usable(branches)), np.nan)
+
+
+CYCLE: Mapping[str, Callable[[Mapping[str, RowsInWindow]], FloatArray]] = {
+    "usable_stroke": _usable_stroke,
+    "usable_start": lambda branches: _usable(branches)[0],
+    "usable_end": lambda branches: _usable(branches)[1],
+}
+"""Metrics of all branches together."""
+
+WINDOWED: Mapping[str, Callable[[RowsInWindow], FloatArray]] = {
+    STATIC_BALANCE: RowsInWindow.static_balance,
+    "rms_to_target": RowsInWindow.rms_to_target,
+    "stress_max": RowsInWindow.stress_max,
+    "safety_factor": RowsInWindow.safety_factor,
+}
+"""Metrics of one branch whose window must be covered, beside those of `spread`."""
+
+
+def metric_of_branches(name: str, branches: Mapping[str, RowsInWindow]) -> Mapping[str, FloatArray] | None:
+    """Return a metric of many curves by branch, (d,) each [SI]; NaN where it has no value.
+
+    Parameters
+    ----------
+    name : str
+        Of the metric, without a branch in brackets.
+    branches : mapping of str to RowsInWindow
+        The branches of the curves over the window of the metric.
+
+    Returns
+    -------
+    mapping or None
+        What is no matter of one branch stands under the name "" alone. None: the metric is known of single curves only.
+    """
+    kind = next(iter(branches.values())).curves.kind
+    with np.errstate(all="ignore"):
+        if name in CYCLE:
+            return {"": CYCLE[name](branches)}
+        if name == "hysteresis_area" and not {"load", "unload"} <= set(branches):
+            return {"": np.full(len(next(iter(branches.values())).ends[0]), np.nan)}
+        if name in RANGES:
+            return {branch: one.range_of(name) for branch, one in branches.items()}
+        if name in WINDOWED:
+            return {branch: np.where(one.covered, WINDOWED[name](one), np.nan) for branch, one in branches.items()}
+        if name in metrics_of(kind):
+            return {
+                branch: np.where(one.covered, metric_of(name, one.many, one.curves.target), np.nan)
+                for branch, one in branches.items()
+            }
+    return None

@@ -1,0 +1,212 @@
+"""Points of a study as rows of one solution, for families whose mechanisms are solved together."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
+from cfmkit.metrics.branches_cut_to_window import TOLERANCE
+from cfmkit.metrics.metric_values import worst_branch
+from cfmkit.metrics.metrics_of_rows import metric_of_branches
+from cfmkit.metrics.requirements import Bounds
+from cfmkit.results import OLD_KEY
+from cfmkit.specs.units import between
+from cfmkit.studies.row_blocks_for_journal import ResultRows, gathered
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.rows import SolvedRows
+    from cfmkit.metrics import Definition
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.units import Ends
+    from cfmkit.studies.plan import Plan
+    from cfmkit.studies.point_evaluation import Study
+
+    ByBranch = Mapping[str, FloatArray]
+
+
+class SolvedVariants:
+    """What a study reads of variants that are solved together."""
+
+    def __init__(self, study: Study, specs: Sequence[Spec], solved: SolvedRows[Any]) -> None:
+        """Read nothing yet."""
+        self.study, self.specs, self.solved = study, specs, solved
+        self._values: dict[tuple[str, Ends | None], ByBranch | None] = {}
+
+    def __len__(self) -> int:
+        """Return the number of variants."""
+        return len(self.specs)
+
+    @cached_property
+    def _travels(self) -> list[tuple[float, float]]:
+        """Where the motion of each starts, and where it ends."""
+        curves = next(iter(self.solved.branches.values()))
+        return list(zip(*(end.tolist() for end in curves.extent), strict=True))
+
+    def _places(self, ends: Sequence[Ends | None]) -> tuple[FloatArray, FloatArray] | None:
+        """Return windows of the variants in places, (m,) each; None for the full travel."""
+        if all(one is None for one in ends):
+            return None
+        found = [between(one, travel) for one, travel in zip(ends, self._travels, strict=True) if one is not None]
+        low, high = np.array(found).T
+        return low, high
+
+    def _window(self, over: Ends | None) -> tuple[FloatArray, FloatArray] | None:
+        """Return the window of a metric: its own, else that of the analysis."""
+        if over is not None:
+            return self._places([over] * len(self))
+        return self._places([getattr(getattr(spec, "analysis", None), "window", None) for spec in self.specs])
+
+    @cached_property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which variants have a complete curve that covers every window of their specification, (m,)."""
+        good = self.solved.complete.copy()
+        windows = [[ends for _, ends in spec.windows()] for spec in self.specs]
+        for ends in zip(*windows, strict=True):
+            low, high = self._places(ends) or (0.0, 0.0)
+            for curves in self.solved.branches.values():
+                slack = TOLERANCE * (high - low)
+                good &= (curves.extent[0] <= low + slack) & (curves.extent[1] >= high - slack)
+        return good
+
+    def values(self, name: str, over: Ends | None) -> ByBranch | None:
+        """Return a metric or a value of the family by branch, (m,) each; None if rows do not know it.
+
+        What is no matter of one branch stands under the name "" alone.
+        """
+        key = name, over
+        if key not in self._values:
+            own = self.solved.value(name)
+            if own is not None:
+                self._values[key] = {"": own}
+            else:
+                window = self._window(over)
+                inside = {branch: curves.within(window) for branch, curves in self.solved.branches.items()}
+                found = metric_of_branches(name, inside)
+                self._values[key] = metric_of_branches(other_name(name), inside) if found is None else found
+        return self._values[key]
+
+    @property
+    def _asked(self) -> tuple[tuple[str, Ends | None], ...]:
+        """Name and window of everything that is read: the metrics, then the requirements."""
+        metrics = [(one.name, one.over) for one in self.study.metrics]
+        return (*metrics, *((one.metric, one.over) for one in self.study.spec.part_requirements))
+
+    @property
+    def known(self) -> bool:
+        """Whether rows know everything that the study reads."""
+        return all(self.values(split_name(name)[0], over) is not None for name, over in self._asked)
+
+    @cached_property
+    def _definitions(self) -> Mapping[str, Definition]:
+        kind = next(iter(self.solved.branches.values())).kind
+        return metrics_by_name(kind, values_of_family(family(self.study.spec.family).values))
+
+    def rows(self) -> ResultRows:
+        """Return what the study notes of the variants, as if all of them were usable."""
+        values = np.empty((len(self), len(self.study.metrics)))
+        for k, (name, over) in enumerate(self._asked[: len(self.study.metrics)]):
+            values[:, k] = self._worst(name, over)
+        values[~np.isfinite(values)] = np.nan
+        met = np.ones((len(self), len(self.study.spec.part_requirements)), dtype=bool)
+        for k, one in enumerate(self.study.spec.part_requirements):
+            plain, branch = split_name(one.metric)
+            limits = Bounds.of(one, self._definitions[plain].dimension)
+            chosen = [item for name, item in self._by_branch(plain, one.over).items() if branch in (None, name)]
+            met[:, k] = np.logical_and.reduce([limits.met_by(item) for item in chosen]) if chosen else False
+        return ResultRows(values, met, warned={} if self.study.lean else self._findings())
+
+    def _by_branch(self, plain: str, over: Ends | None) -> ByBranch:
+        found = self.values(plain, over)
+        assert found is not None  # `known`
+        return found
+
+    def _worst(self, name: str, over: Ends | None) -> FloatArray:
+        """Return a metric of the branch that is named, or of the worst, (m,)."""
+        plain, branch = split_name(name)
+        by_branch = self._by_branch(plain, over)
+        if branch is not None:
+            return by_branch.get(branch, np.full(len(self), np.nan))
+        stack = np.stack(list(by_branch.values()))
+        target = next(iter(self.solved.branches.values())).target
+        chosen = worst_branch(self._definitions[plain].worst, stack, None if np.isnan(target).any() else target)
+        return np.asarray(np.take_along_axis(stack, chosen[None], axis=0)[0])
+
+    def _findings(self) -> dict[str, NDArray[np.bool_]]:
+        found = self.solved.findings()
+        old = np.array([any(True for _ in spec.old_keys()) for spec in self.specs])
+        return {**found, OLD_KEY: old} if old.any() else found
+
+
+def are_solved_together(study: Study, plan: Plan) -> bool:
+    """Return whether points of a study are rows of one solution: its first, its middle and its last one are."""
+    solve = family(study.spec.family).rows
+    if solve is None or study.design or not len(plan):
+        return False
+    try:
+        specs = [study.variant(plan.point(index)) for index in sorted({0, len(plan) // 2, len(plan) - 1})]
+        found = [(members, SolvedVariants(study, [specs[k] for k in members], part)) for members, part in solve(specs)]
+        return sum(len(members) for members, _ in found) == len(specs) and all(part.known for _, part in found)
+    except CfmError:
+        return False
+
+
+def evaluate_rows(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:
+    """Return the rows of the points from `start` up to `stop`; those that no rows know are analysed one by one."""
+    variants: dict[int, Spec] = {}
+    for index in range(stop - start):
+        try:
+            variants[index] = study.variant(plan.point(start + index))
+        except CfmError:  # `Study.evaluate` says what is wrong with it
+            continue
+    members, parts = _parts(study, variants)
+    count = stop - start, len(study.metrics), len(study.spec.part_requirements)
+    values, met = np.full(count[:2], np.nan), np.zeros((count[0], count[2]), dtype=bool)
+    warned: dict[str, NDArray[np.bool_]] = {}
+    for chosen, rows, usable in parts:
+        values[chosen], met[chosen] = rows.values, rows.met
+        for name, mask in rows.warned.items():
+            warned.setdefault(name, np.zeros(count[0], dtype=bool))[chosen[usable]] = mask[usable]
+    singly = sorted(set(range(count[0])) - members)
+    rest = gathered([study.evaluate(plan.point(start + k)) for k in singly], *count[1:])
+    values[singly], met[singly] = rest.values, rest.met
+    for name, mask in rest.warned.items():
+        warned.setdefault(name, np.zeros(count[0], dtype=bool))[singly] = mask
+    odd = {singly[k]: item for k, item in rest.odd.items()}
+    bugs = {singly[k]: item for k, item in rest.bugs.items()}
+    curves = {singly[k]: item for k, item in rest.curves.items()}
+    if study.curves:
+        curves |= {k: study.evaluate(plan.point(start + k)).curve for k in sorted(members)}
+    warned = {name: warned[name] for name in sorted(warned) if warned[name].any()}
+    return ResultRows(values, met, odd, curves, bugs, warned)
+
+
+def _parts(
+    study: Study, variants: Mapping[int, Spec]
+) -> tuple[set[int], list[tuple[NDArray[np.intp], ResultRows, NDArray[np.bool_]]]]:
+    """Return which variants are known as rows, and for each solution its variants, their rows, and which are usable."""
+    solve, order = family(study.spec.family).rows, np.array(list(variants), dtype=np.intp)
+    members: set[int] = set()
+    parts: list[tuple[NDArray[np.intp], ResultRows, NDArray[np.bool_]]] = []
+    if solve is None:
+        return members, parts
+    try:
+        for indices, solved in solve(list(variants.values())):
+            chosen = order[indices]
+            part = SolvedVariants(study, [variants[k] for k in chosen.tolist()], solved)
+            if part.known:
+                usable = part.usable
+                parts.append((chosen, part.rows(), usable))
+                members |= set(chosen[usable].tolist())
+    except CfmError:  # of a window without a width, say: each point says so by itself
+        return set(), []
+    return members, parts
