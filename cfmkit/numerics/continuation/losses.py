@@ -1,0 +1,153 @@
+"""What is done where a path loses its stability: locate it, say so, and go on along a stable branch if there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cfmkit.numerics.continuation.branches import (
+    AMPLITUDES,
+    LAST_AMPLITUDES,
+    enter_branch,
+    find_beside,
+    lead_around,
+)
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.events import locate_loss
+from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
+from cfmkit.numerics.continuation.steps import advance
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.events import Located
+
+Items = Generator[Point | Event, None, Walk | Ending | None]
+"""What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
+
+FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
+CLUSTERS = 1.0, 0.1, 10.0
+"""Times `Options.cluster`: ranges within which bifurcations are looked for that are passed together."""
+ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
+LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
+LOOK_PAST_BY = 2e-3, 2e-2
+"""Shares of the range ahead of here and of the goal at which the path may be less stable."""
+LOOK_PAST_MISS = 0.02  # motion
+
+
+def lose_stability(walk: Walk, new: Equilibrium) -> Items:
+    """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
+    problem, options, here = walk.problem, walk.options, walk.here
+    found = locate_loss(walk, new)
+    if found is None:
+        return None
+    far = next(
+        (
+            e
+            for e in reversed(walk.trail)
+            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.trail[0].drive)
+        ),
+        here,
+    )
+    slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
+    modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
+    if options.branch == "stop":
+        yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
+        return Ending(End.JUMPS, found.drive, "stability is lost")
+    onto = enter_branch(walk, found.x, found.drive, problem.orient(modes), AMPLITUDES)
+    if onto is None:  # not one mode by itself: all that become unstable soon, together
+        several = _pass_together(walk, new, found, slope)
+        if several is not None:
+            onto, modes, after = several
+    if onto is None:
+        onto = enter_branch(walk, found.x, found.drive, problem.orient(modes), LAST_AMPLITUDES)
+    yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
+    walk = yield from _reach_bifurcation(walk, found, far, slope)
+    if onto is None:
+        return Ending(End.JUMPS, found.drive, "stability is lost and no stable equilibrium is near")
+    return (yield from _begin_branch(walk, found, onto, after))
+
+
+def _well_before(walk: Walk, drive: float, distance: float) -> Equilibrium | None:
+    """Return the last equilibrium of this piece that is farther than a distance from a drive."""
+    return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
+
+
+def _pass_together(
+    walk: Walk, new: Equilibrium, found: Located, slope: FloatArray
+) -> tuple[Equilibrium, FloatArray, int] | None:
+    """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
+    problem, here = walk.problem, walk.here
+    for factor in CLUSTERS:
+        width = factor * walk.options.cluster
+        ahead = walk.sense * width * walk.options.span
+        saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
+        if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
+            continue
+        modes = problem.modes(found.near, saddle.unstable - here.unstable)[1]
+        start = _well_before(walk, found.drive, 2 * abs(ahead)) or walk.trail[0]
+        onto = lead_around(walk, start, found.drive, modes, width)
+        if onto is not None:
+            return onto, modes, saddle.unstable
+    return None
+
+
+def _reach_bifurcation(walk: Walk, found: Located, far: Equilibrium, slope: FloatArray) -> Generator[Point, None, Walk]:
+    """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
+    problem, unstable = walk.problem, walk.here.unstable
+    for number in walk.targets_up_to(found.drive):
+        goal = float(walk.targets[number])
+        guess = found.x + (goal - found.drive) * slope
+        at = advance(walk, goal).new
+        if at is None or at.unstable > unstable:
+            at = correct(problem, guess, goal)
+        if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
+            at = Equilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
+        yield Point(at, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    return walk
+
+
+def _begin_branch(walk: Walk, found: Located, onto: Equilibrium, after: int) -> Generator[Point, None, Walk]:
+    """Yield the first points of a branch; return the walk on it."""
+    branches = walk.branches + 1
+    name = f"bifurcated {branches} at {found.drive:.17g}, sign {walk.options.sign:+d}"
+    for number in walk.targets_up_to(onto.drive) if not walk.done else ():
+        goal = float(walk.targets[number])
+        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, name)
+        walk = replace(walk, number=number + 1)
+    yield Point(onto, -1, name)
+    modes = after - walk.here.unstable
+    walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
+    return replace(walk, branch=name, branches=branches, modes=modes)
+
+
+def look_past(walk: Walk, goal: float) -> Items:
+    """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
+    problem, span, here = walk.problem, walk.options.span, walk.here
+    far = _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0]
+    for share in LOOK_PAST_BY:
+        for origin in (here.drive, goal):
+            drive = origin + walk.sense * share * span
+            guess = far.x + (drive - far.drive) * far.rate
+            past = correct(problem, guess, drive)
+            if (
+                past is not None
+                and past.unstable > here.unstable
+                and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
+            ):
+                return (yield from lose_stability(replace(walk, here=far), past))
+    return None
+
+
+def start_unstable(walk: Walk) -> Walk | None:
+    """Return the walk on a stable branch near an unstable start, or None."""
+    problem, start = walk.problem, walk.here
+    values, modes = problem.modes(start, start.unstable + 1)
+    falling = modes[:, values < 0]
+    if not falling.shape[1]:
+        return None
+    calm = replace(walk, here=replace(start, unstable=0))
+    onto = lead_around(calm, start, start.drive, falling, 0.1 * walk.options.cluster)
+    return None if onto is None else walk.restart(onto, 0.01 * walk.options.span)
