@@ -45,13 +45,19 @@ def test_a_truss_stops_at_its_limit_point() -> None:
 
 
 def test_a_truss_snaps_through_by_its_arc_length() -> None:
-    points, events, ending = run(truss(HEIGHT), np.array([0.5, 1.5]) * LIMIT, through_folds=True)
+    points, events, ending = run(truss(HEIGHT), np.array([0.5, 2.5]) * LIMIT, through_folds=True)
     assert [event.drive for event in events] == pytest.approx([LIMIT, -LIMIT], rel=1e-9)
     assert ending.end is End.COMPLETE
     assert [point.target for point in points] == [0, 0, 0, 1]
     assert points[-1].at.x[0] > 2 * HEIGHT
     for point in points:
         assert truss(HEIGHT).gradient(point.at.x, point.at.drive) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_truss_that_leaves_the_range_of_the_drive_ends_there() -> None:
+    points, _, ending = run(truss(HEIGHT), np.array([0.5, 1.2]) * LIMIT, through_folds=True)
+    assert ending.end is End.OUTSIDE
+    assert {point.target for point in points} == {0}
 
 
 @pytest.mark.parametrize("sign", [1, -1])
