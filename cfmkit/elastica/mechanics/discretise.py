@@ -108,6 +108,7 @@ class Discretisation:
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
     fits: Mapping[str, Fit]
+    floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
 
     @property
     def n_motions(self) -> int:
@@ -182,7 +183,7 @@ class _ArrayBuilder:
         free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits,
+            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]),
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
@@ -257,6 +258,7 @@ class _ArrayBuilder:
                 "cuts": (left, right),
                 "raw": beam.closure == "raw",
                 "inner": k < len(cuts) - 2,
+                "floored": floor > 0,
             }
             last = piece["ends"][1]
 
@@ -395,6 +397,6 @@ def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
 
 def without_floor(discretisation: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
-    axial = discretisation.elements.axial.copy()
-    axial[elements] = 0.0
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial))
+    axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
+    axial[elements], floored[elements] = 0.0, False
+    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)

@@ -1,0 +1,177 @@
+"""A network of beams as a problem to be followed: along its drive, or along a share of what is constant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.model.network import PointLoad
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.numerics.continuation.problem import Equilibrium
+
+SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
+NO_MOTION = 1e-6  # share of a mode's largest part below which the nodes do not move
+HALF_STEP = 0.5  # of the drive, for central differences: the gradient is at most quadratic in it
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkProblem:
+    """Equilibria of a network: its free unknowns over the drive.
+
+    With `ramp` the drive rests, and what is followed is the share of everything constant: loads, displaced supports,
+    free lengths of springs, the gap of beams that are forced into place.
+    """
+
+    network: Discretisation
+    ramp: bool = False
+
+    @cached_property
+    def motions(self) -> Any:
+        """Which free unknowns are motions."""
+        return self.network.free < self.network.n_motions
+
+    @cached_property
+    def unit(self) -> FloatArray:
+        """Sizes of the free unknowns: 1 for motions, EI/L^2 of its element for a section force."""
+        e = self.network.elements
+        stiffness = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
+        unit = np.ones(self.network.size)
+        unit[e.unknowns[:, -2:]] = (stiffness / np.real(e.length) ** 2)[:, None]
+        return np.asarray(unit[self.network.free])
+
+    def factors(self, drive: float) -> tuple[float, float]:
+        """Return the factors of what grows with the drive and of what is constant."""
+        return (0.0, drive) if self.ramp else (drive, 1.0)
+
+    def values(self, x: FloatArray, drive: float) -> FloatArray:
+        """Return all unknowns, held ones included."""
+        growing, share = self.factors(drive)
+        return np.asarray(energy.values(self.network, x, growing, share))
+
+    def linearise(self, x: FloatArray, drive: float) -> Tangent:
+        """Return residual, tangent and the residual's change with the drive."""
+        network, free = self.network, self.network.free
+        growing, share = self.factors(drive)
+        z = self.values(x, drive)
+        hessian = energy.hessian(network, z, growing, share)[free]
+        rate = hessian @ (network.base if self.ramp else network.rate)
+        if self._varies:
+            up, down = (
+                energy.gradient(network, z, *self.factors(drive + step))[free] for step in (HALF_STEP, -HALF_STEP)
+            )
+            rate = rate + up - down
+        return Tangent(network, energy.gradient(network, z, growing, share)[free], rate, hessian[:, free])
+
+    @cached_property
+    def _varies(self) -> bool:
+        """Whether the gradient changes with the drive while all unknowns rest."""
+        return (
+            self.ramp or any(load.grows for load in self.network.loads) or bool(self.network.elements.line[:, 1].any())
+        )
+
+    @cached_property
+    def loaded(self) -> bool:
+        """Whether anything constant acts: what the way from rest to the drive's begin is needed for."""
+        network = self.network
+        constant = any(not load.grows for load in network.loads) or network.elements.line[:, 0].any()
+        prestress = network.base.any() or network.elements.gap.any()
+        tight = any(
+            getattr(spring.item, name, None)
+            for spring in network.springs
+            for name in ("free_length", "free_angle", "free_displacement")
+        )
+        return bool(constant or prestress or tight)
+
+    # -- modes -----------------------------------------------------------------------------------------------------
+    def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces."""
+        tangent, moves = self.linearise(at.x, at.drive).tangent, np.flatnonzero(self.motions)
+        unit = np.zeros((len(tangent), len(moves)))
+        unit[moves, np.arange(len(moves))] = 1.0
+        try:
+            flexibility = np.linalg.solve(tangent, unit)
+        except np.linalg.LinAlgError:
+            shift = energy.SINGULAR_SHIFT * np.diag(self.motions.astype(float))
+            flexibility = np.linalg.solve(tangent + shift, unit)
+        inner = flexibility[moves]
+        if self.follows:
+            inverse, vectors = np.linalg.eig(inner)
+            real = np.abs(inverse.imag) <= energy.REAL_SHARE * np.abs(inverse)
+            inverse, vectors = inverse[real].real, vectors[:, real].real
+        else:
+            inverse, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        order = np.argsort(-np.abs(inverse))[:count]
+        return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
+
+    @cached_property
+    def follows(self) -> bool:
+        """Whether a load turns with its node: then the tangent is unsymmetric."""
+        return any(load.item.follows for load in self.network.loads if isinstance(load.item, PointLoad))
+
+    def orient(self, modes: FloatArray) -> FloatArray:
+        """Return one combination of modes, its largest motion one, on the side that `Control.sign` 1 names.
+
+        The motion of a node that changes most goes to the negative side; modes that move no node are told by the
+        moments at the beams' ends. With several modes that is repeated on the rest, whatever spans them.
+        """
+        nodes, ends = modes[self._node_rows], self._end_moments(modes)
+        size = np.abs(modes[self.motions]).max()
+        rest, amounts = np.eye(modes.shape[1]), np.zeros(modes.shape[1])
+        for _ in range(modes.shape[1]):
+            parts = nodes @ rest
+            if not np.abs(parts).max(initial=0.0) > NO_MOTION * size:
+                parts = ends @ rest
+            sizes = np.linalg.norm(parts, axis=1)
+            if not sizes.max(initial=0.0) > 0:
+                break
+            row = parts[np.flatnonzero(sizes >= SAME_SIZE * sizes.max())[0]]
+            row = row / np.linalg.norm(row)
+            amounts -= row
+            rest -= np.outer(rest @ row, row)
+        mode = modes @ amounts
+        return np.asarray(mode / np.abs(mode[self.motions]).max())
+
+    @cached_property
+    def _node_rows(self) -> Any:
+        """Which free unknowns move nodes."""
+        named = [unknown for body in self.network.bodies.values() for unknown in body]
+        return np.flatnonzero(np.isin(self.network.free, named))
+
+    def _end_moments(self, modes: FloatArray) -> FloatArray:
+        """Return the moments at the ends of the elements in modes, (e, k)."""
+        z = np.zeros((self.network.size, modes.shape[1]))
+        z[self.network.free] = modes
+        e = self.network.elements
+        columns = energy.rotation_columns(self.network.degree)
+        _, slopes = shape_functions(self.network.degree, np.ones(1))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[:, -1], slopes[0], z[e.unknowns[:, columns]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Residual and tangent of a network at one place."""
+
+    network: Discretisation
+    residual: FloatArray  # (n,)
+    rate: FloatArray  # (n,) change of the residual with the drive
+    tangent: FloatArray  # (n, n)
+
+    @cached_property
+    def unstable(self) -> int:
+        """Number of unstable directions at a held drive."""
+        return energy.count_unstable(self.network, self.tangent)
+
+    def solve(self, right: FloatArray) -> FloatArray | None:
+        """Return the tangent's inverse times columns."""
+        try:
+            return np.asarray(np.linalg.solve(self.tangent, right))
+        except np.linalg.LinAlgError:
+            return None
