@@ -77,19 +77,6 @@ class NetworkProblem:
             self.ramp or any(load.grows for load in self.network.loads) or bool(self.network.elements.line[:, 1].any())
         )
 
-    @cached_property
-    def loaded(self) -> bool:
-        """Whether anything constant acts: what the way from rest to the drive's begin is needed for."""
-        network = self.network
-        constant = any(not load.grows for load in network.loads) or network.elements.line[:, 0].any()
-        prestress = network.base.any() or network.elements.gap.any()
-        tight = any(
-            getattr(spring.item, name, None)
-            for spring in network.springs
-            for name in ("free_length", "free_angle", "free_displacement")
-        )
-        return bool(constant or prestress or tight)
-
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
         """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces."""

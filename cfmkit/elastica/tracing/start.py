@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.outcome.path import Event
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import End, Ending, Event, Options, Point
+from cfmkit.numerics.continuation.path import End, Ending, Options, Point
+from cfmkit.numerics.continuation.path import Event as FoundEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
     from cfmkit.numerics.continuation.problem import Equilibrium
 
 FIRST_SHARE = 0.5  # of what is constant, in the first step
+FREE = "free_length", "free_angle", "free_displacement"
 FLOOR_SHARE = 0.01
 """Part of the flexibility along a straight beam that its floor may bear: where it bears less, it is taken away."""
 FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive stretches it
@@ -29,34 +34,67 @@ class Start(NamedTuple):
 
     problem: NetworkProblem  # along the drive
     at: Equilibrium | None  # None: nothing to begin at
-    ramp: NetworkProblem  # along the share of what is constant
-    events: tuple[Event, ...]  # on the way, at shares
-    ending: Ending | None  # of the way, unless it is complete
+    events: tuple[Event, ...]  # on the way; drives are shares of what is applied
+    first: tuple[NetworkProblem, FoundEvent] | None  # bifurcation on the way, and what it is one of
+    stopped: tuple[str, Ending] | None  # what could not be applied, and how the way to it ended
 
 
 def find_start(network: Discretisation, control: Control) -> Start:
-    """Return the equilibrium under what is constant, on a stable branch if there is one."""
-    problem, ramp = NetworkProblem(network), NetworkProblem(network, ramp=True)
-    rest = correct(problem if not problem.loaded else ramp, np.zeros(len(network.free)), 0.0)
-    if rest is None:
-        return Start(problem, None, ramp, (), None)
-    if not problem.loaded:
-        return Start(*_remove_floors(problem, rest), ramp, (), None)
-    options = Options(1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE)
+    """Return the equilibrium under what is constant, on a stable branch if there is one.
+
+    Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
+    applied: of several stable states it is the one to which this way leads.
+    """
+    problem = NetworkProblem(network)
     events: list[Event] = []
-    last, ending = rest, None
-    for item in follow(ramp, rest, np.ones(1), options):
-        if isinstance(item, Event):
-            events.append(item)
-        elif isinstance(item, Point):
-            last = item.at
-        else:
-            ending = item
-    assert ending is not None
-    if ending.end is not End.COMPLETE:
-        return Start(problem, None, ramp, tuple(events), ending)
-    at = correct(problem, last.x, 0.0)
-    return Start(*(_remove_floors(problem, at) if at else (problem, None)), ramp, tuple(events), None)
+    first: Any = None
+    at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
+    if at is None:
+        return Start(problem, None, (), None, None)
+    for what, ramp in _ramps(network):
+        options = Options(
+            1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
+        )
+        begin = correct(ramp, at.x, 0.0)
+        if begin is None:
+            return Start(problem, None, tuple(events), first, (what, Ending(End.LOST, 0.0)))
+        for item in follow(ramp, begin, np.ones(1), options):
+            if isinstance(item, FoundEvent):
+                events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
+                first = first or ((ramp, item) if item.modes is not None else None)
+            elif isinstance(item, Point):
+                at = item.at
+            elif item.end is not End.COMPLETE:
+                return Start(problem, None, tuple(events), first, (what, item))
+    at = correct(problem, at.x, 0.0)
+    return Start(*(_remove_floors(problem, at) if at else (problem, None)), tuple(events), first, None)
+
+
+def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
+    """Yield what is constant, in the order in which it is applied, with the problem along the share of it."""
+    springs = [spring.item for spring in network.springs]
+    tight = any(getattr(item, name, None) for item in springs for name in FREE)
+    if tight or network.elements.gap.any():
+        yield "prestress", NetworkProblem(_without_loads(network), ramp=True)
+    if any(not load.grows for load in network.loads) or network.elements.line[:, 0].any() or network.base.any():
+        yield "constant loads", NetworkProblem(_loads_as_drive(network))
+
+
+def _without_loads(network: Discretisation) -> Discretisation:
+    """Return the network with its supports at rest and no loads."""
+    elements = network.elements._replace(line=np.zeros_like(network.elements.line))
+    return replace(network, loads=(), elements=elements, base=np.zeros(network.size), rate=np.zeros(network.size))
+
+
+def _loads_as_drive(network: Discretisation) -> Discretisation:
+    """Return the network with constant loads and displacements of supports as what grows with the drive."""
+    line = network.elements.line
+    grown = np.stack([np.zeros_like(line[:, 0]), line[:, 0]], axis=1)
+    loads = tuple(load._replace(grows=True) for load in network.loads if not load.grows)
+    return replace(
+        network, loads=loads, elements=network.elements._replace(line=grown), scales=network.scales._replace(drive=1.0),
+        rate=network.base, base=np.zeros(network.size),
+    )  # fmt: skip
 
 
 def _remove_floors(problem: NetworkProblem, at: Equilibrium) -> tuple[NetworkProblem, Equilibrium | None]:

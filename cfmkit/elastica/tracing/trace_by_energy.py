@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -96,16 +96,13 @@ def trace_on(network: Network, drive: Drive, control: Control, mesh: Mesh) -> Tr
     """Return the path on one discretisation."""
     arrays = mesh.arrays(network, drive)
     start = find_start(arrays, control)
-    what = "prestress" if arrays.elements.gap.any() else "constant loads"
-    events = [Event(f"{event.kind} under {what}", event.drive, event.before, event.after) for event in start.events]
-    first: Any = next(((start.ramp, event) for event in start.events if event.modes is not None), None)
+    events, first = list(start.events), start.first
     if start.at is None:
-        text = (
-            "no equilibrium to start from"
-            if start.ending is None
-            else f"no equilibrium under the {what}: {start.ending.message}"
-        )
-        return TracedPath(network, drive, start.problem, (), tuple(events), _start_status(start), text)
+        text = "no equilibrium to start from"
+        if start.stopped:
+            what, stop = start.stopped
+            text = f"no equilibrium beyond {100 * stop.drive:.3g} % of the {what}: {stop.message}"
+        return TracedPath(network, drive, start.problem, (), start.events, _start_status(start), text)
     unit = arrays.scales.drive
     targets = drive.points / unit
     span = float(np.ptp(np.append(targets, 0.0)))
@@ -129,7 +126,7 @@ def trace_on(network: Network, drive: Drive, control: Control, mesh: Mesh) -> Tr
 
 
 def _start_status(start: Start) -> PathStatus:
-    jumps = start.ending is not None and start.ending.end is End.JUMPS
+    jumps = start.stopped is not None and start.stopped[1].end is End.JUMPS
     return PathStatus.JUMPS if jumps else PathStatus.NO_START
 
 

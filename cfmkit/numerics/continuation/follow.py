@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
@@ -33,6 +35,8 @@ STEEP = 0.5  # motion over the drive's range, by the slope
 MAX_REJECTIONS = 90
 FINEST_STEP = 1e-13  # share of the range
 SHORT_STEP = 1e-9  # share of the range: shorter steps count as rejections
+LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
+"""Force, in its unit, and step as a share of the range, from which on a structure is locked: pulled straight, say."""
 
 
 def follow(
@@ -93,6 +97,8 @@ def _items(
 def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
+    if _is_locked(walk):
+        return Ending(End.LIMIT_POINT, here.drive, "the structure locks: a force grows beyond all bounds")
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
@@ -108,6 +114,13 @@ def _step(walk: Walk) -> Items:
         outcome = yield from lose_stability(walk, trial.new)
         return outcome if outcome is not None else replace(walk.shorten(0.25 * abs(goal - here.drive)), before=None)
     return (yield from _accept(walk, trial, goal, lands))
+
+
+def _is_locked(walk: Walk) -> bool:
+    if walk.step > LOCKED_STEP * walk.options.span:
+        return False
+    forces = (np.abs(walk.here.x) / walk.problem.unit)[~walk.problem.motions]
+    return bool(forces.max(initial=0.0) > LOCKED_FORCE)
 
 
 def _skips(walk: Walk, new: Equilibrium) -> bool:

@@ -32,6 +32,8 @@ class Trial(NamedTuple):
 def hermite(a: Equilibrium, b: Equilibrium, drive: float) -> FloatArray:
     """Return the cubic through two equilibria with their slopes at a drive."""
     width = b.drive - a.drive
+    if width == 0:
+        return a.x
     s = (drive - a.drive) / width
     values = (1 + 2 * s) * (1 - s) ** 2 * a.x + s * s * (3 - 2 * s) * b.x
     return values + width * (s * (1 - s) ** 2 * a.rate + s * s * (s - 1) * b.rate)
