@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
+FLEXIBLE_SHARE = 1e-9  # of the largest flexibility, below which one is that of a constraint: rounding
 REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of its size
 
 
@@ -157,6 +158,8 @@ def count_unstable(network: Discretisation, tangent: Any) -> int:
 
     if any(load.item.follows for load in network.loads):
         return int((motion_eigenvalues(network, tangent) < 0).sum())
+    from scipy.linalg import lapack
+
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0
     negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
@@ -170,5 +173,6 @@ def motion_eigenvalues(network: Discretisation, tangent: Any) -> Any:
     unit[moves, np.arange(len(moves))] = 1.0
     flexibility = np.linalg.solve(tangent, unit)[moves]
     inverse = np.linalg.eigvals(flexibility)
-    real = (np.abs(inverse.imag) < REAL_SHARE * np.abs(inverse)) & (np.abs(inverse) > 0)
+    size = np.abs(inverse)
+    real = (np.abs(inverse.imag) < REAL_SHARE * size) & (size > FLEXIBLE_SHARE * size.max(initial=0.0))
     return np.sort(1 / inverse[real].real)

@@ -1,0 +1,291 @@
+"""The compiled equations of a network, `march.c`, or numpy where there is no compiler.
+
+Both give the same to rounding (tests/unit/test_elastica_march.py). C takes a model as a row of 8-byte counts and
+addresses, so that an array of rows is many designs; what the addresses point to is kept with the row.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.equations import (
+    FORCE_CHANGE,
+    Linearised,
+    March,
+    MarchCode,
+    NumpyEquations,
+    Plan,
+    State,
+    begin,
+)
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+
+MAX_DEGREE = 40
+"""As in march.h: arrays of one element are on the stack."""
+SWITCH = "CFMKIT_WITHOUT_C"
+"""Environment variable that keeps everything in numpy, whatever its value."""
+KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
+"""Springs and loads that march.c has; networks with others run on numpy."""
+
+COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
+ADDRESSES = (
+    "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
+    "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
+    "spring", "load_at", "load",
+)  # fmt: skip
+"""Fields of `Model` in march.h, in its order."""
+
+
+@cache
+def _module() -> Any:
+    try:
+        from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    return _march
+
+
+def compiled() -> Any:
+    """Return the compiled module, None if it was not built, or is switched off by `SWITCH`."""
+    return None if SWITCH in os.environ else _module()
+
+
+def engine() -> str:
+    """Return what the beam engine runs on: "C" or "numpy"."""
+    return "numpy" if compiled() is None else "C"
+
+
+def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
+    """Return the equations of a network, compiled if they can be.
+
+    Parameters
+    ----------
+    network : Discretisation
+        With real arrays.
+    ramp : bool
+        Whether the way is the share of what is constant instead of the drive.
+    """
+    kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
+    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
+    return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledEquations(NumpyEquations):
+    """The same equations in compiled code."""
+
+    arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
+    row: Any = field(init=False)  # counts and addresses
+
+    def __post_init__(self) -> None:
+        """Collect the arrays."""
+        super().__post_init__()
+        arrays = model_arrays(self)
+        counts = model_counts(self.network, self.ramp)
+        row = np.array([*counts.values(), *(arrays[name].ctypes.data for name in ADDRESSES)], np.int64)
+        object.__setattr__(self, "arrays", arrays)
+        object.__setattr__(self, "row", row)
+
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        size = self.network.size
+        out = np.empty(size), np.empty((size, size))
+        compiled().evaluate(self.row, np.ascontiguousarray(z, float), *out, drive, share)
+        return out
+
+    def linearise(self, free: FloatArray, way: float) -> Linearised:
+        """Return the equations linearised at some unknowns."""
+        out = Linearised(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
+        compiled().linearise(self.row, np.ascontiguousarray(free, float), *out, way)
+        return out
+
+    def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
+        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the tangent is singular.
+        """
+        found, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
+        if compiled().resolve(self.row, np.ascontiguousarray(free, float), found, count, way):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        return found, self._unstable(free, way, int(count[0]))
+
+    def _unstable(self, free: FloatArray, way: float, pivots: int) -> int:
+        """Return the count of C; under loads that follow it is a parity, and eigenvalues are counted."""
+        if not self.follows:
+            return pivots
+        return energy.count_unstable(self.network, self.linearise(free, way).tangent)
+
+    def solve(
+        self,
+        free: FloatArray,
+        way: float,
+        border: FloatArray | None = None,
+        level: float = 0.0,
+        push: FloatArray | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
+    ) -> State | None:
+        """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
+        x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
+        nothing = np.empty(0)
+        given = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
+        if compiled().solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
+            return None
+        way = float(at[0])
+        return State(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+
+    def march(self, start: State, targets: FloatArray, plan: Plan) -> March:
+        """Return the states on the way to targets, as far as nothing happens."""
+        n, goals = self.n, np.ascontiguousarray(targets, float)
+        rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
+        parity = start.unstable % 2 if self.follows else start.unstable
+        given = _plan_row(plan, parity, False)
+        before = plan.before
+        known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
+        here = np.concatenate([start.free, start.rate, [start.way]])
+        code = compiled().march(self.row, given, here, known, goals, rows, stored)
+        states = tuple(
+            State(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
+            for row in rows[: stored[0]].copy()
+        )
+        march = March(states, MarchCode(code), float(given[0]))
+        return self._counted(march, start.unstable) if self.follows else march
+
+    def _counted(self, march: March, unstable: int) -> March:
+        """Return a march with eigenvalues counted, as far as their number stays the same."""
+        states: list[State] = []
+        for state in march.states:
+            if self._unstable(state.free, state.way, 0) != unstable:
+                return March(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
+            states.append(replace(state, unstable=unstable))
+        return replace(march, states=tuple(states))
+
+
+def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
+    """Return a `Plan` of march.h."""
+    return np.array(
+        [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
+    )
+
+
+def march_many(
+    networks: Sequence[Discretisation], targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+) -> tuple[FloatArray, Any]:
+    """Return the efforts of many networks under a drive by a motion, each followed from rest.
+
+    Parameters
+    ----------
+    networks : sequence of Discretisation
+        Without constant loads or displaced supports.
+    targets : (k,) array
+        Values of the drive [m or rad].
+    first_step : float
+        Share of the range of the drive.
+
+    Returns
+    -------
+    efforts : (designs, k) array
+        [N or N m]; not a number from where a path does not simply go on.
+    codes : (designs,) int array
+        `MarchCode` of each.
+    """
+    each = [equations(network) for network in networks]
+    goals = np.array([targets / one.network.scales.drive for one in each], float).reshape(len(each), -1)
+    spans = np.maximum(goals.max(axis=1), 0.0) - np.minimum(goals.min(axis=1), 0.0)
+    plans = [Plan(first_step * span, span, tolerance=tolerance) for span in spans.tolist()]
+    efforts, codes = np.full(goals.shape, np.nan), np.zeros(len(each), np.int64)
+    rows = [one.row for one in each if isinstance(one, CompiledEquations) and not one.follows]
+    if rows and len(rows) == len(each):
+        given = np.array([_plan_row(plan, 0, True) for plan in plans])
+        if not compiled().march_many(np.array(rows), given, goals, efforts, codes, plans[0].room):
+            raise MemoryError
+    else:
+        for number, (one, plan, goal) in enumerate(zip(each, plans, goals, strict=True)):
+            start = begin(one)
+            march = March((), MarchCode.NO_START, 0.0) if start is None else one.march(start, goal, plan)
+            codes[number] = march.code
+            for state in march.states:
+                if state.target >= 0:
+                    efforts[number, state.target] = state.effort
+    return efforts * np.array([one.effort_unit for one in each])[:, None], codes
+
+
+# -- arrays ------------------------------------------------------------------------------------------------------------
+def model_counts(network: Discretisation, ramp: bool) -> dict[str, int]:
+    """Return the counts of a `Model`."""
+    elements, points = network.elements.weight.shape
+    follows = any(load.item.follows for load in network.loads)
+    values = (elements, points, network.degree, network.size, len(network.free), len(network.springs))
+    return dict(zip(COUNTS, (*values, len(network.loads), int(ramp), int(follows)), strict=True))
+
+
+def model_arrays(of: NumpyEquations) -> dict[str, Any]:
+    """Return the arrays of a `Model` in C order."""
+    network, rule = of.network, basis(of.network.degree)
+    e, a = network.elements, network.attachments
+    slot = np.full(network.size, -1, np.int64)
+    slot[network.free] = np.arange(len(network.free))
+    bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
+    springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
+    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name not in ("beam", "cuts")}
+    given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
+    given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
+    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}
+    given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
+    given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
+    whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
+    return {name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64) for name in ADDRESSES}
+
+
+def _leaves(network: Discretisation, slot: Any) -> Any:
+    """Return the last element that holds each free unknown, -1 if none does."""
+    last = np.full(network.size, -1, np.int64)
+    for number, unknowns in enumerate(network.elements.unknowns):
+        last[unknowns] = number
+    return last[slot >= 0]
+
+
+def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return kind and places of a spring, and its stiffness and what else it needs."""
+    item, scales, attachments = attached.item, network.scales, network.attachments
+    rest = attachments.origin[list(attached.places)] + attachments.arm[list(attached.places)]
+    stiffness = item.stiffness * scales.length / scales.force
+    if isinstance(item, SlideSpring):
+        free = item.free_displacement / scales.length
+        values = (stiffness, free, np.cos(item.direction), np.sin(item.direction), *rest[0])
+        return (1, attached.places[0], -1), values
+    if isinstance(item, LineSpring):
+        ground = np.array(item.ground) / scales.length
+        length = float(np.hypot(*((rest[1] if item.end else ground) - rest[0])))
+        free = length if item.free_length is None else item.free_length / scales.length
+        end = attached.places[1] if item.end else -1
+        return (0, attached.places[0], end), (stiffness, length, free - length, *ground, 0.0)
+    start, end = attached.places if item.start is not None else (-1, attached.places[0])
+    return (2, start, end), (item.stiffness / scales.moment, item.free_angle, 0.0, 0.0, 0.0, 0.0)
+
+
+def _load(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return place of a load, whether it grows and follows, and force and moment."""
+    item, scales = attached.item, network.scales
+    unit = scales.drive if attached.grows else 1.0
+    values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
+    return (attached.places[0], int(attached.grows), int(item.follows)), values
+
+
+__all__ = ["CompiledEquations", "compiled", "engine", "equations", "march_many"]
