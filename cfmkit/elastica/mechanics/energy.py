@@ -158,7 +158,6 @@ def count_unstable(network: Discretisation, tangent: Any) -> int:
 
     if any(load.item.follows for load in network.loads):
         return int((motion_eigenvalues(network, tangent) < 0).sum())
-    from scipy.linalg import lapack
 
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0

@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
+from cfmkit.numerics.continuation.problem import Equilibrium
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.numerics.continuation.problem import Equilibrium
+    from cfmkit.elastica.mechanics.equations import NumpyEquations
+    from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
 NO_MOTION = 1e-6  # share of a mode's largest part below which the nodes do not move
-HALF_STEP = 0.5  # of the drive, for central differences: the gradient is at most quadratic in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,43 +41,33 @@ class NetworkProblem:
         return self.network.free < self.network.n_motions
 
     @cached_property
+    def equations(self) -> NumpyEquations:
+        """Residual, tangent and Newton's method, compiled where they can be."""
+        return equations(self.network, self.ramp)
+
+    @cached_property
     def unit(self) -> FloatArray:
         """Sizes of the free unknowns: 1 for motions, EI/L^2 of its element for a section force."""
-        e = self.network.elements
-        stiffness = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
-        unit = np.ones(self.network.size)
-        unit[e.unknowns[:, -2:]] = (stiffness / np.real(e.length) ** 2)[:, None]
-        return np.asarray(unit[self.network.free])
-
-    def factors(self, drive: float) -> tuple[float, float]:
-        """Return the factors of what grows with the drive and of what is constant."""
-        return (0.0, drive) if self.ramp else (drive, 1.0)
+        return np.where(self.motions, 1.0, self.equations.unit)
 
     def values(self, x: FloatArray, drive: float) -> FloatArray:
         """Return all unknowns, held ones included."""
-        growing, share = self.factors(drive)
-        return np.asarray(energy.values(self.network, x, growing, share))
+        return np.asarray(self.equations.values(x, drive))
 
     def linearise(self, x: FloatArray, drive: float) -> Tangent:
         """Return residual, tangent and the residual's change with the drive."""
-        network, free = self.network, self.network.free
-        growing, share = self.factors(drive)
-        z = self.values(x, drive)
-        hessian = energy.hessian(network, z, growing, share)[free]
-        rate = hessian @ (network.base if self.ramp else network.rate)
-        if self._varies:
-            up, down = (
-                energy.gradient(network, z, *self.factors(drive + step))[free] for step in (HALF_STEP, -HALF_STEP)
-            )
-            rate = rate + up - down
-        return Tangent(network, energy.gradient(network, z, growing, share)[free], rate, hessian[:, free])
+        at = self.equations.linearise(x, drive)
+        return Tangent(self.network, at.residual, at.change, at.tangent)
 
-    @cached_property
-    def _varies(self) -> bool:
-        """Whether the gradient changes with the drive while all unknowns rest."""
-        return (
-            self.ramp or any(load.grows for load in self.network.loads) or bool(self.network.elements.line[:, 1].any())
-        )
+    def solve(
+        self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
+    ) -> Equilibrium | None:
+        """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
+        row, level = (None, 0.0) if border is None else border
+        state = self.equations.solve(x, drive, row, level, push)
+        if state is None or not np.isfinite(state.rate).all():
+            return None
+        return Equilibrium(state.free, state.way, state.rate, state.unstable)
 
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:

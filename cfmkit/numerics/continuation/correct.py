@@ -27,9 +27,14 @@ def correct(
 ) -> Equilibrium | None:
     """Return the equilibrium near a guess, at its drive or where the border's condition holds; None if none is near.
 
+    A problem that has a method `solve(x, drive, border)` of its own, compiled, say, is asked instead.
+
     The bordered system is solved by elimination with the factors of the tangent alone: at limit points and
     bifurcations these are nearly singular, and the iteration makes good what rounding spoils.
     """
+    own = getattr(problem, "solve", None)
+    if own is not None:
+        return own(x, drive, border)  # type: ignore[no-any-return]
     last = np.inf
     with np.errstate(all="ignore"):
         for iteration in range(iterations):

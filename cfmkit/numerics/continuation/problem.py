@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -93,6 +94,12 @@ class Pushed:
     def linearise(self, x: FloatArray, drive: float) -> Linearisation:
         """Return residual and tangent with the force."""
         return _PushedLinearisation(self.problem.linearise(x, drive), self.force)
+
+    @property
+    def solve(self) -> Any:
+        """Newton's method of the problem, if it has one of its own."""
+        own = getattr(self.problem, "solve", None)
+        return own and partial(own, push=self.force)
 
     def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
         """Return those of the problem: a constant force changes no tangent."""
