@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
-NO_MOTION = 1e-6  # share of a mode's largest part below which the nodes do not move
+NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +125,14 @@ class NetworkProblem:
         return np.flatnonzero(np.isin(self.network.free, named))
 
     def _end_moments(self, modes: FloatArray) -> FloatArray:
-        """Return the moments at the ends of the elements in modes, (e, k)."""
+        """Return the moments at the ends of the beams in modes, (beams, k)."""
         z = np.zeros((self.network.size, modes.shape[1]))
         z[self.network.free] = modes
         e = self.network.elements
-        columns = energy.rotation_columns(self.network.degree)
+        last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
+        unknowns = e.unknowns[last][:, energy.rotation_columns(self.network.degree)]
         _, slopes = shape_functions(self.network.degree, np.ones(1))
-        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[:, -1], slopes[0], z[e.unknowns[:, columns]]))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ def estimate_error(path: TracedPath, finer: Discretisation) -> float:
         point = path.points[index].at
         guess = raise_degree(coarse, finer, path.z[index])[finer.free]
         near = correct(problem, guess, point.drive)
-        if near is None or largest_motion(problem, near.x - guess) > MAX_CHANGE:
+        if near is None or largest_motion(problem, near.x - guess) > MAX_CHANGE or near.unstable != point.unstable:
             return float("inf")
         z = problem.values(near.x, near.drive)
         largest_effort = max(largest_effort, abs(effort(finer, z, near.drive) - float(path.effort[index])))

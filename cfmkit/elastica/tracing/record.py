@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.outcome.path import Event, PathStatus
-    from cfmkit.numerics.continuation.path import Event as FoundEvent
+    from cfmkit.elastica.tracing.imperfection import Buckling
     from cfmkit.numerics.continuation.path import Point
 
 
@@ -32,7 +32,7 @@ class TracedPath:
     events: tuple[Event, ...]
     status: PathStatus
     message: str
-    first: tuple[NetworkProblem, FoundEvent] | None = None  # first bifurcation, and what it is one of
+    first: Buckling | None = None  # first loss of stability
     error: float = np.inf  # estimated, of efforts and motions, relative to the largest of the path
     imperfection: str = ""
 

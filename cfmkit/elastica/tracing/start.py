@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.outcome.path import Event
+from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import End, Ending, Options, Point
@@ -35,7 +36,7 @@ class Start(NamedTuple):
     problem: NetworkProblem  # along the drive
     at: Equilibrium | None  # None: nothing to begin at
     events: tuple[Event, ...]  # on the way; drives are shares of what is applied
-    first: tuple[NetworkProblem, FoundEvent] | None  # bifurcation on the way, and what it is one of
+    first: Buckling | None  # on the way
     stopped: tuple[str, Ending] | None  # what could not be applied, and how the way to it ended
 
 
@@ -47,7 +48,7 @@ def find_start(network: Discretisation, control: Control) -> Start:
     """
     problem = NetworkProblem(network)
     events: list[Event] = []
-    first: Any = None
+    first: Buckling | None = None
     at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
     if at is None:
         return Start(problem, None, (), None, None)
@@ -61,7 +62,8 @@ def find_start(network: Discretisation, control: Control) -> Start:
         for item in follow(ramp, begin, np.ones(1), options):
             if isinstance(item, FoundEvent):
                 events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
-                first = first or ((ramp, item) if item.modes is not None else None)
+                if first is None and item.modes is not None:
+                    first = Buckling(ramp, item, what)
             elif isinstance(item, Point):
                 at = item.at
             elif item.end is not End.COMPLETE:

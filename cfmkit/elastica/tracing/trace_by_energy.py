@@ -11,6 +11,7 @@ from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretis
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.outcome.path import Event, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, estimate_error
+from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.record import TracedPath
 from cfmkit.elastica.tracing.start import Start, find_start, is_stretched
 from cfmkit.numerics.continuation.follow import follow
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
 DEGREES = 5, 14  # with which a path is tried first, by its tolerance
 MORE_FOR_FOLDS = 2  # degrees
+DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
 MAX_PIECES = 4
@@ -54,6 +56,10 @@ class Mesh:
 def trace(network: Network, drive: Drive, control: Control | None = None) -> TracedPath:
     """Return the path of equilibria of a network under a drive, from rest through all requested points."""
     control = control or Control()
+    if control.imperfection:
+        perfect = replace(control, imperfection=0.0)
+        bent, name = bend(network, drive, _first_buckling(network, drive, perfect), control.imperfection)
+        return replace(trace(bent, drive, perfect), imperfection=name)
     degree = int(np.clip(np.ceil(1 - np.log10(control.tolerance)), *DEGREES)) + MORE_FOR_FOLDS * control.through_folds
     mesh, best, ended = Mesh(degree), None, None
     for attempt in range(MAX_ROUNDS):
@@ -92,11 +98,18 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Tra
     return best
 
 
+def _first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
+    """Return the first loss of stability on the primary path of a network."""
+    path = trace_on(network, drive, replace(control, branch="primary", through_folds=False), Mesh(DEGREE_OF_MODES))
+    return path.first
+
+
 def trace_on(network: Network, drive: Drive, control: Control, mesh: Mesh) -> TracedPath:
     """Return the path on one discretisation."""
     arrays = mesh.arrays(network, drive)
     start = find_start(arrays, control)
-    events, first = list(start.events), start.first
+    events: list[Event] = list(start.events)
+    first = start.first
     if start.at is None:
         text = "no equilibrium to start from"
         if start.stopped:
@@ -111,13 +124,15 @@ def trace_on(network: Network, drive: Drive, control: Control, mesh: Mesh) -> Tr
         span, control.branch, control.sign, control.through_folds, control.largest_turn, first_step=step,
         most_points=control.most_points,
     )  # fmt: skip
-    points, ending = [], Ending(End.LOST, 0.0)
+    points: list[Point] = []
+    ending = Ending(End.LOST, 0.0)
     for item in follow(start.problem, start.at, targets, options):
         if isinstance(item, Point):
             points.append(item)
         elif isinstance(item, FoundEvent):
             events.append(Event(item.kind, item.drive * unit, item.before, item.after))
-            first = first or ((start.problem, item) if item.modes is not None else None)
+            if first is None and item.modes is not None:
+                first = Buckling(start.problem, item, "")
         else:
             ending = item
     status = PathStatus[ending.end.name]

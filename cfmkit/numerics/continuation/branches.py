@@ -8,23 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.numerics.continuation.correct import correct
-from cfmkit.numerics.continuation.path import Options, Walk
-from cfmkit.numerics.continuation.problem import Border, Pushed, keep_motions, largest_motion
-from cfmkit.numerics.continuation.steps import advance
+from cfmkit.numerics.continuation.problem import Border, keep_motions, largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import Equilibrium, Problem
 
-AMPLITUDES = 0.06, 0.02
+AMPLITUDES, LAST_AMPLITUDES = (0.06, 0.02), (0.006, 0.002)
 """Largest motion of the mode with which a branch is entered."""
-LAST_AMPLITUDES = 0.006, 0.002
-"""The same where nothing else leads on."""
-PUSHES = 3e-3, 3e-2, 3e-1
-"""Forces along several modes under which a path leads past their bifurcations, EI / L^2."""
-RELEASES = 0.0, 0.3, 0.7, 0.9
-"""Factors by which such a force is taken away, the first that keeps to the path."""
-MAX_REJECTIONS = 60
+FIRST_REACH, LONGEST_REACH = 1e-3, 0.05  # of steps down from a saddle
+MAX_STEPS_DOWN = 100
+STILL = 1e-6  # step from which Newton's method reaches an equilibrium
+NEARBY = 0.5  # motion behind which an equilibrium is no more near a saddle
 BESIDE_TOLERANCE = 1e-12  # of the drive, as a share of the way to where the branch was entered
 SMALLEST_AMPLITUDE = 1e-6  # as a share of that where the branch was entered: less is the singular point itself
 
@@ -54,62 +50,39 @@ def enter_branch(
     return None
 
 
-def lead_around(walk: Walk, start: Equilibrium, drive: float, modes: FloatArray, width: float) -> Equilibrium | None:
-    """Return a stable equilibrium behind bifurcations of several modes around a drive.
+def descend(problem: Problem, saddle: Equilibrium, sign: int) -> Equilibrium | None:
+    """Return a stable equilibrium below an unstable one at the same drive, or None if the way down leads far away.
 
-    The path is followed from `start` under a small force along one combination of the modes, which rounds all of the
-    corners, and the force is then taken away.
+    Newton's steps, but away from where the energy is highest along falling modes. The saddle is left to the side that
+    `sign` names, along all of its falling modes.
     """
-    problem = walk.problem
-    push = keep_motions(problem, problem.orient(modes))
-    push *= walk.options.sign / np.abs(push).max()
-    goal = drive + walk.sense * 3 * width * walk.options.span
-    for size in PUSHES:
-        near = _follow_pushed(walk, start, drive, goal, size * push)
-        if near is not None:
-            near = _release(walk, near, size * push)
-        if near is not None:
-            return near
+    x, reach = saddle.x, FIRST_REACH
+    for _ in range(MAX_STEPS_DOWN):
+        here = problem.linearise(x, saddle.drive)
+        newton = here.solve(-here.residual[:, None])
+        if newton is None or not np.isfinite(newton).all():
+            return None
+        values, modes = problem.modes(replace(saddle, x=x), len(x))
+        falling = modes[:, values < 0]
+        step = newton[:, 0] - 2 * falling @ (falling[problem.motions].T @ newton[problem.motions, 0])
+        if largest_motion(problem, step) < STILL:
+            if not falling.shape[1]:
+                return correct(problem, x, saddle.drive)
+            step = sign * FIRST_REACH * problem.orient(falling)
+        x = x + step * min(1.0, reach / largest_motion(problem, step))
+        reach = min(2 * reach, LONGEST_REACH)
+        if largest_motion(problem, x - saddle.x) > NEARBY:
+            return None
     return None
 
 
-def _follow_pushed(walk: Walk, start: Equilibrium, drive: float, goal: float, force: FloatArray) -> Equilibrium | None:
-    """Return the equilibrium at a drive under a small force, followed from a start without it."""
-    pushed = Pushed(walk.problem, force)
-    begin = correct(pushed, start.x, start.drive)
-    if begin is None:
-        return None
-    options = Options(walk.options.span, largest_motion=0.15)
-    aside = Walk(pushed, options, np.array([goal]), begin, 0.2 * abs(drive - start.drive), trail=(begin,))
-    rejections = 0
-    while (goal - aside.here.drive) * walk.sense > 0:
-        step = min(aside.step, abs(goal - aside.here.drive))
-        trial = advance(aside, aside.here.drive + walk.sense * step)
-        if trial.new is None or trial.new.unstable > walk.here.unstable:
-            aside, rejections = replace(aside, step=0.5 * step, before=None), rejections + 1
-            if rejections == MAX_REJECTIONS:
-                return None
-            continue
-        aside = replace(aside.move(trial.new), step=aside.step * (1.4 if trial.misfit < 0.1 else 1.0))
-    return aside.here
-
-
-def _release(walk: Walk, near: Equilibrium, force: FloatArray) -> Equilibrium | None:
-    """Return the equilibrium to which one leads when its force is taken away by steps."""
-    part = 1.0
-    while part > 0:
-        for factor in RELEASES:
-            fewer = correct(Pushed(walk.problem, factor * part * force), near.x, near.drive)
-            if (
-                fewer is not None
-                and fewer.unstable <= walk.here.unstable
-                and largest_motion(walk.problem, fewer.x - near.x) < 0.1
-            ):
-                near, part = fewer, factor * part
-                break
-        else:
-            return None
-    return near
+def opens_at(problem: Problem, x: FloatArray, drive: float, entered: Equilibrium) -> bool:
+    """Return True if an equilibrium is on a branch that opens at (x, drive), like the root of the distance."""
+    guess, goal = x + 0.5 * (entered.x - x), drive + 0.25 * (entered.drive - drive)
+    near = correct(problem, guess, goal)
+    if near is None or near.unstable != entered.unstable:
+        return False
+    return 0.3 < largest_motion(problem, near.x - x) / largest_motion(problem, entered.x - x) < 0.7
 
 
 def find_beside(

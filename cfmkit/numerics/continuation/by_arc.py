@@ -12,7 +12,7 @@ from cfmkit.numerics.continuation.branch_ends import find_joined_path
 from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
-from cfmkit.numerics.continuation.path import PRIMARY, End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.path import PRIMARY, End, Ending, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _end_at_fold(
     """Go on where the drive turns back: at a limit point, or behind the end of a branch."""
     joined = find_joined_path(walk, fold, begin.unstable)
     if joined is None and loses_one:
-        return (yield from _stop_at_limit_point(walk, begin, move, fold))
+        return (yield from _stop_at_limit_point(walk, begin, fold))
     if joined is None and fineness > FINEST_RETRY:  # the step came to another path, or a sharp corner lies in it
         again = walk.restart(move.old, walk.step, same_piece=True)
         return (yield from follow_by_arc(again, 0.1 * fineness))
@@ -123,10 +123,9 @@ def _end_at_fold(
     return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))
 
 
-def _stop_at_limit_point(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located) -> Items:
+def _stop_at_limit_point(walk: Walk, begin: Equilibrium, fold: Located) -> Items:
     """Yield what is left before a limit point of the drive, where the path ends."""
     problem, last, sense = walk.problem, fold.before, walk.sense
-    yield Event("limit point", fold.drive, begin.unstable, move.new.unstable, fold.near)
     for number in walk.targets_up_to(fold.drive):
         goal = float(walk.targets[number])
         share = (goal - begin.drive) / (last.drive - begin.drive)

@@ -125,9 +125,9 @@ def _is_locked(walk: Walk) -> bool:
 
 def _skips(walk: Walk, new: Equilibrium) -> bool:
     """Return True if a long step has passed several bifurcations: they are passed one by one."""
-    return new.unstable > walk.here.unstable + 1 and abs(new.drive - walk.here.drive) > (
-        walk.options.cluster * walk.options.span
-    )
+    passed = new.unstable - walk.here.unstable
+    several = abs(passed) > 1 if walk.options.branch == "primary" else passed > 1
+    return several and abs(new.drive - walk.here.drive) > walk.options.cluster * walk.options.span
 
 
 def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
@@ -138,7 +138,9 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
     if new.unstable != here.unstable:
         found = locate_loss(walk, new)
         drive, near = (found.drive, found.near) if found else (new.drive, None)
-        yield Event("bifurcation", drive, here.unstable, new.unstable, near)
+        lost = new.unstable - here.unstable
+        modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
+        yield Event("bifurcation", drive, here.unstable, new.unstable, near, modes)
     elif walk.branch != PRIMARY:
         end = find_passed_end(walk, new)
         if end == "unsure":
@@ -172,7 +174,7 @@ def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
 def _reject(walk: Walk, goal: float) -> Items:
     """Go on after a step that failed: behind a bifurcation that is here, by a shorter step, by the arc length."""
     options, here = walk.options, walk.here
-    if walk.rejections >= 2 and walk.searched is not here and options.branch != "primary":
+    if walk.rejections >= 2 and walk.searched is not here:
         walk = replace(walk, searched=here)
         outcome = yield from look_past(walk, goal)
         if outcome is not None:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from cfmkit.numerics.continuation.branches import (
     AMPLITUDES,
     LAST_AMPLITUDES,
+    descend,
     enter_branch,
     find_beside,
-    lead_around,
+    opens_at,
 )
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
@@ -27,13 +28,14 @@ Items = Generator[Point | Event, None, Walk | Ending | None]
 """What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
 
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
-CLUSTERS = 1.0, 0.1, 10.0
-"""Times `Options.cluster`: ranges within which bifurcations are looked for that are passed together."""
+NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
+"""Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
 ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
 LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
 LOOK_PAST_BY = 2e-3, 2e-2
 """Shares of the range ahead of here and of the goal at which the path may be less stable."""
 LOOK_PAST_MISS = 0.02  # motion
+FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
 def lose_stability(walk: Walk, new: Equilibrium) -> Items:
@@ -52,16 +54,21 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
     )
     slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
     modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
+    if options.branch == "primary":
+        modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
+        yield Event("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
+        walk = yield from _reach_bifurcation(walk, found, far, slope)
+        return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
-        yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
+        yield from _reach_bifurcation(walk, found, far, slope)
         return Ending(End.JUMPS, found.drive, "stability is lost")
-    onto = enter_branch(walk, found.x, found.drive, problem.orient(modes), AMPLITUDES)
-    if onto is None:  # not one mode by itself: all that become unstable soon, together
-        several = _pass_together(walk, new, found, slope)
+    mode = problem.orient(modes)
+    onto = enter_branch(walk, found.x, found.drive, mode, AMPLITUDES)
+    for clusters in NEAR_CLUSTERS, WIDE_CLUSTERS:  # not one mode by itself: all that become unstable soon, together
+        several = None if onto else _pass_together(walk, new, found, slope, clusters)
         if several is not None:
             onto, modes, after = several
-    if onto is None:
-        onto = enter_branch(walk, found.x, found.drive, problem.orient(modes), LAST_AMPLITUDES)
+        onto = onto or enter_branch(walk, found.x, found.drive, mode, LAST_AMPLITUDES)
     yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None:
@@ -75,21 +82,20 @@ def _well_before(walk: Walk, drive: float, distance: float) -> Equilibrium | Non
 
 
 def _pass_together(
-    walk: Walk, new: Equilibrium, found: Located, slope: FloatArray
+    walk: Walk, new: Equilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
 ) -> tuple[Equilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
     problem, here = walk.problem, walk.here
-    for factor in CLUSTERS:
+    for factor in clusters:
         width = factor * walk.options.cluster
         ahead = walk.sense * width * walk.options.span
         saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
         if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
             continue
-        modes = problem.modes(found.near, saddle.unstable - here.unstable)[1]
-        start = _well_before(walk, found.drive, 2 * abs(ahead)) or walk.trail[0]
-        onto = lead_around(walk, start, found.drive, modes, width)
-        if onto is not None:
-            return onto, modes, saddle.unstable
+        onto = descend(problem, saddle, walk.options.sign)
+        if onto is None or onto.unstable > here.unstable or not opens_at(problem, found.x, found.drive, onto):
+            continue
+        return onto, problem.modes(found.near, saddle.unstable - here.unstable)[1], saddle.unstable
     return None
 
 
@@ -126,7 +132,10 @@ def _begin_branch(walk: Walk, found: Located, onto: Equilibrium, after: int) -> 
 def look_past(walk: Walk, goal: float) -> Items:
     """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
     problem, span, here = walk.problem, walk.options.span, walk.here
-    far = _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0]
+    far, primary = (
+        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0],
+        walk.options.branch == "primary",
+    )
     for share in LOOK_PAST_BY:
         for origin in (here.drive, goal):
             drive = origin + walk.sense * share * span
@@ -134,7 +143,7 @@ def look_past(walk: Walk, goal: float) -> Items:
             past = correct(problem, guess, drive)
             if (
                 past is not None
-                and past.unstable > here.unstable
+                and (past.unstable > here.unstable or (primary and past.unstable != here.unstable))
                 and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
             ):
                 return (yield from lose_stability(replace(walk, here=far), past))
@@ -142,12 +151,6 @@ def look_past(walk: Walk, goal: float) -> Items:
 
 
 def start_unstable(walk: Walk) -> Walk | None:
-    """Return the walk on a stable branch near an unstable start, or None."""
-    problem, start = walk.problem, walk.here
-    values, modes = problem.modes(start, start.unstable + 1)
-    falling = modes[:, values < 0]
-    if not falling.shape[1]:
-        return None
-    calm = replace(walk, here=replace(start, unstable=0))
-    onto = lead_around(calm, start, start.drive, falling, 0.1 * walk.options.cluster)
-    return None if onto is None else walk.restart(onto, 0.01 * walk.options.span)
+    """Return the walk at a stable equilibrium below an unstable start, or None."""
+    onto = descend(walk.problem, walk.here, walk.options.sign)
+    return None if onto is None else walk.restart(onto, FIRST_STEP_BELOW * walk.options.span)

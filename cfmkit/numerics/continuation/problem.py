@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -72,56 +71,6 @@ class Border(NamedTuple):
 
     row: FloatArray  # (n + 1,)
     level: float
-
-
-@dataclass(frozen=True, eq=False)
-class Pushed:
-    """A problem under a small constant force besides its own."""
-
-    problem: Problem
-    force: FloatArray  # (n,)
-
-    @property
-    def unit(self) -> FloatArray:
-        """Natural sizes of the unknowns."""
-        return self.problem.unit
-
-    @property
-    def motions(self) -> Any:
-        """Which unknowns are motions."""
-        return self.problem.motions
-
-    def linearise(self, x: FloatArray, drive: float) -> Linearisation:
-        """Return residual and tangent with the force."""
-        return _PushedLinearisation(self.problem.linearise(x, drive), self.force)
-
-    @property
-    def solve(self) -> Any:
-        """Newton's method of the problem, if it has one of its own."""
-        own = getattr(self.problem, "solve", None)
-        return own and partial(own, push=self.force)
-
-    def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return those of the problem: a constant force changes no tangent."""
-        return self.problem.modes(at, count)
-
-    def orient(self, modes: FloatArray) -> FloatArray:
-        """Return the problem's combination."""
-        return self.problem.orient(modes)
-
-
-class _PushedLinearisation:
-    def __init__(self, inner: Linearisation, force: FloatArray) -> None:
-        self.inner, self.residual, self.rate = inner, inner.residual - force, inner.rate
-
-    @property
-    def unstable(self) -> int:
-        """Unstable directions, as without the force."""
-        return self.inner.unstable
-
-    def solve(self, right: FloatArray) -> FloatArray | None:
-        """Return the tangent's inverse times columns."""
-        return self.inner.solve(right)
 
 
 def arc_weights(problem: Problem, span: float) -> FloatArray:
