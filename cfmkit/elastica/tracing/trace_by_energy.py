@@ -36,6 +36,7 @@ FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four 
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
 TENSION_FROM = 8.0  # L sqrt(N/EI) of an element
+EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_END = 1e-3  # share of the range within which two paths end alike
 WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 
@@ -62,6 +63,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Tra
         return replace(trace(bent, drive, perfect), imperfection=name)
     degree = int(np.clip(np.ceil(1 - np.log10(control.tolerance)), *DEGREES)) + MORE_FOR_FOLDS * control.through_folds
     mesh, best, ended = Mesh(degree), None, None
+    before: TracedPath | None = None
     for attempt in range(MAX_ROUNDS):
         path = trace_on(network, drive, control, mesh)
         if is_stretched(path.problem.network, path.z):
@@ -75,7 +77,8 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Tra
         path = replace(path, error=estimate_error(path, _finer(network, drive, mesh, path)))
         if best is None or not path.error > best.error:
             best = path
-        if path.error <= control.tolerance and path.status not in (PathStatus.LOST, PathStatus.NO_START):
+        settled, before = _are_settled(path, before, control), path
+        if path.error <= control.tolerance and settled and path.status not in (PathStatus.LOST, PathStatus.NO_START):
             break
         if path.status is PathStatus.NO_START and attempt >= 2:
             break
@@ -149,6 +152,20 @@ def _finer(network: Network, drive: Drive, mesh: Mesh, path: TracedPath) -> Disc
     """Return the arrays of a higher degree, with the same floors."""
     finer = mesh.arrays(network, drive, DEGREES_MORE)
     return without_floor(finer, np.flatnonzero(finer.floored & ~path.problem.network.floored))
+
+
+def _are_settled(path: TracedPath, before: TracedPath | None, control: Control) -> bool:
+    """Return True if bifurcations far along the primary path lie where they do at another degree.
+
+    The path itself says nothing about their error: a straight column has none, while its high modes have waves.
+    """
+    places = [event.drive for event in path.events]
+    if control.branch != "primary" or not places:
+        return True
+    if before is None or len(before.events) != len(places):
+        return False
+    shift = np.abs(np.array(places) - [event.drive for event in before.events]).max()
+    return bool(shift <= max(EVENT_TOLERANCE, control.tolerance) * _span(path))
 
 
 def _span(path: TracedPath) -> float:
