@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.equations import MarchCode, Plan, State
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
+from cfmkit.numerics.continuation.path import PRIMARY, March
 from cfmkit.numerics.continuation.problem import Equilibrium
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.equations import NumpyEquations
+    from cfmkit.numerics.continuation.path import Walk
     from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
@@ -67,7 +70,18 @@ class NetworkProblem:
         state = self.equations.solve(x, drive, row, level, push)
         if state is None or not np.isfinite(state.rate).all():
             return None
-        return Equilibrium(state.free, state.way, state.rate, state.unstable)
+        return _equilibrium(state)
+
+    def march(self, walk: Walk) -> March:
+        """Return the equilibria on the way to the next requested values, as far as nothing happens."""
+        here, before, options = (_state(walk.here), walk.before, walk.options)
+        plan = Plan(
+            walk.step, options.span, _state(before) if before is not None else None, options.largest_motion,
+            on_branch=walk.branch != PRIMARY, room=options.most_points + len(walk.targets),
+        )  # fmt: skip
+        marched = self.equations.march(here, walk.targets[walk.number :], plan)
+        states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
+        return March(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
 
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
@@ -133,6 +147,14 @@ class NetworkProblem:
         unknowns = e.unknowns[last][:, energy.rotation_columns(self.network.degree)]
         _, slopes = shape_functions(self.network.degree, np.ones(1))
         return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+
+
+def _state(at: Equilibrium) -> State:
+    return State(at.x, at.drive, at.rate, at.unstable, at.effort)
+
+
+def _equilibrium(state: State) -> Equilibrium:
+    return Equilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
 
 
 @dataclass(frozen=True, eq=False)

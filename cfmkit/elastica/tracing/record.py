@@ -43,8 +43,10 @@ class TracedPath:
     @cached_property
     def z(self) -> FloatArray:
         """All unknowns at every point, (n, size), dimensionless."""
-        found = [self.problem.values(point.at.x, point.at.drive) for point in self.points]
-        return np.array(found).reshape(len(self), self.problem.network.size)
+        network = self.problem.network
+        values = network.base + self.drives[:, None] * network.rate
+        values[:, network.free] = np.array([point.at.x for point in self.points]).reshape(len(self), -1)
+        return np.asarray(values)
 
     @cached_property
     def drives(self) -> FloatArray:
@@ -74,8 +76,13 @@ class TracedPath:
     @cached_property
     def effort(self) -> FloatArray:
         """What the drive works with at every point, SI."""
-        pairs = zip(self.z, self.drives, strict=True)
-        return np.array([effort(self.problem.network, z, drive) for z, drive in pairs])
+        network = self.problem.network
+        if not network.rate.any():
+            return np.array([effort(network, z, drive) for z, drive in zip(self.z, self.drives, strict=True)])
+        known = np.array([point.at.effort for point in self.points]) * network.scales.moment / network.scales.drive
+        for index in np.flatnonzero(np.isnan(known)):
+            known[index] = effort(network, self.z[index], self.drives[index])
+        return known
 
     @cached_property
     def gradient(self) -> FloatArray:

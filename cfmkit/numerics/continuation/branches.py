@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -110,5 +111,5 @@ def find_beside(
             break
         share *= float(np.sqrt(part / reached))
     if at is None:
-        return replace(entered, x=x, drive=goal, unstable=unstable)
-    return replace(at, drive=goal, unstable=min(at.unstable, unstable))
+        return replace(entered, x=x, drive=goal, unstable=unstable, effort=math.nan)
+    return replace(at, drive=goal, unstable=min(at.unstable, unstable), effort=math.nan)

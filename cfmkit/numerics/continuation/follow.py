@@ -17,11 +17,11 @@ from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.path import Options
+    from cfmkit.numerics.continuation.path import March, Options
     from cfmkit.numerics.continuation.problem import Equilibrium, Problem
     from cfmkit.numerics.continuation.steps import Trial
 
@@ -47,7 +47,8 @@ def follow(
     Parameters
     ----------
     problem : Problem
-        The structure.
+        The structure. If it has a method `march` (of a `Walk`, to a `March`) it takes steps by itself where nothing
+        happens, in compiled code, say.
     start : Equilibrium
         Where the path begins.
     targets : (k,) array
@@ -84,7 +85,12 @@ def _items(
     if options.through_folds and not walk.done:
         yield from follow_through_folds(walk)
         return
+    march = getattr(problem, "march", None)
     while not walk.done:
+        if march is not None and walk.rejections == 0:
+            walk = yield from _march(walk, march)
+            if walk.done:
+                break
         outcome = yield from _step(walk)
         if isinstance(outcome, Ending):
             yield outcome
@@ -92,6 +98,15 @@ def _items(
         assert outcome is not None
         walk = outcome
     yield Ending(End.COMPLETE, walk.here.drive)
+
+
+def _march(walk: Walk, march: Callable[[Walk], March]) -> Generator[Point, None, Walk]:
+    """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
+    marched = march(walk)
+    for at, reached in marched.states:
+        yield Point(at, walk.number if reached else -1, walk.branch)
+        walk = walk.move(at, int(reached))
+    return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 
 def _step(walk: Walk) -> Items:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from cfmkit.numerics.continuation.problem import largest_motion
 
@@ -69,6 +69,14 @@ class Ending:
     end: End
     drive: float
     message: str = ""
+
+
+class March(NamedTuple):
+    """Equilibria that a problem's own steps came to, by the same rules as `steps.advance`."""
+
+    states: tuple[tuple[Equilibrium, bool], ...]  # with whether the next requested value is reached
+    step: float  # with which to go on
+    stuck: bool  # whether steps failed, and not because something happens
 
 
 @dataclass(frozen=True, eq=False)

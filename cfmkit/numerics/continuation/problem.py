@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -64,6 +65,7 @@ class Equilibrium:
     drive: float
     rate: FloatArray  # (n,) dx/d(drive)
     unstable: int
+    effort: float = math.nan  # what works with the drive, if the problem says so
 
 
 class Border(NamedTuple):
