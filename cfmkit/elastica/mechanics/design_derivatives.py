@@ -77,8 +77,9 @@ def _by_attachments(network: Discretisation, z: Any, first: Any, last: Any) -> d
     """Return the derivatives by origin, arm and frame, from the forces on both ends of every element."""
     a, ends = network.attachments, network.elements.ends
     force = np.zeros((*z.shape[:-1], *a.arm.shape), z.dtype)
-    np.add.at(force, (..., ends[:, 0], slice(None)), -first)
-    np.add.at(force, (..., ends[:, 1], slice(None)), last)
+    by_place = np.moveaxis(force, -2, 0)  # a view
+    np.add.at(by_place, ends[:, 0], np.moveaxis(-first, -2, 0))
+    np.add.at(by_place, ends[:, 1], np.moveaxis(last, -2, 0))
     x, y, turn = (z[..., a.unknowns[:, k]] for k in range(3))
     cos, sin, fx, fy = np.cos(turn), np.sin(turn), force[..., 0], force[..., 1]
     arm = np.stack([cos * fx + sin * fy, cos * fy - sin * fx], axis=-1)

@@ -7,7 +7,8 @@ one by one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
 
 
-class Designs(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Designs:
     """Arrays of d networks of one topology; real, or with a complex step each.
 
     `tables` are those of `Elements`, `places` origin, arm and frame of `Attachments`, all with the designs as first
@@ -94,7 +96,7 @@ def _plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Seque
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
     offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
-    node, master, beam_end = _whose(template, origin, names)
+    node, master = _whose(origin, names)
     arm = spots[:, node] - spots[:, master]
     ends = template.elements.ends
     arm[:, ends] += offsets[:, np.arange(len(ends))]
@@ -121,8 +123,8 @@ def _plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Seque
     return Designs(template, len(pairs), tables, places, base, (), tuple(pairs))
 
 
-def _whose(template: Discretisation, origin: tuple[Network, Drive], names: list[str]) -> tuple[Any, Any, Any]:
-    """Return which node each attachment is at, which moves it, and the attachments of beams, in their order."""
+def _whose(origin: tuple[Network, Drive], names: list[str]) -> tuple[Any, Any]:
+    """Return which node each attachment is at and which moves it, in the order of `discretise`."""
     network, drive = origin
     at = [name for beam in network.beams.values() for name in (beam.start, beam.end)]
     for spring in network.springs:
@@ -131,7 +133,7 @@ def _whose(template: Discretisation, origin: tuple[Network, Drive], names: list[
     at += names
     number = {name: k for k, name in enumerate(names)}
     node = np.array([number[name] for name in at])
-    return node, np.array([number[network.master_of(name)] for name in at]), template.elements.ends
+    return node, np.array([number[network.master_of(name)] for name in at])
 
 
 def _coefficients(beams: list[list[Any]]) -> Any:
@@ -200,4 +202,3 @@ def _supports(
     frames = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     real = not (frames.imag.any() or base.imag.any())
     return (frames.real, base.real) if real else (frames, base)
-

@@ -337,7 +337,11 @@ class _Builder:
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
         displaced = [value for node in self.network.nodes.values() for value in node.support.displacement]
-        held, base, rate = np.zeros(size, bool), np.zeros(size, np.result_type(float, np.asarray(displaced))), np.zeros(size)
+        held, base, rate = (
+            np.zeros(size, bool),
+            np.zeros(size, np.result_type(float, np.asarray(displaced))),
+            np.zeros(size),
+        )
         for name, body in self.bodies.items():
             support = self.network.nodes[name].support
             flags = support.along, support.across, support.rotation
