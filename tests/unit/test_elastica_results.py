@@ -18,9 +18,9 @@ from cfmkit.elastica import (
     Network,
     Node,
     PointLoad,
+    Polynomial,
     Rotation,
     Section,
-    arc,
     guided,
     trace,
 )
@@ -83,11 +83,11 @@ def test_sections_of_a_cantilever_are_those_of_statics() -> None:
 
 
 def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() -> None:
-    """An arch that is pressed, with a pin at each end: most bent inside, wherever it is cut."""
+    """An arch that is pressed, pinned at both ends: most bent inside, wherever it is cut."""
     nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0.2 * LENGTH, guided(0.0))}
     found = []
     for pieces in (1, 3):
-        beam = Beam("a", "b", STRIP, arc(0.6), start_joint="pin", end_joint="pin")
+        beam = Beam("a", "b", STRIP, Polynomial((0.0, 1.0, -0.7)), start_joint="pin", end_joint="pin")
         path = functional_path(
             Network(nodes, {"x": beam}), Displacement("b", np.pi, np.array([0.1 * LENGTH])), 16, pieces
         )
@@ -95,7 +95,7 @@ def test_the_largest_stress_inside_a_beam_is_found_between_its_sampled_places() 
     (value, place, seen), (again, same, _) = found
     assert again == pytest.approx(value, rel=1e-8)
     assert same == pytest.approx(place, abs=1e-6)
-    assert value >= seen.stress().max()
+    assert value > seen.stress().max() * (1 + 1e-6)
     assert 0.05 < place < 0.95
 
 

@@ -170,8 +170,8 @@ class NumpyEquations:
         ----------
         free, way : (n,) array, float
             First guess.
-        border : (n + 1,) array, optional
-            What is held instead of the way.
+        border, level : (n + 1,) array, float, optional
+            What is held instead of the way, and where.
         push : (n,) array, optional
             Added force.
         tolerance : float

@@ -294,6 +294,3 @@ def _load(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, 
     unit = scales.drive if attached.grows else 1.0
     values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
     return (attached.places[0], int(attached.grows), int(item.follows)), values
-
-
-__all__ = ["CompiledEquations", "compiled", "engine", "equations", "march_many"]
