@@ -338,7 +338,12 @@ class _ArrayBuilder:
         self, size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
-        held, base, rate = np.zeros(size, bool), np.zeros(size), np.zeros(size)
+        displaced = [value for node in self.network.nodes.values() for value in node.support.displacement]
+        held, base, rate = (
+            np.zeros(size, bool),
+            np.zeros(size, np.result_type(float, np.asarray(displaced))),
+            np.zeros(size),
+        )
         for name, body in self.bodies.items():
             support = self.network.nodes[name].support
             flags = support.along, support.across, support.rotation

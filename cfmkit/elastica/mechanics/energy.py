@@ -27,7 +27,7 @@ REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of 
 
 
 class Fields(NamedTuple):
-    """What is known at the Gauss points of the elements, (e, q) each."""
+    """What is known at the Gauss points of the elements, (..., e, q) each."""
 
     curvature: Any  # phi' by the element's parameter
     cos: Any
@@ -39,11 +39,11 @@ class Fields(NamedTuple):
 
 
 def fields(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
-    """Return rotations and section forces at the Gauss points."""
+    """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
     e, rule = network.elements, basis(network.degree)
-    own = z[e.unknowns]
-    rotation = own[:, rotation_columns(network.degree)]
-    force = own[:, None, -2:] + line_load(network, drive, share)[:, None, :] * e.ahead[:, :, None]
+    own = z[..., e.unknowns]
+    rotation = own[..., rotation_columns(network.degree)]
+    force = own[..., None, -2:] + line_load(network, drive, share)[..., None, :] * e.ahead[..., None]
     turn = e.angle + rotation @ rule.values.T
     cos, sin = np.cos(turn), np.sin(turn)
     normal = force[..., 0] * cos + force[..., 1] * sin
@@ -60,8 +60,8 @@ def rotation_columns(degree: int) -> Any:
 
 
 def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
-    """Return the line load on the elements, (e, 2)."""
-    return share * network.elements.line[:, 0] + drive * network.elements.line[:, 1]
+    """Return the line load on the elements, (..., e, 2), at one drive or several (n,)."""
+    return share * network.elements.line[:, 0] + np.asarray(drive)[..., None, None] * network.elements.line[:, 1]
 
 
 def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:

@@ -126,6 +126,15 @@ class NumpyEquations:
         drive, share = self.factors(way)
         return energy.gradient(self.network, energy.values(self.network, free, drive, share), drive, share)
 
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        return energy.gradient(self.network, z, drive, share), energy.hessian(self.network, z, drive, share)
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size); what is constant is all there."""
+        each = [energy.gradient(self.network, *pair) for pair in zip(z, drive, strict=True)]
+        return np.array(each).reshape(z.shape)
+
     def linearise(self, free: FloatArray, way: float) -> Linearised:
         """Return the equations linearised at some unknowns."""
         drive, share = self.factors(way)
@@ -161,8 +170,8 @@ class NumpyEquations:
         ----------
         free, way : (n,) array, float
             First guess.
-        border : (n + 1,) array, optional
-            What is held instead of the way.
+        border, level : (n + 1,) array, float, optional
+            What is held instead of the way, and where.
         push : (n,) array, optional
             Added force.
         tolerance : float

@@ -86,20 +86,26 @@ static Int unstable_of(const Model *m, const Factors *f) {
     return m->follows ? f->negative : f->negative - 2 * m->elements;
 }
 
-void evaluate(const Model *m, const double *z, double drive, double share, double *gradient, double *hessian) {
-    const Stage at = {drive, share, 0.0, 0.0};
+/* Gradients (count, size) at states (count, size), with Hessians (count, size, size) unless that is NULL. */
+int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian) {
     Term *t = malloc(sizeof(Term));
-    if (!t) return;
-    memset(gradient, 0, (size_t)m->size * sizeof(double));
-    memset(hessian, 0, (size_t)(m->size * m->size) * sizeof(double));
-    for (Int k = 0; k < terms(m); k++) {
-        term(m, k, z, at, 1, t);
-        for (Int i = 0; i < t->count; i++) {
-            gradient[t->at[i]] += t->gradient[i];
-            for (Int j = 0; j < t->count; j++) hessian[t->at[i] * m->size + t->at[j]] += t->hessian[i * t->count + j];
+    if (!t) return DIVERGED;
+    memset(gradient, 0, (size_t)(count * m->size) * sizeof(double));
+    if (hessian) memset(hessian, 0, (size_t)(count * m->size * m->size) * sizeof(double));
+    for (Int p = 0; p < count; p++, z += m->size, gradient += m->size) {
+        const Stage at = {drive[p], share, 0.0, 0.0};
+        for (Int k = 0; k < terms(m); k++) {
+            term(m, k, z, at, hessian != NULL, t);
+            for (Int i = 0; i < t->count; i++) {
+                gradient[t->at[i]] += t->gradient[i];
+                if (!hessian) continue;
+                double *row = hessian + (p * m->size + t->at[i]) * m->size;
+                for (Int j = 0; j < t->count; j++) row[t->at[j]] += t->hessian[i * t->count + j];
+            }
         }
     }
     free(t);
+    return CONVERGED;
 }
 
 /* Residual, tangent (n, n) and change of the residual on the way, of the free unknowns. */

@@ -68,7 +68,7 @@ void factors_solve(const Factors *f, int unsymmetric, double *x);
 typedef struct Work Work;
 Work *work_open(const Model *m);
 void work_close(Work *w);
-void evaluate(const Model *m, const double *z, double drive, double share, double *gradient, double *hessian);
+int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian);
 int linearise(const Model *m, const double *x, double way, double *residual, double *tangent, double *change);
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,

@@ -101,10 +101,18 @@ class CompiledEquations(NumpyEquations):
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
-        size = self.network.size
-        out = np.empty(size), np.empty((size, size))
-        compiled().evaluate(self.row, np.ascontiguousarray(z, float), *out, drive, share)
-        return out
+        gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
+        compiled().evaluate(
+            self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share
+        )
+        return gradient, hessian
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size)."""
+        found = np.empty(z.shape)
+        given = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
+        compiled().evaluate(self.row, *given, found, np.empty(0), 1.0)
+        return found
 
     def linearise(self, free: FloatArray, way: float) -> Linearised:
         """Return the equations linearised at some unknowns."""
@@ -286,6 +294,3 @@ def _load(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, 
     unit = scales.drive if attached.grows else 1.0
     values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
     return (attached.places[0], int(attached.grows), int(item.follows)), values
-
-
-__all__ = ["CompiledEquations", "compiled", "engine", "equations", "march_many"]

@@ -36,17 +36,19 @@ static int number(PyObject *arguments, Py_ssize_t k, double *value) {
     return !(*value == -1.0 && PyErr_Occurred());
 }
 
-/* evaluate(model, z, gradient, hessian, drive, share) */
+/* evaluate(model, z, drives, gradients, hessians, share) -> code */
 static PyObject *py_evaluate(PyObject *self, PyObject *arguments) {
     Buffers b;
-    double drive, share;
+    double share;
+    int code;
     (void)self;
-    if (!number(arguments, 4, &drive) || !number(arguments, 5, &share) || !take(arguments, 0, 4, &b)) return NULL;
+    if (!number(arguments, 5, &share) || !take(arguments, 0, 5, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
-    evaluate(at(&b, 0), at(&b, 1), drive, share, at(&b, 2), at(&b, 3));
+    const Int count = b.view[2].len / (Int)sizeof(double);
+    code = evaluate(at(&b, 0), at(&b, 1), at(&b, 2), share, count, at(&b, 3), at(&b, 4));
     Py_END_ALLOW_THREADS
     release(&b);
-    Py_RETURN_NONE;
+    return PyLong_FromLong(code);
 }
 
 /* linearise(model, x, residual, tangent, change, way) -> code */
