@@ -13,7 +13,7 @@ from cfmkit.elastica.mechanics.equations import MarchCode, Plan, State
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
-from cfmkit.numerics.continuation.path import PRIMARY, March
+from cfmkit.numerics.continuation.path import March
 from cfmkit.numerics.continuation.problem import Equilibrium
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ class NetworkProblem:
 
     network: Discretisation
     ramp: bool = False
+    next_correction: float = 1e-10
+    """Size of the next of Newton's corrections, as the square of the last, at which a march accepts an equilibrium."""
 
     @cached_property
     def motions(self) -> Any:
@@ -77,7 +79,7 @@ class NetworkProblem:
         here, before, options = (_state(walk.here), walk.before, walk.options)
         plan = Plan(
             walk.step, options.span, _state(before) if before is not None else None, options.largest_motion,
-            on_branch=walk.branch != PRIMARY, room=options.most_points + len(walk.targets),
+            tolerance=self.next_correction, on_branch=walk.branch is not None, room=options.most_points + len(walk.targets),
         )  # fmt: skip
         marched = self.equations.march(here, walk.targets[walk.number :], plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)

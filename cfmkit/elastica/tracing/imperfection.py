@@ -15,7 +15,6 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.effort import effort
 from cfmkit.elastica.mechanics.polynomials import integrals, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.drive import Displacement
@@ -70,9 +69,10 @@ def _where(drive: Drive, buckling: Buckling) -> str:
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
     place = event.drive * problem.network.scales.drive
-    assert event.near is not None
-    if problem.network.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
-        force = effort(problem.network, problem.values(event.near.x, event.near.drive), event.near.drive)
+    network, near = problem.network, event.near
+    if near is not None and network.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
+        residual = energy.gradient(network, problem.values(near.x, near.drive), near.drive)
+        force = float(residual @ network.rate) * network.scales.moment / network.scales.drive
         return f"under {abs(force):.4g} {'N' if isinstance(drive, Displacement) else 'N m'}"
     return f"at {place:.6g}"
 

@@ -13,7 +13,7 @@ from cfmkit.elastica.outcome.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import End, Ending, Options, Point
+from cfmkit.numerics.continuation.path import Branch, End, Ending, Options, Point
 from cfmkit.numerics.continuation.path import Event as FoundEvent
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import Equilibrium
 
 FIRST_SHARE = 0.5  # of what is constant, in the first step
+LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
+"""Next correction at which a march accepts an equilibrium: at most, and as a share of the path's tolerance."""
 FREE = "free_length", "free_angle", "free_displacement"
 FLOOR_SHARE = 0.01
 """Part of the flexibility along a straight beam that its floor may bear: where it bears less, it is taken away."""
@@ -36,6 +38,7 @@ class Start(NamedTuple):
     problem: NetworkProblem  # along the drive
     at: Equilibrium | None  # None: nothing to begin at
     events: tuple[Event, ...]  # on the way; drives are shares of what is applied
+    branch: Branch | None  # on which that is
     first: Buckling | None  # on the way
     stopped: tuple[str, Ending] | None  # what could not be applied, and how the way to it ended
 
@@ -46,30 +49,33 @@ def find_start(network: Discretisation, control: Control) -> Start:
     Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
     applied: of several stable states it is the one to which this way leads.
     """
-    problem = NetworkProblem(network)
+    problem = NetworkProblem(network, next_correction=min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance))
     events: list[Event] = []
+    branch: Branch | None = None
     first: Buckling | None = None
     at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
     if at is None:
-        return Start(problem, None, (), None, None)
+        return Start(problem, None, (), None, None, None)
     for what, ramp in _ramps(network):
         options = Options(
             1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
         )
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
-            return Start(problem, None, tuple(events), first, (what, Ending(End.LOST, 0.0)))
-        for item in follow(ramp, begin, np.ones(1), options):
+            return Start(problem, None, tuple(events), branch, first, (what, Ending(End.LOST, 0.0)))
+        for item in follow(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, FoundEvent):
                 events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
                 if first is None and item.modes is not None:
                     first = Buckling(ramp, item, what)
             elif isinstance(item, Point):
-                at = item.at
+                at, branch = item.at, item.branch
             elif item.end is not End.COMPLETE:
-                return Start(problem, None, tuple(events), first, (what, item))
+                return Start(problem, None, tuple(events), branch, first, (what, item))
+        if branch is not None and not branch.label:
+            branch = branch._replace(label=what)
     at = correct(problem, at.x, 0.0)
-    return Start(*(_remove_floors(problem, at) if at else (problem, None)), tuple(events), first, None)
+    return Start(*(_remove_floors(problem, at) if at else (problem, None)), tuple(events), branch, first, None)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:

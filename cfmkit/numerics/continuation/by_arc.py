@@ -12,7 +12,7 @@ from cfmkit.numerics.continuation.branch_ends import find_joined_path
 from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
-from cfmkit.numerics.continuation.path import PRIMARY, End, Ending, Point, Walk
+from cfmkit.numerics.continuation.path import End, Ending, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _end_at_fold(
         return Ending(End.LOST, fold.drive, "the end of a branch")
     beyond, event = joined
     yield event
-    walk = replace(walk, branch=PRIMARY)
+    walk = replace(walk, branch=None)
     if walk.done:
         return walk
     for number in walk.targets_up_to(beyond.drive):

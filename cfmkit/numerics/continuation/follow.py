@@ -12,7 +12,7 @@ from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.folds import follow_through_folds
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_unstable
-from cfmkit.numerics.continuation.path import PRIMARY, End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.path import March, Options
+    from cfmkit.numerics.continuation.path import Branch, March, Options
     from cfmkit.numerics.continuation.problem import Equilibrium, Problem
     from cfmkit.numerics.continuation.steps import Trial
 
@@ -40,7 +40,7 @@ LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
 
 
 def follow(
-    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options
+    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options, branch: Branch | None = None
 ) -> Iterator[Point | Event | Ending]:
     """Yield the points and events of a path in order, and its ending at last.
 
@@ -55,6 +55,8 @@ def follow(
         Values of the drive to be reached in order; they may turn back.
     options : Options
         Range of the drive, branches, steps.
+    branch : Branch, optional
+        On which the path begins.
 
     Yields
     ------
@@ -62,7 +64,7 @@ def follow(
         Points at requested values and between them. A path that ends early ends with an `Ending` that says why.
     """
     between = 0
-    for item in _items(problem, start, targets, options):
+    for item in _items(problem, start, targets, options, branch):
         yield item
         between += isinstance(item, Point) and item.target < 0
         if between > options.most_points:
@@ -71,11 +73,13 @@ def follow(
 
 
 def _items(
-    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options
+    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options, branch: Branch | None
 ) -> Iterator[Point | Event | Ending]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
-    yield Point(start, at_first - 1)
-    walk = Walk(problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,))
+    yield Point(start, at_first - 1, branch)
+    walk = Walk(
+        problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,), branch=branch
+    )
     if start.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
@@ -156,13 +160,13 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         lost = new.unstable - here.unstable
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
         yield Event("bifurcation", drive, here.unstable, new.unstable, near, modes)
-    elif walk.branch != PRIMARY:
+    elif walk.branch is not None:
         end = find_passed_end(walk, new)
         if end == "unsure":
             return replace(walk.shorten(0.5 * step), before=None)
         if end is not None:
             yield end
-            walk = replace(walk, branch=PRIMARY)
+            walk = replace(walk, branch=None)
             walk = replace(walk.move(new, int(lands)), before=None)
             yield Point(new, walk.number - 1 if lands else -1, walk.branch)
             return replace(walk, step=_next_step(walk, trial.misfit, step, lands))

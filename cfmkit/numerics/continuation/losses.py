@@ -16,7 +16,7 @@ from cfmkit.numerics.continuation.branches import (
 )
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.path import Branch, End, Ending, Event, Point, Walk
 from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -117,16 +117,15 @@ def _reach_bifurcation(walk: Walk, found: Located, far: Equilibrium, slope: Floa
 
 def _begin_branch(walk: Walk, found: Located, onto: Equilibrium, after: int) -> Generator[Point, None, Walk]:
     """Yield the first points of a branch; return the walk on it."""
-    branches = walk.branches + 1
-    name = f"bifurcated {branches} at {found.drive:.17g}, sign {walk.options.sign:+d}"
+    branch = Branch(found.drive, walk.options.sign)
     for number in walk.targets_up_to(onto.drive) if not walk.done else ():
         goal = float(walk.targets[number])
-        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, name)
+        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)
         walk = replace(walk, number=number + 1)
-    yield Point(onto, -1, name)
+    yield Point(onto, -1, branch)
     modes = after - walk.here.unstable
     walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
-    return replace(walk, branch=name, branches=branches, modes=modes)
+    return replace(walk, branch=branch, modes=modes)
 
 
 def look_past(walk: Walk, goal: float) -> Items:

@@ -12,7 +12,13 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.problem import Equilibrium, Problem
 
-PRIMARY = "primary"  # branch that a path from rest is on until it leaves it
+
+class Branch(NamedTuple):
+    """The branch that a path has been on since a bifurcation."""
+
+    drive: float  # at the bifurcation
+    sign: int
+    label: str = ""  # of what is followed, if it is not the drive of the path proper
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class Point:
 
     at: Equilibrium
     target: int = -1  # number of the requested value that it is at
-    branch: str = PRIMARY
+    branch: Branch | None = None  # None: the path from rest, not left so far
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +97,7 @@ class Walk:
     number: int = 0  # of the next requested value
     before: Equilibrium | None = None  # on the same smooth piece, for the predictor
     trail: tuple[Equilibrium, ...] = ()  # this smooth piece
-    branch: str = PRIMARY
-    branches: int = 0  # entered so far
+    branch: Branch | None = None
     modes: int = 1  # critical where this branch began
     rejections: int = 0  # two for each, less one for each accepted step
     searched: Equilibrium | None = None  # from where it was looked for a bifurcation ahead
