@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import Border
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
+ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
 NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
 
@@ -76,12 +77,12 @@ class NetworkProblem:
 
     def march(self, walk: Walk) -> March:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
-        here, before, options = (_state(walk.here), walk.before, walk.options)
+        here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
         plan = Plan(
-            walk.step, options.span, _state(before) if before is not None else None, options.largest_motion,
-            tolerance=self.next_correction, on_branch=walk.branch is not None, room=options.most_points + len(walk.targets),
+            walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
+            self.next_correction, on_branch=walk.branch is not None, room=2 * len(left) + ROOM,
         )  # fmt: skip
-        marched = self.equations.march(here, walk.targets[walk.number :], plan)
+        marched = self.equations.march(here, left, plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
         return March(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
 

@@ -26,11 +26,11 @@ BESIDE_EVENT = 5e-3  # share of the range around an event within which everythin
 SAFETY = 1.5
 ROUNDING = 1e-13
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
-NO_EFFORT, NO_MOTION = 1e-12, 1e-6  # efforts and motions that are none, dimensionless
+NO_EFFORT, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
 
 
 def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
-    """Return the estimated errors of efforts and motions of nodes at points, relative to the largest of the path.
+    """Return the estimated errors of efforts, reactions and motions of nodes at points, relative to the largest ones.
 
     `finer` is the path's network with a degree that is `DEGREES_MORE` higher. Infinite where it has no equilibrium
     nearby, or one of another stability.
@@ -53,11 +53,15 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
         else:
             states[row, finer.free] = near.x
     at = Equilibria(finer, states, path.at.drive[list(indices)])
-    efforts: Any = np.abs(replace(path, at=at).effort - path.effort[list(indices)])
+    fine = replace(path, at=at)
+    efforts: Any = np.abs(fine.effort - path.effort[list(indices)])
+    forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
     size = max(float(np.abs(path.effort).max()), NO_EFFORT * scales.moment / scales.drive)
     reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), NO_MOTION)
-    return np.where(known, SAFETY * np.maximum(efforts / size, moves / reach) + ROUNDING, np.inf)
+    load = max(float(np.abs(path.residual[:, :n_bodies]).max()), NO_EFFORT)
+    relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
+    return np.where(known, SAFETY * relative + ROUNDING, np.inf)
 
 
 def pick_points(path: Path) -> list[int]:
