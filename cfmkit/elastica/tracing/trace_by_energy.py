@@ -37,6 +37,7 @@ MAX_ROUNDS = 6
 FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four at once
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
+MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam that is not cut: it locks
 WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_END = 1e-3  # share of the range within which two paths end alike
@@ -275,4 +276,4 @@ def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     for beam, value, length, (left, right) in zip(e.beam, tautness, e.length, e.cuts, strict=True):
         if value > TAUT and right - left > WHOLE:
             found[beam] = max(found.get(beam, 0.0), float(value / length * whole[beam]))
-    return {beam: value for beam, value in found.items() if value > MORE_TENSION * known.get(beam, 0.0)}
+    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value < MAX_TENSION}
