@@ -11,8 +11,8 @@ from varied_networks import LAN, X, arms, lan, pushed, turned
 
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import design_of, effort_slopes, unknown_slopes
-from cfmkit.elastica.mechanics.designs import Designs, set_up
+from cfmkit.elastica.mechanics.design_derivatives import effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.designs import Designs, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +28,13 @@ from cfmkit.elastica import (
     Polynomial,
     Rotation,
     Section,
+    SlideSpring,
+    Taper,
     arc,
     guided,
 )
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import Designs, set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, NumpyEquations, Plan, begin
 from cfmkit.elastica.mechanics.march import SWITCH, CompiledEquations, compiled, engine, equations, march_many
@@ -210,48 +214,62 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     assert 0.5 * critical < march.states[-1].way * 0.1 < critical
 
 
-def leaf(thickness: float) -> Discretisation:
+TARGETS = np.linspace(0, 5e-3, 11)[1:]
+
+
+def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
+    thick = Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
     nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.03, guided(0.0, rotates=False))}
-    net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thickness), Polynomial((0.0, 1.0, -0.8)))})
-    return discretise(net, Displacement("b", np.pi, np.linspace(0, 5e-3, 11)[1:]), 8)
+    net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thick), Polynomial((0.0, 1.0, -0.8)))})
+    return net, Displacement("b", np.pi, TARGETS)
 
 
-def test_a_batch_has_the_efforts_of_single_marches() -> None:
-    networks = [leaf(thickness) for thickness in np.linspace(0.5e-3, 1e-3, 4)]
-    targets = np.linspace(0, 5e-3, 11)[1:]
-    efforts, codes = march_many(networks, targets)
+def leaves(count: int, taper: bool = False) -> Designs:
+    pairs = [leaf(thickness, taper) for thickness in np.linspace(0.5e-3, 1e-3, count)]
+    return set_up(discretise(*pairs[0], 8), pairs[0], pairs)
+
+
+@pytest.mark.parametrize("taper", [False, True])
+def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
+    """Of beams that are set up together, and one by one."""
+    efforts, codes = march_many(leaves(4, taper), TARGETS)
     assert (codes == MarchCode.DONE).all()
-    for network, row in zip(networks, efforts, strict=True):
-        own = NumpyEquations(network)
-        goals = targets / network.scales.drive
+    for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
+        own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
+        goals = TARGETS / own.network.scales.drive
         march = own.march(begin(own), goals, Plan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
         assert row == pytest.approx(known, rel=1e-7)
 
 
+def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
+    net, drive = leaf(1e-3)
+    pairs = [(replace(net, springs=(SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
+    efforts, _ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
+    assert np.abs(efforts[1] - efforts[0]) == pytest.approx(490.0 * TARGETS, rel=1e-9)
+
+
 @needs_c
 def test_several_threads_march_at_once() -> None:
-    networks, targets = [leaf(thickness) for thickness in np.linspace(0.5e-3, 1e-3, 8)], np.linspace(0, 5e-3, 11)[1:]
-    found: dict[int, Any] = {}
-    threads = [
-        threading.Thread(target=lambda k=k: found.update({k: march_many(networks[k::2], targets)[0]})) for k in (0, 1)
-    ]
+    designs, found = leaves(8), {}
+    threads = [threading.Thread(target=lambda k=k: found.update({k: march_many(designs, TARGETS)[0]})) for k in (0, 1)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    together = march_many(networks, targets)[0]
-    assert (found[0] == together[::2]).all()
-    assert (found[1] == together[1::2]).all()
+    together = march_many(designs, TARGETS)[0]
+    assert (found[0] == together).all()
+    assert (found[1] == together).all()
 
 
 def test_numpy_takes_over_without_the_compiled_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled_efforts = march_many(leaves(2), TARGETS)[0]
     monkeypatch.setenv(SWITCH, "1")
     assert engine() == "numpy"
-    assert type(equations(leaf(1e-3))) is NumpyEquations
-    efforts, codes = march_many([leaf(1e-3)], np.array([1e-3]))
-    assert codes[0] == MarchCode.DONE
-    assert efforts[0, 0] > 0
+    assert type(equations(discretise(*leaf(1e-3), 8))) is NumpyEquations
+    efforts, codes = march_many(leaves(2), TARGETS)
+    assert (codes == MarchCode.DONE).all()
+    assert efforts == pytest.approx(compiled_efforts, rel=1e-9)
 
 
 @pytest.mark.slow

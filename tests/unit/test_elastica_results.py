@@ -24,7 +24,9 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
+from cfmkit.elastica.outcome import between_points as today
 from cfmkit.elastica.outcome import crosswise_stiffness
+from cfmkit.elastica.results.between_points import between_loads, between_points
 from cfmkit.elastica.results.cross_stiffness import cross_stiffness, poles
 from cfmkit.errors import InputError
 
@@ -125,3 +127,37 @@ def test_a_node_that_a_link_moves_has_no_reaction() -> None:
     path = functional_path(net, beam_networks.drives(net, 3)[3], 8)
     with pytest.raises(InputError, match="moved by a link"):
         path.reaction("bb")
+
+
+def arch(points: int, load: bool = False) -> tuple[Network, Displacement | Loading]:
+    """An arch that is pressed flat: its force has a largest and a smallest value on the way."""
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0.02, guided(np.pi / 2, rotates=False))}
+    net = Network(nodes, {"x": Beam("a", "b", STRIP, Polynomial((0.0, 0.9, -0.4)))})
+    if load:
+        return net, Loading((PointLoad("b", fy=1.0),), np.linspace(0, 1.5, points)[1:])
+    return net, Displacement("b", -np.pi / 2, np.linspace(0, 0.04, points)[1:])
+
+
+def test_between_its_points_a_path_is_that_of_the_shooting_engine() -> None:
+    net, drive = arch(14)
+    old = today.between_points(trace(net, drive, Control(tolerance=1e-9)), allowed=6e6)
+    new = between_points(functional_path(net, drive, 14), allowed=6e6)
+    assert old is not None
+    assert new is not None
+    places = np.linspace(0.01, 0.039, 20)  # at the start, which the old path has a point at, cubics differ
+    assert_near(new.effort("", places), old.effort("", places), 1e-7)
+    assert_near(new.stress("", places), old.stress("", places), 1e-5)
+    assert new.largest_stress("", 0.01, 0.037) == pytest.approx(old.largest_stress("", 0.01, 0.037), rel=1e-6)
+    assert_near(np.array(new.peaks), np.array(old.peaks), 1e-6)
+
+
+def test_between_its_points_a_path_under_a_load_is_that_of_the_shooting_engine() -> None:
+    net, drive = arch(12, load=True)
+    old = today.between_loads(trace(net, drive, Control(tolerance=1e-9)), "b", np.pi / 2)
+    new = between_loads(functional_path(net, drive, 14), "b", np.pi / 2)
+    assert old is not None
+    assert new is not None
+    low, high = new.places[[0, -1]]
+    places = np.linspace(max(low, old.places[0]), min(high, old.places[-1]), 13)[4:-1]
+    assert_near(new.effort("", places), old.effort("", places), 1e-7)
+    assert_near(new.stress("", places), old.stress("", places), 1e-5)

@@ -17,12 +17,13 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
@@ -158,17 +159,6 @@ def _changed_terms(designs: Designs) -> list[list[tuple[Discretisation, Attached
                 own.append((network, attached))
         found.append(own)
     return found
-
-
-def design_of(designs: Designs, number: int) -> Discretisation:
-    """Return the arrays of one design as a `Discretisation`."""
-    if designs.each:
-        return designs.each[number]
-    template = designs.template
-    elements = template.elements._replace(**{name: table[number] for name, table in designs.tables.items()})
-    attachments = template.attachments._replace(**{name: place[number] for name, place in designs.places.items()})
-    base = template.base if designs.base is None else designs.base[number]
-    return replace(template, elements=elements, attachments=attachments, base=base)
 
 
 def _is_stepped(item: Any) -> bool:

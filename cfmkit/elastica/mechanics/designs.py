@@ -7,7 +7,7 @@ one by one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -202,3 +202,14 @@ def _supports(
     frames = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     real = not (frames.imag.any() or base.imag.any())
     return (frames.real, base.real) if real else (frames, base)
+
+
+def design_of(designs: Designs, number: int) -> Discretisation:
+    """Return the arrays of one design as a `Discretisation`."""
+    if designs.each:
+        return designs.each[number]
+    template = designs.template
+    elements = template.elements._replace(**{name: table[number] for name, table in designs.tables.items()})
+    attachments = template.attachments._replace(**{name: place[number] for name, place in designs.places.items()})
+    base = template.base if designs.base is None else designs.base[number]
+    return replace(template, elements=elements, attachments=attachments, base=base)

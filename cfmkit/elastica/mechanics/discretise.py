@@ -20,6 +20,8 @@ from cfmkit.elastica.model.beam import Fit, fit
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
 from cfmkit.elastica.model.numbering import apart, driven
+from cfmkit.elastica.model.plain_beams_at_once import Bundle
+from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -156,7 +158,7 @@ class _ArrayBuilder:
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = itertools.count()
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.fits = {name: self._fit(beam) for name, beam in network.beams.items()}
+        self.fits = _fits(network)
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -187,11 +189,6 @@ class _ArrayBuilder:
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
-    def _fit(self, beam: Beam) -> Fit:
-        start, end = self.network.nodes[beam.start], self.network.nodes[beam.end]
-        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
-        return fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
-
     def _scales(self) -> MechanicsUnits:
         length = float(np.mean([np.real(fitted.length) for fitted in self.fits.values()]))
         section = next(iter(self.network.beams.values())).section
@@ -282,8 +279,9 @@ class _ArrayBuilder:
 
     def _floor(self, beam: Beam, fitted: Fit) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
-        angles = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5))
-        if beam.section.axial or len(fitted.course.breaks) > 2 or np.ptp(angles + np.zeros(9)) > 0:
+        if beam.section.axial or len(fitted.course.breaks) > 2:
+            return 0.0
+        if np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0:
             return 0.0
         rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
@@ -359,6 +357,21 @@ class _ArrayBuilder:
         return np.flatnonzero(~held), base, rate
 
 
+def _fits(network: Network) -> dict[str, Fit]:
+    """Return how each beam is fitted between its nodes; plain ones are fitted together."""
+    ends = np.array(
+        [
+            (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
+            for beam in network.beams.values()
+            for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
+        ]
+    )
+    bundle = Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
+    reach = ends[1::2] - ends[::2]
+    alone = {bundle.names[k]: fit(bundle.beams[k], reach[k]) for k in bundle.others}
+    return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
+
+
 def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
     """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
     used = np.zeros(size, bool)
@@ -382,10 +395,15 @@ def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
     marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
     marks[0], marks[-1] = 0.0, 1.0
-    count = max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
+    count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
     cuts = [left + (right - left) * k / count for left, right in itertools.pairwise(marks) for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
+
+
+def _turns_little(beam: Beam) -> bool:
+    """Return True if the angle of an unloaded beam is a polynomial that cannot turn by more than an element may."""
+    return isinstance(beam.shape, Polynomial) and sum(abs(c) for c in beam.shape.coefficients[1:]) <= MAX_TURN
 
 
 def _refine_ends(cuts: list[float], tautness: float) -> list[float]:

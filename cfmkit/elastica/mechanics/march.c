@@ -379,18 +379,18 @@ end:
     return code;
 }
 
-/* One path a design, each with its plan and targets: efforts at the targets (designs, count), not a number from where a path does not simply go on. */
-int march_many(const Model *models, Int designs, const Plan *plans, const double *targets, Int count, double *efforts, Int room,
+/* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on. */
+int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts, Int room,
                Int *codes) {
     for (Int d = 0; d < designs; d++) {
         const Model *m = models + d;
         const Int wide = 2 * m->free + 4;
-        Plan own = plans[d];
+        Plan own = *plan;
         Int stored[2];
         double way = 0.0, *x = calloc((size_t)(2 * m->free), sizeof(double)), *rows = malloc((size_t)(room * wide) * sizeof(double));
         for (Int k = 0; k < count; k++) efforts[d * count + k] = NAN;
         if (!x || !rows) { free(x); free(rows); return 0; }
-        codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets + d * count, count, rows, room, stored);
+        codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets, count, rows, room, stored);
         for (Int k = 0; k < stored[0]; k++) {
             const double *row = rows + k * wide, target = row[wide - 1];
             if (target >= 0.0) efforts[d * count + (Int)target] = row[wide - 3];

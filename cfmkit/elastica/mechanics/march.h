@@ -81,7 +81,7 @@ typedef struct {
 
 int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
           Int count, double *rows, Int room, Int *stored);
-int march_many(const Model *models, Int designs, const Plan *plans, const double *targets, Int count, double *efforts,
+int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
                Int room, Int *codes);
 
 #endif

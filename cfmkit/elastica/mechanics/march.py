@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     Linearised,
@@ -28,9 +29,10 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import Designs
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 MAX_DEGREE = 40
@@ -198,45 +200,77 @@ def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
 
 
 def march_many(
-    networks: Sequence[Discretisation], targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+    designs: Designs, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
 ) -> tuple[FloatArray, Any]:
-    """Return the efforts of many networks under a drive by a motion, each followed from rest.
+    """Return the efforts of many designs under a drive by a motion, each followed from rest.
 
     Parameters
     ----------
-    networks : sequence of Discretisation
-        Without constant loads or displaced supports.
+    designs : Designs
+        Real ones, without constant loads or displaced supports.
     targets : (k,) array
         Values of the drive [m or rad].
     first_step : float
         Share of the range of the drive.
+    tolerance : float
+        Of corrections, relative to the largest motion and force.
 
     Returns
     -------
-    efforts : (designs, k) array
+    efforts : (d, k) array
         [N or N m]; not a number from where a path does not simply go on.
-    codes : (designs,) int array
+    codes : (d,) int array
         `MarchCode` of each.
     """
-    each = [equations(network) for network in networks]
-    goals = np.array([targets / one.network.scales.drive for one in each], float).reshape(len(each), -1)
-    spans = np.maximum(goals.max(axis=1), 0.0) - np.minimum(goals.min(axis=1), 0.0)
-    plans = [Plan(first_step * span, span, tolerance=tolerance) for span in spans.tolist()]
-    efforts, codes = np.full(goals.shape, np.nan), np.zeros(len(each), np.int64)
-    rows = [one.row for one in each if isinstance(one, CompiledEquations) and not one.follows]
-    if rows and len(rows) == len(each):
-        given = np.array([_plan_row(plan, 0, True) for plan in plans])
-        if not compiled().march_many(np.array(rows), given, goals, efforts, codes, plans[0].room):
+    own = equations(designs.template)
+    goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
+    span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
+    plan = Plan(first_step * span, span, tolerance=tolerance)
+    efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
+    if isinstance(own, CompiledEquations) and not own.follows:
+        kept = design_arrays(own, designs)
+        given = _plan_row(plan, 0, True)
+        if not compiled().march_many(_rows(own, kept, designs.count), given, goals, efforts, codes, plan.room):
             raise MemoryError
     else:
-        for number, (one, plan, goal) in enumerate(zip(each, plans, goals, strict=True)):
-            start = begin(one)
-            march = March((), MarchCode.NO_START, 0.0) if start is None else one.march(start, goal, plan)
-            codes[number] = march.code
-            for state in march.states:
-                if state.target >= 0:
-                    efforts[number, state.target] = state.effort
-    return efforts * np.array([one.effort_unit for one in each])[:, None], codes
+        for number in range(designs.count):
+            march_one(equations(design_of(designs, number)), goals, plan, efforts[number], codes[number : number + 1])
+    return efforts * own.effort_unit, codes
+
+
+def march_one(own: NumpyEquations, goals: FloatArray, plan: Plan, efforts: FloatArray, code: Any) -> None:
+    """Follow one network from rest; put its efforts at the goals and how it ended into the arrays given."""
+    start = begin(own)
+    march = March((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+    code[0] = march.code
+    for state in march.states:
+        if state.target >= 0:
+            efforts[state.target] = state.effort
+
+
+def design_arrays(own: CompiledEquations, designs: Designs) -> dict[str, Any]:
+    """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
+    rule, tables = basis(own.network.degree), designs.tables
+    found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
+    bend = tables["weight"] * tables["rigidity"]
+    if designs.each:
+        found["bend"] = (rule.slopes.T * bend[:, :, None, :]) @ rule.slopes
+        found["spring"] = np.array([[_spring(one, spring)[1] for spring in one.springs] for one in designs.each])
+        found["load"] = np.array([[_load(one, load)[1] for load in one.loads] for one in designs.each])
+    else:  # the same along an element, but for the weights
+        whole = (rule.slopes.T * rule.weights) @ rule.slopes
+        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None, None] * whole
+    if designs.base is not None:
+        found["base"] = np.ascontiguousarray(designs.base, float)
+    return found
+
+
+def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
+    """Return a `Model` for each design: the template's, with addresses of its own."""
+    rows = np.tile(own.row, (count, 1))
+    for name, array in kept.items():
+        rows[:, len(COUNTS) + ADDRESSES.index(name)] = array.ctypes.data + array.strides[0] * np.arange(count)
+    return rows
 
 
 # -- arrays ------------------------------------------------------------------------------------------------------------

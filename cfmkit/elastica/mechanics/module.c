@@ -113,7 +113,7 @@ static PyObject *py_march(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
-/* march_many(models, plans, targets, efforts, codes, room) -> whether there was memory */
+/* march_many(models, plan, targets, efforts, codes, room) -> whether there was memory */
 static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
     Buffers b;
     double room;
@@ -121,8 +121,8 @@ static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
     (void)self;
     if (!number(arguments, 5, &room) || !take(arguments, 0, 5, &b)) return NULL;
     Py_BEGIN_ALLOW_THREADS
-    const Int designs = b.view[4].len / (Int)sizeof(Int), numbers = b.view[2].len / (Int)sizeof(double);
-    code = !designs || march_many(at(&b, 0), designs, at(&b, 1), at(&b, 2), numbers / designs, at(&b, 3), (Int)room, at(&b, 4));
+    code = march_many(at(&b, 0), b.view[4].len / (Int)sizeof(Int), at(&b, 1), at(&b, 2), b.view[2].len / (Int)sizeof(double),
+                      at(&b, 3), (Int)room, at(&b, 4));
     Py_END_ALLOW_THREADS
     release(&b);
     return PyLong_FromLong(code);
