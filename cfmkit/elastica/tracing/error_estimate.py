@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.refine import embed
@@ -26,7 +27,7 @@ BESIDE_EVENT = 5e-3  # share of the range around an event within which everythin
 SAFETY = 1.5
 ROUNDING = 1e-13
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
-NO_EFFORT, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
+NO_FORCE, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
 
 
 def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
@@ -57,11 +58,19 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     efforts: Any = np.abs(fine.effort - path.effort[list(indices)])
     forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
-    size = max(float(np.abs(path.effort).max()), NO_EFFORT * scales.moment / scales.drive)
+    load = max(_largest_force(path.at), NO_FORCE)
+    size = max(float(np.abs(path.effort).max()), NO_MOTION * load * scales.moment / scales.drive)
     reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), NO_MOTION)
-    load = max(float(np.abs(path.residual[:, :n_bodies]).max()), NO_EFFORT)
     relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+
+
+def _largest_force(at: Equilibria) -> float:
+    """Return the largest force or moment in a beam at any state, dimensionless."""
+    e = at.network.elements
+    fields = energy.fields(at.network, at.z, at.drive)
+    moment = np.abs(e.rigidity * fields.curvature * e.length[:, None]).max(initial=0.0)
+    return float(max(moment, np.abs(fields.normal).max(initial=0.0), np.abs(fields.shear).max(initial=0.0)))
 
 
 def pick_points(path: Path) -> list[int]:
