@@ -26,8 +26,10 @@ MAX_POINTS = 10  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
 ROUNDING = 1e-13
+SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
-NO_FORCE, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
+NO_FORCE, NO_EFFORT = 1e-12, 1e-6  # largest force, and effort as a share of it, that are none; dimensionless
+SMALL_MOTION = 1e-3  # largest motion up to which errors of motions are relative to this
 
 
 def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
@@ -59,10 +61,25 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
     load = max(_largest_force(path.at), NO_FORCE)
-    size = max(float(np.abs(path.effort).max()), NO_MOTION * load * scales.moment / scales.drive)
-    reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), NO_MOTION)
+    size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
+    reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), SMALL_MOTION)
     relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+
+
+def polish(path: Path) -> Path:
+    """Return the path with Newton's method repeated at every point.
+
+    A march leaves it when the next correction would be small if it converged quadratically: beside a bifurcation it
+    does not.
+    """
+    problem, z = NetworkProblem(path.network), path.at.z.copy()
+    free = path.network.free
+    for row, drive in zip(z, path.at.drive, strict=True):
+        near = correct(problem, row[free], float(drive))
+        if near is not None and largest_motion(problem, near.x - row[free]) < SAME_POINT:
+            row[free] = near.x
+    return replace(path, at=replace(path.at, z=z))
 
 
 def _largest_force(at: Equilibria) -> float:

@@ -13,7 +13,7 @@ from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretis
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.outcome.path import Event, PathStatus
 from cfmkit.elastica.results.path import Path
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors
+from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import Start, find_start, is_stretched
 from cfmkit.numerics.continuation.follow import follow
@@ -35,6 +35,7 @@ DEGREE_OF_PIECES = 14  # where beams are cut
 MAX_PIECES = 4
 MAX_ROUNDS = 6
 FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four at once
+NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
 MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam that is not cut: it locks
@@ -126,8 +127,9 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
             mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
             best = attempt
             continue
-        errors = point_errors(path, mesh.finer(path), pick_points(path))
-        path = replace(path, error=float(errors.max(initial=0.0)))
+        path = _with_error(path, mesh)
+        if tolerance < path.error < NEARLY * tolerance:
+            path = _with_error(polish(path), mesh)
         attempt = attempt._replace(path=path)
         if best is None or not path.error > best.path.error:
             best = attempt
@@ -147,6 +149,11 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
             break
     assert best is not None
     return best
+
+
+def _with_error(path: Path, mesh: Mesh) -> Path:
+    errors = point_errors(path, mesh.finer(path), pick_points(path))
+    return replace(path, error=float(errors.max(initial=0.0)))
 
 
 def _end_alike(path: Path, before: Path) -> bool:
