@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
 DEGREES = 5, 14  # with which a path is tried first, by its tolerance
-MORE_FOR_FOLDS = 2  # degrees
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
@@ -115,7 +114,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES)) + MORE_FOR_FOLDS * control.through_folds
+    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
     mesh, best, before = Mesh(degree), None, None
     for count in range(MAX_ROUNDS):
         attempt = trace_on(network, drive, control, mesh)
@@ -246,7 +245,7 @@ def _explain(start: Start, ending: Ending, unit: float) -> tuple[PathStatus, str
         text += "or nothing holds the network, the drive cannot move it, or its springs are prestressed too far"
         return PathStatus.NO_START, text
     status = PathStatus[ending.end.name]
-    text = status.value if ending.end is End.COMPLETE else f"{ending.message} at {ending.drive * unit:.6g}"
+    text = status.value if ending.end is End.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
     return status, text
 
 
