@@ -88,7 +88,10 @@ class NetworkProblem:
 
     # -- modes -----------------------------------------------------------------------------------------------------
     def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces."""
+        """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces.
+
+        Directions that constraints or stiff beams hold are none: their flexibility is rounding.
+        """
         tangent, moves = self.linearise(at.x, at.drive).tangent, np.flatnonzero(self.motions)
         unit = np.zeros((len(tangent), len(moves)))
         unit[moves, np.arange(len(moves))] = 1.0
@@ -105,7 +108,8 @@ class NetworkProblem:
         else:
             inverse, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
         inverse = np.where(inverse == 0, np.finfo(float).tiny, inverse)
-        order = np.argsort(-np.abs(inverse))[:count]
+        flexible = int((np.abs(inverse) > energy.FLEXIBLE_SHARE * np.abs(inverse).max()).sum())
+        order = np.argsort(-np.abs(inverse))[: min(count, flexible)]
         return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
 
     @cached_property

@@ -26,6 +26,7 @@ MAX_POINTS = 10  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
 ROUNDING = 1e-13
+CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
 NO_FORCE, NO_EFFORT = 1e-12, 1e-6  # largest force, and effort as a share of it, that are none; dimensionless
@@ -47,14 +48,12 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     for row, index in enumerate(indices):
         guess, drive = guesses[row, finer.free], float(path.at.drive[index])
         near = correct(problem, guess, drive)
-        if (
-            near is None
-            or largest_motion(problem, near.x - guess) > MAX_CHANGE
-            or near.unstable != path.unstable[index]
-        ):
+        if near is None or largest_motion(problem, near.x - guess) > MAX_CHANGE:
             known[row] = False
-        else:
-            states[row, finer.free] = near.x
+            continue
+        states[row, finer.free] = near.x
+        if near.unstable != path.unstable[index]:
+            known[row] = abs(float(problem.modes(near, 1)[0][0])) < CRITICAL
     at = Equilibria(finer, states, path.at.drive[list(indices)])
     fine = replace(path, at=at)
     efforts: Any = np.abs(fine.effort - path.effort[list(indices)])

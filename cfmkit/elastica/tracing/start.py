@@ -74,8 +74,9 @@ def find_start(network: Discretisation, control: Control) -> Start:
                 return Start(problem, None, tuple(events), branch, first, (what, item))
         if branch is not None and not branch.label:
             branch = branch._replace(label=what)
-    at = correct(problem, at.x, 0.0)
-    return Start(*(_remove_floors(problem, at) if at else (problem, None)), tuple(events), branch, first, None)
+    # just at a bifurcation Newton's method fails where the way there has led
+    at = correct(problem, at.x, 0.0) or replace(at, drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
+    return Start(*_remove_floors(problem, at), tuple(events), branch, first, None)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
@@ -105,7 +106,7 @@ def _loads_as_drive(network: Discretisation) -> Discretisation:
     )  # fmt: skip
 
 
-def _remove_floors(problem: NetworkProblem, at: Equilibrium) -> tuple[NetworkProblem, Equilibrium | None]:
+def _remove_floors(problem: NetworkProblem, at: Equilibrium) -> tuple[NetworkProblem, Equilibrium]:
     """Return the problem without the floors of flexibility that bear nothing, and its equilibrium.
 
     Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.
@@ -128,7 +129,7 @@ def _remove_floors(problem: NetworkProblem, at: Equilibrium) -> tuple[NetworkPro
     if not needless.size:
         return problem, at
     stiff = replace(problem, network=without_floor(network, needless))
-    return stiff, correct(stiff, at.x, at.drive)
+    return stiff, correct(stiff, at.x, at.drive) or at
 
 
 def is_stretched(network: Discretisation, z: np.ndarray) -> bool:

@@ -130,10 +130,10 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
         if tolerance < path.error < NEARLY * tolerance:
             path = _with_error(polish(path), mesh)
         attempt = attempt._replace(path=path)
-        if best is None or not path.error > best.path.error:
+        if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
         settled = _are_settled(path, before, control)
-        if path.error <= tolerance and settled and path.status not in (PathStatus.LOST, PathStatus.NO_START):
+        if path.error <= tolerance and settled and path.status in (PathStatus.COMPLETE, PathStatus.FULL):
             break
         if path.status is PathStatus.NO_START and count >= 2:
             break
@@ -157,8 +157,8 @@ def _with_error(path: Path, mesh: Mesh) -> Path:
 
 def _end_alike(path: Path, before: Path) -> bool:
     """Return True if two paths end early at the same place: no degree leads further."""
-    early = (PathStatus.LIMIT_POINT, PathStatus.JUMPS, PathStatus.LOST)
-    if path.status not in early or not len(path) or not len(before):
+    early = (PathStatus.LIMIT_POINT, PathStatus.JUMPS, PathStatus.LOST, PathStatus.OUTSIDE)
+    if path.status not in early or path.status is not before.status or not len(path) or not len(before):
         return False
     return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _span(path))
 

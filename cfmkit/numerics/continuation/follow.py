@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_unstable
+from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
 from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
@@ -80,7 +80,11 @@ def _items(
     walk = Walk(
         problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,), branch=branch
     )
-    if start.unstable and options.branch != "primary" and not walk.done:
+    beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
+    if beyond is not None:
+        walk = beyond
+        yield Point(walk.here, -1, walk.branch)
+    elif start.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
             yield Ending(End.JUMPS, start.drive, "no stable equilibrium at the start, {place}")

@@ -6,6 +6,9 @@ from collections.abc import Generator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from cfmkit.numerics.continuation.arc import step_along
 from cfmkit.numerics.continuation.branches import (
     AMPLITUDES,
     LAST_AMPLITUDES,
@@ -17,7 +20,7 @@ from cfmkit.numerics.continuation.branches import (
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.path import Branch, End, Ending, Event, Point, Walk
-from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
+from cfmkit.numerics.continuation.problem import Equilibrium, arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
 if TYPE_CHECKING:
@@ -30,11 +33,14 @@ Items = Generator[Point | Event, None, Walk | Ending | None]
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
 NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
 """Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
+NEAR_SHARE = 1e-3  # of the way to the first of them: the other modes of a slender column are not together with it
 ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
 LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
 LOOK_PAST_BY = 2e-3, 2e-2
 """Shares of the range ahead of here and of the goal at which the path may be less stable."""
 LOOK_PAST_MISS = 0.02  # motion
+CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
+FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
@@ -63,13 +69,14 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
         yield from _reach_bifurcation(walk, found, far, slope)
         yield Point(new, -1, walk.branch)
         return Ending(End.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
-    mode = problem.orient(modes)
-    onto = enter_branch(walk, found.x, found.drive, mode, AMPLITUDES)
-    for clusters in NEAR_CLUSTERS, WIDE_CLUSTERS:  # not one mode by itself: all that become unstable soon, together
-        several = None if onto else _pass_together(walk, new, found, slope, clusters)
+    onto, mode = None, problem.orient(modes)
+    for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
+        several = _pass_together(walk, new, found, slope, clusters)
         if several is not None:
             onto, modes, after = several
-        onto = onto or enter_branch(walk, found.x, found.drive, mode, LAST_AMPLITUDES)
+        onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
+        if onto is not None:
+            break
     yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
@@ -92,6 +99,8 @@ def _pass_together(
     for factor in clusters:
         width = factor * walk.options.cluster
         ahead = walk.sense * width * walk.options.span
+        if clusters is NEAR_CLUSTERS:
+            ahead *= min(1.0, NEAR_SHARE * abs(found.drive - walk.trail[0].drive) / abs(ahead))
         saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
         if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
             continue
@@ -149,6 +158,27 @@ def look_past(walk: Walk, goal: float) -> Items:
                 and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
             ):
                 return (yield from lose_stability(replace(walk, here=far), past))
+    return None
+
+
+def start_critical(walk: Walk) -> Walk | None:
+    """Return the walk a little behind a start at which a mode is just critical, or None if none is.
+
+    Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
+    """
+    problem, start = walk.problem, walk.here
+    values, modes = problem.modes(start, 1)
+    if abs(values[0]) > CRITICAL:
+        return None
+    tangent = np.append(problem.orient(modes), 0.0)
+    tangent /= np.sqrt(arc_weights(problem, walk.options.span) @ tangent**2)
+    for halvings in range(MAX_HALVINGS):
+        for sign in (walk.options.sign, -walk.options.sign):
+            step = step_along(problem, start, sign * tangent, FIRST_AMPLITUDE * 0.5**halvings, walk.options.span)
+            if step is None or step.new.unstable or (step.new.drive - start.drive) * walk.sense <= 0:
+                continue
+            if not walk.targets_up_to(step.new.drive):
+                return walk.restart(step.new, abs(step.new.drive - start.drive))
     return None
 
 
