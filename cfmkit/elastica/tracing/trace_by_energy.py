@@ -190,6 +190,8 @@ def trace_on(
                         break
             else:
                 ending = item
+    while ending.end is End.COMPLETE and points and points[-1].target < 0:
+        points.pop()
     status, message = _explain(start, ending, unit)
     return Attempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
 

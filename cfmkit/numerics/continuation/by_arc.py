@@ -14,14 +14,13 @@ from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
 from cfmkit.numerics.continuation.folds import pass_fold
 from cfmkit.numerics.continuation.path import End, Ending, Point, Walk
-from cfmkit.numerics.continuation.problem import largest_motion
+from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.problem import Equilibrium
 
 LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
 TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
@@ -120,9 +119,8 @@ def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, a
         return walk
     for number in walk.targets_up_to(beyond.drive):
         goal = float(walk.targets[number])
-        at = correct(walk.problem, beyond.x + (goal - beyond.drive) * beyond.rate, goal)
-        if at is None:
-            return Ending(End.LOST, goal, "the path was lost behind the end of a branch at {place}")
+        guess = beyond.x + (goal - beyond.drive) * beyond.rate
+        at = correct(walk.problem, guess, goal) or Equilibrium(guess, goal, beyond.rate, beyond.unstable)
         yield Point(at, number, walk.branch)
         walk = replace(walk, number=number + 1)
     yield Point(beyond, -1, walk.branch)
