@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.continuation.problem import Equilibrium
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +58,7 @@ class Structure:
         parts = (function(x, drive) for function in (self.gradient, self.by_drive, self.hessian))
         return Linear(*(np.asarray(part, float) for part in parts))
 
-    def modes(self, at: Equilibrium, count: int) -> tuple[Any, Any]:
+    def modes(self, at: PathEquilibrium, count: int) -> tuple[Any, Any]:
         """Return the eigenvalues nearest to zero with their vectors."""
         values, vectors = np.linalg.eigh(self.hessian(at.x, at.drive))
         order = np.argsort(np.abs(values))[:count]
@@ -69,12 +69,12 @@ class Structure:
         total = modes @ np.sign(modes[np.abs(modes).argmax(axis=0), np.arange(modes.shape[1])])
         return -total
 
-    def rest(self) -> Equilibrium:
+    def rest(self) -> PathEquilibrium:
         """Return the equilibrium at rest: all unknowns zero."""
         zero = np.zeros(self.size)
         here = self.linearise(zero, 0.0)
         assert not here.residual.any()
-        return Equilibrium(zero, 0.0, -np.linalg.solve(here.tangent, here.rate), here.unstable)
+        return PathEquilibrium(zero, 0.0, -np.linalg.solve(here.tangent, here.rate), here.unstable)
 
 
 def truss(height: float) -> Structure:

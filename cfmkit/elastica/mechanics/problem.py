@@ -13,8 +13,8 @@ from cfmkit.elastica.mechanics.equations import MarchCode, Plan, State
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
-from cfmkit.numerics.continuation.path import March
-from cfmkit.numerics.continuation.problem import Equilibrium
+from cfmkit.numerics.continuation.path import MarchedSteps
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -67,7 +67,7 @@ class NetworkProblem:
 
     def solve(
         self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
-    ) -> Equilibrium | None:
+    ) -> PathEquilibrium | None:
         """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
         row, level = (None, 0.0) if border is None else border
         state = self.equations.solve(x, drive, row, level, push)
@@ -75,7 +75,7 @@ class NetworkProblem:
             return None
         return _equilibrium(state)
 
-    def march(self, walk: Walk) -> March:
+    def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
         plan = Plan(
@@ -84,10 +84,10 @@ class NetworkProblem:
         )  # fmt: skip
         marched = self.equations.march(here, left, plan)
         states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
-        return March(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
+        return MarchedSteps(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
 
     # -- modes -----------------------------------------------------------------------------------------------------
-    def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
+    def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
         """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces.
 
         Directions that constraints or stiff beams hold are none: their flexibility is rounding.
@@ -157,12 +157,12 @@ class NetworkProblem:
         return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
 
 
-def _state(at: Equilibrium) -> State:
+def _state(at: PathEquilibrium) -> State:
     return State(at.x, at.drive, at.rate, at.unstable, at.effort)
 
 
-def _equilibrium(state: State) -> Equilibrium:
-    return Equilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
+def _equilibrium(state: State) -> PathEquilibrium:
+    return PathEquilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
 
 
 @dataclass(frozen=True, eq=False)

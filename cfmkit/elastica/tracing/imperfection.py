@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.drive import Drive
-    from cfmkit.numerics.continuation.path import Event
+    from cfmkit.numerics.continuation.path import PathEvent
 
 DEGREE = 14  # of the polynomials that the rotations are given as
 PLACES = 65  # of an element at which they and displacements are taken
@@ -36,7 +36,7 @@ class Buckling(NamedTuple):
     """The first bifurcation of a perfect network."""
 
     problem: NetworkProblem
-    event: Event
+    event: PathEvent
     what: str  # of which constant things a share is followed; empty: the drive
 
 

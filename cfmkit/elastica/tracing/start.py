@@ -13,15 +13,14 @@ from cfmkit.elastica.outcome.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import Branch, End, Ending, Options, Point
-from cfmkit.numerics.continuation.path import Event as FoundEvent
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEnd, PathEnding, PathEvent, Point
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.model.drive import Control
-    from cfmkit.numerics.continuation.problem import Equilibrium
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 FIRST_SHARE = 0.5  # of what is constant, in the first step
 LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
@@ -32,18 +31,18 @@ FLOOR_SHARE = 0.01
 FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive stretches it
 
 
-class Start(NamedTuple):
+class DriveStart(NamedTuple):
     """Where a path begins."""
 
     problem: NetworkProblem  # along the drive
-    at: Equilibrium | None  # None: nothing to begin at
+    at: PathEquilibrium | None  # None: nothing to begin at
     events: tuple[Event, ...]  # on the way; drives are shares of what is applied
-    branch: Branch | None  # on which that is
+    branch: PathBranch | None  # on which that is
     first: Buckling | None  # on the way
-    stopped: tuple[str, Ending] | None  # what could not be applied, and how the way to it ended
+    stopped: tuple[str, PathEnding] | None  # what could not be applied, and how the way to it ended
 
 
-def find_start(network: Discretisation, control: Control) -> Start:
+def find_start(network: Discretisation, control: Control) -> DriveStart:
     """Return the equilibrium under what is constant, on a stable branch if there is one.
 
     Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
@@ -51,32 +50,32 @@ def find_start(network: Discretisation, control: Control) -> Start:
     """
     problem = NetworkProblem(network, next_correction=min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance))
     events: list[Event] = []
-    branch: Branch | None = None
+    branch: PathBranch | None = None
     first: Buckling | None = None
     at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
     if at is None:
-        return Start(problem, None, (), None, None, None)
+        return DriveStart(problem, None, (), None, None, None)
     for what, ramp in _ramps(network):
         options = Options(
             1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
         )
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
-            return Start(problem, None, tuple(events), branch, first, (what, Ending(End.LOST, 0.0)))
+            return DriveStart(problem, None, tuple(events), branch, first, (what, PathEnding(PathEnd.LOST, 0.0)))
         for item in follow(ramp, begin, np.ones(1), options, branch):
-            if isinstance(item, FoundEvent):
+            if isinstance(item, PathEvent):
                 events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
                 if first is None and item.modes is not None:
                     first = Buckling(ramp, item, what)
             elif isinstance(item, Point):
                 at, branch = item.at, item.branch
-            elif item.end is not End.COMPLETE:
-                return Start(problem, None, tuple(events), branch, first, (what, item))
+            elif item.end is not PathEnd.COMPLETE:
+                return DriveStart(problem, None, tuple(events), branch, first, (what, item))
         if branch is not None and not branch.label:
             branch = branch._replace(label=what)
     # just at a bifurcation Newton's method fails where the way there has led
     at = correct(problem, at.x, 0.0) or replace(at, drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
-    return Start(*_remove_floors(problem, at), tuple(events), branch, first, None)
+    return DriveStart(*_remove_floors(problem, at), tuple(events), branch, first, None)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
@@ -106,7 +105,7 @@ def _loads_as_drive(network: Discretisation) -> Discretisation:
     )  # fmt: skip
 
 
-def _remove_floors(problem: NetworkProblem, at: Equilibrium) -> tuple[NetworkProblem, Equilibrium]:
+def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[NetworkProblem, PathEquilibrium]:
     """Return the problem without the floors of flexibility that bear nothing, and its equilibrium.
 
     Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.

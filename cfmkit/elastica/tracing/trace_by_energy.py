@@ -15,10 +15,9 @@ from cfmkit.elastica.outcome.path import Event, PathStatus
 from cfmkit.elastica.results.path import Path
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
-from cfmkit.elastica.tracing.start import Start, find_start, is_stretched
+from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import Branch, End, Ending, Options, Point
-from cfmkit.numerics.continuation.path import Event as FoundEvent
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEnd, PathEnding, PathEvent, Point
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +44,7 @@ RIGID = "the drive cannot move the network from rest: it is rigid, or nothing ho
 
 
 @dataclass(frozen=True)
-class Mesh:
+class DegreeAndPieces:
     """Degree, elements a smooth piece, and beams under tension."""
 
     degree: int
@@ -62,11 +61,11 @@ class Mesh:
         return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
 
 
-class Attempt(NamedTuple):
+class TraceAttempt(NamedTuple):
     """A path on one discretisation."""
 
     path: Path
-    mesh: Mesh
+    mesh: DegreeAndPieces
     first: Buckling | None  # first loss of stability
 
 
@@ -111,11 +110,11 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     )  # fmt: skip
 
 
-def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attempt:
+def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceAttempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
     degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
-    mesh, best, before = Mesh(degree), None, None
+    mesh, best, before = DegreeAndPieces(degree), None, None
     for count in range(MAX_ROUNDS):
         attempt = trace_on(network, drive, control, mesh)
         path = attempt.path
@@ -150,7 +149,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
     return best
 
 
-def _with_error(path: Path, mesh: Mesh) -> Path:
+def _with_error(path: Path, mesh: DegreeAndPieces) -> Path:
     errors = point_errors(path, mesh.finer(path), pick_points(path))
     return replace(path, error=float(errors.max(initial=0.0)))
 
@@ -166,23 +165,28 @@ def _end_alike(path: Path, before: Path) -> bool:
 def _first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
     """Return the first loss of stability on the primary path of a network."""
     primary = replace(control, branch="primary", through_folds=False)
-    return trace_on(network, drive, primary, Mesh(DEGREE_OF_MODES), first_only=True).first
+    return trace_on(network, drive, primary, DegreeAndPieces(DEGREE_OF_MODES), first_only=True).first
 
 
 def trace_on(
-    network: Network, drive: Drive, control: Control, mesh: Mesh, first_only: bool = False, limit: int | None = None
-) -> Attempt:
+    network: Network,
+    drive: Drive,
+    control: Control,
+    mesh: DegreeAndPieces,
+    first_only: bool = False,
+    limit: int | None = None,
+) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
     arrays = mesh.arrays(network, drive)
     start = find_start(arrays, control)
     events, first, points = [*start.events], start.first, list[Point]()
-    ending = Ending(End.LOST, 0.0)
+    ending = PathEnding(PathEnd.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
         for item in follow(start.problem, start.at, drive.points / unit, _options(drive, control, unit), start.branch):
             if isinstance(item, Point):
                 points.append(item)
-            elif isinstance(item, FoundEvent):
+            elif isinstance(item, PathEvent):
                 events.append(Event(item.kind, item.drive * unit, item.before, item.after))
                 if first is None and item.modes is not None:
                     first = Buckling(start.problem, item, "")
@@ -190,10 +194,10 @@ def trace_on(
                         break
             else:
                 ending = item
-    while ending.end is End.COMPLETE and points and points[-1].target < 0:
+    while ending.end is PathEnd.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    return Attempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
+    return TraceAttempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
@@ -207,7 +211,7 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
 
 
 def _path(
-    network: Network, drive: Drive, start: Start, points: list[Point], events: tuple[Event, ...],
+    network: Network, drive: Drive, start: DriveStart, points: list[Point], events: tuple[Event, ...],
     status: PathStatus, message: str,
 ) -> Path:  # fmt: skip
     arrays = start.problem.network
@@ -225,7 +229,7 @@ def _path(
     )  # fmt: skip
 
 
-def _name_branch(branch: Branch | None, unit: float) -> str:
+def _name_branch(branch: PathBranch | None, unit: float) -> str:
     if branch is None:
         return "primary"
     where = (
@@ -234,20 +238,20 @@ def _name_branch(branch: Branch | None, unit: float) -> str:
     return f"bifurcated {where}, sign {branch.sign:+d}"
 
 
-def _explain(start: Start, ending: Ending, unit: float) -> tuple[PathStatus, str]:
+def _explain(start: DriveStart, ending: PathEnding, unit: float) -> tuple[PathStatus, str]:
     """Return the status of a path, and why it ended."""
     if start.at is None:
         if start.stopped is None:
             return PathStatus.NO_START, RIGID
         what, stop = start.stopped
-        jumps = stop.end is End.JUMPS
+        jumps = stop.end is PathEnd.JUMPS
         if jumps:
             return PathStatus.JUMPS, f"stability is lost under {100 * stop.drive:.3g} % of the {what}"
         text = f"no equilibrium to start from: lost at {stop.drive:.3g} of the constant loads and displacements; "
         text += "or nothing holds the network, the drive cannot move it, or its springs are prestressed too far"
         return PathStatus.NO_START, text
     status = PathStatus[ending.end.name]
-    text = status.value if ending.end is End.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
+    text = status.value if ending.end is PathEnd.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
     return status, text
 
 

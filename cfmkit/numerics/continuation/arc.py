@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Options
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 MISSED_SHARE = 0.4  # of a step by which the tangent may miss
 GOOD_MISS = 0.05  # below which the next step is longer
@@ -27,19 +27,21 @@ SHORTEST_SHARE, SHORTEST = 1e-9, 1e-12  # of the first step, and at all
 class ArcStep(NamedTuple):
     """An equilibrium at an arc length from another."""
 
-    new: Equilibrium
+    new: PathEquilibrium
     tangent: FloatArray  # (n + 1,) of unit length, in the sense of travel
     missed: float  # by the prediction
 
 
-def unit_tangent(problem: Problem, at: Equilibrium, along: FloatArray, span: float) -> FloatArray:
+def unit_tangent(problem: ContinuationProblem, at: PathEquilibrium, along: FloatArray, span: float) -> FloatArray:
     """Return d(x, drive) of unit arc length at an equilibrium, in the sense of another direction, (n + 1,)."""
     weights, tangent = arc_weights(problem, span), np.append(at.rate, 1.0)
     tangent /= np.sqrt(weights @ tangent**2)
     return tangent if (weights * along) @ tangent >= 0 else -tangent
 
 
-def step_along(problem: Problem, here: Equilibrium, tangent: FloatArray, length: float, span: float) -> ArcStep | None:
+def step_along(
+    problem: ContinuationProblem, here: PathEquilibrium, tangent: FloatArray, length: float, span: float
+) -> ArcStep | None:
     """Return the equilibrium at a length along the unit tangent from here."""
     weights, place = arc_weights(problem, span), np.append(here.x, here.drive)
     guess, row = place + length * tangent, weights * tangent
@@ -53,8 +55,8 @@ def step_along(problem: Problem, here: Equilibrium, tangent: FloatArray, length:
 class ArcMove(NamedTuple):
     """An accepted step along the arc."""
 
-    old: Equilibrium
-    new: Equilibrium
+    old: PathEquilibrium
+    new: PathEquilibrium
     tangent_before: FloatArray
     tangent: FloatArray
     length: float
@@ -66,7 +68,7 @@ class ArcMove(NamedTuple):
 
 
 def follow_arc(
-    problem: Problem, here: Equilibrium, tangent: FloatArray, length: float, options: Options
+    problem: ContinuationProblem, here: PathEquilibrium, tangent: FloatArray, length: float, options: Options
 ) -> Iterator[ArcMove]:
     """Yield accepted steps along the arc from an equilibrium, until none is found."""
     first, weights = length, arc_weights(problem, options.span)
@@ -85,7 +87,9 @@ def follow_arc(
             length *= GROWTH
 
 
-def _accept(problem: Problem, here: Equilibrium, step: ArcStep, length: float, options: Options) -> bool:
+def _accept(
+    problem: ContinuationProblem, here: PathEquilibrium, step: ArcStep, length: float, options: Options
+) -> bool:
     return (
         step.missed <= MISSED_SHARE * length
         and largest_motion(problem, step.new.x - here.x) <= options.largest_motion

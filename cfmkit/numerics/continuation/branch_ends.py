@@ -8,14 +8,14 @@ import numpy as np
 
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_stability_change
-from cfmkit.numerics.continuation.path import Event
+from cfmkit.numerics.continuation.path import PathEvent
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 LOOK_AHEAD = 1e-5, 1e-4, 1e-3, 1e-2, 1e-6, 1e-7
 """Shares of the range behind a fold at which a path is looked for that the branch may have joined."""
@@ -26,7 +26,7 @@ IN_DOUBT = 0.05, 0.02
 """Motions of a step that are halved if going back fails, or comes to a path that is no less stable."""
 
 
-def find_passed_end(walk: Walk, new: Equilibrium) -> Event | Literal["unsure"] | None:
+def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["unsure"] | None:
     """Return the event at the end of a branch that a step has passed, None if the step stayed on the branch.
 
     Who goes back from the new equilibrium along its own path comes to where the step began, or else to the path
@@ -44,17 +44,17 @@ def find_passed_end(walk: Walk, new: Equilibrium) -> Event | Literal["unsure"] |
     found = locate_stability_change(problem, back, new)
     if found is None:
         return "unsure"
-    return Event("bifurcation", found.drive, back.unstable, new.unstable, found.near)
+    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near)
 
 
-def primary_slope(problem: Problem, at: Equilibrium, modes: FloatArray) -> FloatArray:
+def primary_slope(problem: ContinuationProblem, at: PathEquilibrium, modes: FloatArray) -> FloatArray:
     """Return the slope of the path through a pitchfork: that of the equilibrium, less the critical modes."""
     rows = problem.motions
     amounts = np.linalg.lstsq(modes[rows], at.rate[rows], rcond=None)[0]
     return np.asarray(at.rate - modes @ amounts)
 
 
-def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[Equilibrium, Event] | None:
+def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[PathEquilibrium, PathEvent] | None:
     """Return the first equilibrium behind the end of a branch on the path that it joins, and its event.
 
     None if the fold is none: no path as stable goes on there that was less stable before.
@@ -72,11 +72,11 @@ def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[Equilibr
             continue
         before = _count_before(walk, fold.drive, beyond, ahead)
         if before > beyond.unstable:
-            return beyond, Event("bifurcation", fold.drive, before, beyond.unstable, fold.near, modes)
+            return beyond, PathEvent("bifurcation", fold.drive, before, beyond.unstable, fold.near, modes)
     return None
 
 
-def _count_before(walk: Walk, drive: float, beyond: Equilibrium, ahead: float) -> int:
+def _count_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahead: float) -> int:
     """Return the unstable directions of the path through `beyond` a little before a drive."""
     at, most = beyond, beyond.unstable
     for factor in LOOK_BACK:

@@ -14,7 +14,7 @@ from cfmkit.numerics.continuation.problem import Border, keep_motions, largest_m
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 AMPLITUDES, LAST_AMPLITUDES = (0.06, 0.02), (0.006, 0.002)
 """Largest motion of the mode with which a branch is entered."""
@@ -28,7 +28,7 @@ SMALLEST_AMPLITUDE = 1e-6  # as a share of that where the branch was entered: le
 
 def enter_branch(
     walk: Walk, x: FloatArray, drive: float, mode: FloatArray, amplitudes: tuple[float, ...]
-) -> Equilibrium | None:
+) -> PathEquilibrium | None:
     """Return an equilibrium on the branch that crosses at (x, drive) along a mode, no less stable than the path was.
 
     The drive must have gone forward there; of two mirror images it is the one of `Options.sign` if it does so.
@@ -51,7 +51,7 @@ def enter_branch(
     return None
 
 
-def descend(problem: Problem, saddle: Equilibrium, sign: int) -> Equilibrium | None:
+def descend(problem: ContinuationProblem, saddle: PathEquilibrium, sign: int) -> PathEquilibrium | None:
     """Return a stable equilibrium below an unstable one at the same drive, or None if the way down leads far away.
 
     Newton's steps, but away from where the energy is highest along falling modes. The saddle is left to the side that
@@ -77,7 +77,7 @@ def descend(problem: Problem, saddle: Equilibrium, sign: int) -> Equilibrium | N
     return None
 
 
-def opens_at(problem: Problem, x: FloatArray, drive: float, entered: Equilibrium) -> bool:
+def opens_at(problem: ContinuationProblem, x: FloatArray, drive: float, entered: PathEquilibrium) -> bool:
     """Return True if an equilibrium is on a branch that opens at (x, drive), like the root of the distance."""
     guess, goal = x + 0.5 * (entered.x - x), drive + 0.25 * (entered.drive - drive)
     near = correct(problem, guess, goal)
@@ -87,8 +87,8 @@ def opens_at(problem: Problem, x: FloatArray, drive: float, entered: Equilibrium
 
 
 def find_beside(
-    problem: Problem, x: FloatArray, drive: float, entered: Equilibrium, goal: float, unstable: int
-) -> Equilibrium:
+    problem: ContinuationProblem, x: FloatArray, drive: float, entered: PathEquilibrium, goal: float, unstable: int
+) -> PathEquilibrium:
     """Return the equilibrium at a drive between a singular point (x, drive) and another one on the branch from there.
 
     The branch opens like a root: the equilibrium is found by its amplitude, along which nothing is singular, until its

@@ -13,8 +13,8 @@ from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.path import End, Ending, Point, Walk
-from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
+from cfmkit.numerics.continuation.path import PathEnd, PathEnding, Point, Walk
+from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -68,8 +68,8 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if steady >= STEADY_STEPS and count >= STEADY_STEPS and drive_step > STEADY_STEP * options.span:
             return _natural(walk)
         if count > LOCKED_STEPS and abs(move.new.drive - begin.drive) < LOCKED_SHARE * options.span:
-            return Ending(
-                End.LIMIT_POINT,
+            return PathEnding(
+                PathEnd.LIMIT_POINT,
                 move.new.drive,
                 TOO_SHARP,
             )
@@ -95,7 +95,9 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
     return walk
 
 
-def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, after: int, fineness: float) -> Items:
+def _end_at_fold(
+    walk: Walk, begin: PathEquilibrium, move: ArcMove, fold: Located, after: int, fineness: float
+) -> Items:
     """Go on where the drive turns back: at a limit point, or behind the end of a branch."""
     joined, loses_one = find_joined_path(walk, fold, begin.unstable), after == begin.unstable + 1
     if joined is None and loses_one and walk.options.through_folds:
@@ -111,7 +113,7 @@ def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, a
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
     if joined is None:
-        return Ending(End.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
+        return PathEnding(PathEnd.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined
     yield event
     walk = replace(walk, branch=None)
@@ -120,7 +122,7 @@ def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, a
     for number in walk.targets_up_to(beyond.drive):
         goal = float(walk.targets[number])
         guess = beyond.x + (goal - beyond.drive) * beyond.rate
-        at = correct(walk.problem, guess, goal) or Equilibrium(guess, goal, beyond.rate, beyond.unstable)
+        at = correct(walk.problem, guess, goal) or PathEquilibrium(guess, goal, beyond.rate, beyond.unstable)
         yield Point(at, number, walk.branch)
         walk = replace(walk, number=number + 1)
     yield Point(beyond, -1, walk.branch)
@@ -128,7 +130,7 @@ def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, a
     return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))
 
 
-def _stop_at_limit_point(walk: Walk, begin: Equilibrium, fold: Located) -> Items:
+def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:
     """Yield what is left before a limit point of the drive, where the path ends."""
     problem, last, sense = walk.problem, fold.before, walk.sense
     for number in walk.targets_up_to(fold.drive):
@@ -140,4 +142,4 @@ def _stop_at_limit_point(walk: Walk, begin: Equilibrium, fold: Located) -> Items
         yield Point(at, number, walk.branch)
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
-    return Ending(End.LIMIT_POINT, fold.drive, LIMIT_POINT)
+    return PathEnding(PathEnd.LIMIT_POINT, fold.drive, LIMIT_POINT)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.continuation.problem import Border, Equilibrium, largest_motion
+from cfmkit.numerics.continuation.problem import Border, PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.continuation.problem import Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem
 
 TOLERANCE = 1e-10  # of a step: of motions, and of forces over their size or ten units
 MAX_ITERATIONS = 14
@@ -23,8 +23,12 @@ FORCE_UNITS = 10.0  # forces are compared with themselves, at least with so many
 
 
 def correct(
-    problem: Problem, x: FloatArray, drive: float, border: Border | None = None, iterations: int = MAX_ITERATIONS
-) -> Equilibrium | None:
+    problem: ContinuationProblem,
+    x: FloatArray,
+    drive: float,
+    border: Border | None = None,
+    iterations: int = MAX_ITERATIONS,
+) -> PathEquilibrium | None:
     """Return the equilibrium near a guess, at its drive or where the border's condition holds; None if none is near.
 
     A problem that has a method `solve(x, drive, border)` of its own, compiled, say, is asked instead.
@@ -56,7 +60,7 @@ def correct(
             stagnant = motion < FLOOR_OF_MOTION and largest < FLOOR_OF_FORCE and largest > STAGNATION * last
             converged = largest < TOLERANCE * (1 + largest_motion(problem, x)) or stagnant
             if converged and (iteration > 0 or border is None):  # a first step may have changed the drive alone
-                return Equilibrium(x, float(drive), rate, here.unstable)
+                return PathEquilibrium(x, float(drive), rate, here.unstable)
             last = largest
     return None
 

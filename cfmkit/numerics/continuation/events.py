@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.arc import ArcMove
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 1e-7
 """Shares of the first values at which a location ends: beside a pitchfork rounding acts as an imperfection does."""
@@ -33,24 +33,24 @@ class Located(NamedTuple):
 
     x: FloatArray
     drive: float
-    near: Equilibrium  # the nearest sample
-    before: Equilibrium  # on both sides
-    behind: Equilibrium
+    near: PathEquilibrium  # the nearest sample
+    before: PathEquilibrium  # on both sides
+    behind: PathEquilibrium
     share: float  # of the way between the first two
 
 
 class _Sample(NamedTuple):
     share: float
     value: float
-    at: Equilibrium
+    at: PathEquilibrium
 
 
 def locate(
-    problem: Problem,
-    first: Equilibrium,
-    last: Equilibrium,
-    solve: Callable[[float], Equilibrium | None],
-    value: Callable[[Equilibrium], float],
+    problem: ContinuationProblem,
+    first: PathEquilibrium,
+    last: PathEquilibrium,
+    solve: Callable[[float], PathEquilibrium | None],
+    value: Callable[[PathEquilibrium], float],
     close: float,
 ) -> Located | None:
     """Return where `value` vanishes between two equilibria, or None if they lie on two paths.
@@ -105,17 +105,17 @@ def _interpolate(samples: list[_Sample], low: _Sample, high: _Sample, largest: f
     return Located(x, drive, near[0].at, low.at, high.at, share)
 
 
-def stability_value(problem: Problem, reference: Equilibrium) -> Callable[[Equilibrium], float]:
+def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
     """Return a function that vanishes where the number of unstable directions leaves that of an equilibrium."""
 
-    def value(at: Equilibrium) -> float:
+    def value(at: PathEquilibrium) -> float:
         size = abs(float(problem.modes(at, 1)[0][0]))
         return size if at.unstable == reference.unstable else -size
 
     return value
 
 
-def locate_loss(walk: Walk, new: Equilibrium) -> Located | None:
+def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
     """Return the first change of stability between here and a new equilibrium on the same path."""
     problem, here = walk.problem, walk.here
     begin = walk.trail[0].drive
@@ -131,41 +131,43 @@ def locate_loss(walk: Walk, new: Equilibrium) -> Located | None:
     return locate_stability_change(problem, here, new)
 
 
-def locate_stability_change(problem: Problem, first: Equilibrium, last: Equilibrium) -> Located | None:
+def locate_stability_change(
+    problem: ContinuationProblem, first: PathEquilibrium, last: PathEquilibrium
+) -> Located | None:
     """Return the change of stability between two equilibria at different drives."""
 
-    def solve(share: float) -> Equilibrium | None:
+    def solve(share: float) -> PathEquilibrium | None:
         drive = first.drive + share * (last.drive - first.drive)
         return correct(problem, hermite(first, last, drive), drive)
 
     return locate(problem, first, last, solve, stability_value(problem, first), CLOSE_TO_BIFURCATION)
 
 
-def locate_stability_change_on_arc(problem: Problem, move: ArcMove, span: float) -> Located | None:
+def locate_stability_change_on_arc(problem: ContinuationProblem, move: ArcMove, span: float) -> Located | None:
     """Return the change of stability within a step along the arc."""
     first, last = np.append(move.old.x, move.old.drive), np.append(move.new.x, move.new.drive)
     row = arc_weights(problem, span) * (last - first)
     row /= np.linalg.norm(row)
 
-    def solve(share: float) -> Equilibrium | None:
+    def solve(share: float) -> PathEquilibrium | None:
         place = first + share * (last - first)
         return correct(problem, place[:-1], float(place[-1]), Border(row, float(row @ place)))
 
     return locate(problem, move.old, move.new, solve, stability_value(problem, move.old), CLOSE_TO_BIFURCATION)
 
 
-def locate_fold(problem: Problem, move: ArcMove, span: float) -> tuple[Located, int] | None:
+def locate_fold(problem: ContinuationProblem, move: ArcMove, span: float) -> tuple[Located, int] | None:
     """Return where the drive turns back within a step along the arc, and the unstable directions behind it.
 
     At a limit point their number changes by one; at the end of a branch it does not. They are counted well behind the
     fold: counts right beside it are noise.
     """
 
-    def solve(share: float) -> Equilibrium | None:
+    def solve(share: float) -> PathEquilibrium | None:
         step = step_along(problem, move.old, move.tangent_before, share * move.length, span)
         return None if step is None else step.new
 
-    def value(at: Equilibrium) -> float:
+    def value(at: PathEquilibrium) -> float:
         if at is move.old:
             return float(move.tangent_before[-1])
         return float(unit_tangent(problem, at, move.tangent_before, span)[-1])

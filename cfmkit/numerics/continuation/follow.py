@@ -11,7 +11,7 @@ from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
-from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.path import PathEnd, PathEnding, PathEvent, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.path import Branch, March, Options
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathBranch
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
     from cfmkit.numerics.continuation.steps import Trial
 
 LANDING = 1.3  # steps by which a step may be stretched to land on a requested value
@@ -40,41 +40,49 @@ LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
 
 
 def follow(
-    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options, branch: Branch | None = None
-) -> Iterator[Point | Event | Ending]:
+    problem: ContinuationProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None = None,
+) -> Iterator[Point | PathEvent | PathEnding]:
     """Yield the points and events of a path in order, and its ending at last.
 
     Parameters
     ----------
-    problem : Problem
-        The structure. If it has a method `march` (of a `Walk`, to a `March`) it takes steps by itself where nothing
-        happens, in compiled code, say.
-    start : Equilibrium
+    problem : ContinuationProblem
+        The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
+        nothing happens, in compiled code, say.
+    start : PathEquilibrium
         Where the path begins.
     targets : (k,) array
         Values of the drive to be reached in order; they may turn back.
     options : Options
         Range of the drive, branches, steps.
-    branch : Branch, optional
+    branch : PathBranch, optional
         On which the path begins.
 
     Yields
     ------
-    Point, Event or Ending
-        Points at requested values and between them. A path that ends early ends with an `Ending` that says why.
+    Point, PathEvent or PathEnding
+        Points at requested values and between them. A path that ends early ends with an `PathEnding` that says why.
     """
     between = 0
     for item in _items(problem, start, targets, options, branch):
         yield item
         between += isinstance(item, Point) and item.target < 0
         if between > options.most_points:
-            yield Ending(End.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
+            yield PathEnding(PathEnd.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
             return
 
 
 def _items(
-    problem: Problem, start: Equilibrium, targets: FloatArray, options: Options, branch: Branch | None
-) -> Iterator[Point | Event | Ending]:
+    problem: ContinuationProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None,
+) -> Iterator[Point | PathEvent | PathEnding]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     yield Point(start, at_first - 1, branch)
     walk = Walk(
@@ -87,7 +95,7 @@ def _items(
     elif start.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
-            yield Ending(End.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
+            yield PathEnding(PathEnd.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
             return
         walk = moved
     march = getattr(problem, "march", None)
@@ -97,15 +105,15 @@ def _items(
             if walk.done:
                 break
         outcome = yield from _step(walk)
-        if isinstance(outcome, Ending):
+        if isinstance(outcome, PathEnding):
             yield outcome
             return
         assert outcome is not None
         walk = outcome
-    yield Ending(End.COMPLETE, walk.here.drive)
+    yield PathEnding(PathEnd.COMPLETE, walk.here.drive)
 
 
-def _march(walk: Walk, march: Callable[[Walk], March]) -> Generator[Point, None, Walk]:
+def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
     marched = march(walk)
     for at, reached in marched.states:
@@ -118,7 +126,7 @@ def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
     if _is_locked(walk):
-        return Ending(End.LIMIT_POINT, here.drive, LOCKED)
+        return PathEnding(PathEnd.LIMIT_POINT, here.drive, LOCKED)
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
@@ -143,7 +151,7 @@ def _is_locked(walk: Walk) -> bool:
     return bool(forces.max(initial=0.0) > LOCKED_FORCE)
 
 
-def _skips(walk: Walk, new: Equilibrium) -> bool:
+def _skips(walk: Walk, new: PathEquilibrium) -> bool:
     """Return True if a long step has passed several bifurcations: they are passed one by one."""
     passed = new.unstable - walk.here.unstable
     several = abs(passed) > 1 if walk.options.branch == "primary" else passed > 1
@@ -160,7 +168,7 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         drive, near = (found.drive, found.near) if found else (new.drive, None)
         lost = new.unstable - here.unstable
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
-        yield Event("bifurcation", drive, here.unstable, new.unstable, near, modes)
+        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes)
     elif walk.branch is not None:
         end = find_passed_end(walk, new)
         if end == "unsure":
@@ -207,5 +215,5 @@ def _reject(walk: Walk, goal: float) -> Items:
             if outcome is not None:
                 return outcome
     if walk.step < FINEST_STEP * options.span or walk.rejections > MAX_REJECTIONS:
-        return Ending(End.LOST, here.drive, "no step converged at {place}")
+        return PathEnding(PathEnd.LOST, here.drive, "no step converged at {place}")
     return walk

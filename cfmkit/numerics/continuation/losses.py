@@ -19,15 +19,15 @@ from cfmkit.numerics.continuation.branches import (
 )
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.path import Branch, End, Ending, Event, Point, Walk
-from cfmkit.numerics.continuation.problem import Equilibrium, arc_weights, largest_motion
+from cfmkit.numerics.continuation.path import PathBranch, PathEnd, PathEnding, PathEvent, Point, Walk
+from cfmkit.numerics.continuation.problem import PathEquilibrium, arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
 
-Items = Generator[Point | Event, None, Walk | Ending | None]
+Items = Generator[Point | PathEvent, None, Walk | PathEnding | None]
 """What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
 
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
@@ -44,7 +44,7 @@ FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from th
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
-def lose_stability(walk: Walk, new: Equilibrium) -> Items:
+def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
     problem, options, here = walk.problem, walk.options, walk.here
     found = locate_loss(walk, new)
@@ -62,13 +62,13 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
     modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
     if options.branch == "primary":
         modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
-        yield Event("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
+        yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
         walk = yield from _reach_bifurcation(walk, found, far, slope)
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
         yield Point(new, -1, walk.branch)
-        return Ending(End.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
+        return PathEnding(PathEnd.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
     onto, mode = None, problem.orient(modes)
     for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
         several = _pass_together(walk, new, found, slope, clusters)
@@ -77,23 +77,25 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
         onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
         if onto is not None:
             break
-    yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
+    yield PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
         return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
     if onto is None:
-        return Ending(End.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there")
+        return PathEnding(
+            PathEnd.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
+        )
     return (yield from _begin_branch(walk, found, onto, after))
 
 
-def _well_before(walk: Walk, drive: float, distance: float) -> Equilibrium | None:
+def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium | None:
     """Return the last equilibrium of this piece that is farther than a distance from a drive."""
     return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
 
 
 def _pass_together(
-    walk: Walk, new: Equilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
-) -> tuple[Equilibrium, FloatArray, int] | None:
+    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
+) -> tuple[PathEquilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
     problem, here = walk.problem, walk.here
     for factor in clusters:
@@ -111,7 +113,9 @@ def _pass_together(
     return None
 
 
-def _reach_bifurcation(walk: Walk, found: Located, far: Equilibrium, slope: FloatArray) -> Generator[Point, None, Walk]:
+def _reach_bifurcation(
+    walk: Walk, found: Located, far: PathEquilibrium, slope: FloatArray
+) -> Generator[Point, None, Walk]:
     """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
     problem, unstable = walk.problem, walk.here.unstable
     for number in walk.targets_up_to(found.drive):
@@ -121,15 +125,15 @@ def _reach_bifurcation(walk: Walk, found: Located, far: Equilibrium, slope: Floa
         if at is None or at.unstable > unstable:
             at = correct(problem, guess, goal)
         if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
-            at = Equilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
+            at = PathEquilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
         yield Point(at, number, walk.branch)
         walk = replace(walk, number=number + 1)
     return walk
 
 
-def _begin_branch(walk: Walk, found: Located, onto: Equilibrium, after: int) -> Generator[Point, None, Walk]:
+def _begin_branch(walk: Walk, found: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
     """Yield the first points of a branch; return the walk on it."""
-    branch = Branch(found.drive, walk.options.sign)
+    branch = PathBranch(found.drive, walk.options.sign)
     for number in walk.targets_up_to(onto.drive) if not walk.done else ():
         goal = float(walk.targets[number])
         yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)

@@ -10,10 +10,10 @@ from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.continuation.problem import Equilibrium, Problem
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 
-class Branch(NamedTuple):
+class PathBranch(NamedTuple):
     """The branch that a path has been on since a bifurcation."""
 
     drive: float  # at the bifurcation
@@ -40,24 +40,24 @@ class Options:
 class Point:
     """An equilibrium of a path."""
 
-    at: Equilibrium
+    at: PathEquilibrium
     target: int = -1  # number of the requested value that it is at
-    branch: Branch | None = None  # None: the path from rest, not left so far
+    branch: PathBranch | None = None  # None: the path from rest, not left so far
 
 
 @dataclass(frozen=True, eq=False)
-class Event:
+class PathEvent:
     """A bifurcation or limit point; unstable directions before and after it on the path that it lies on."""
 
     kind: Literal["bifurcation", "limit point"]
     drive: float
     before: int
     after: int
-    near: Equilibrium | None = None
+    near: PathEquilibrium | None = None
     modes: Any = None  # (n, k) critical ones, if they were computed
 
 
-class End(Enum):
+class PathEnd(Enum):
     """How a path ends."""
 
     COMPLETE = "all requested values were reached"
@@ -69,18 +69,18 @@ class End(Enum):
 
 
 @dataclass(frozen=True)
-class Ending:
+class PathEnding:
     """The last item of a path."""
 
-    end: End
+    end: PathEnd
     drive: float
     message: str = ""  # why, with {place} for the drive there
 
 
-class March(NamedTuple):
+class MarchedSteps(NamedTuple):
     """Equilibria that a problem's own steps came to, by the same rules as `steps.advance`."""
 
-    states: tuple[tuple[Equilibrium, bool], ...]  # with whether the next requested value is reached
+    states: tuple[tuple[PathEquilibrium, bool], ...]  # with whether the next requested value is reached
     step: float  # with which to go on
     stuck: bool  # whether steps failed, and not because something happens
 
@@ -89,18 +89,18 @@ class March(NamedTuple):
 class Walk:
     """Where the follower stands: the last equilibria of one smooth piece, the next step and value."""
 
-    problem: Problem
+    problem: ContinuationProblem
     options: Options
     targets: FloatArray
-    here: Equilibrium
+    here: PathEquilibrium
     step: float
     number: int = 0  # of the next requested value
-    before: Equilibrium | None = None  # on the same smooth piece, for the predictor
-    trail: tuple[Equilibrium, ...] = ()  # this smooth piece
-    branch: Branch | None = None
+    before: PathEquilibrium | None = None  # on the same smooth piece, for the predictor
+    trail: tuple[PathEquilibrium, ...] = ()  # this smooth piece
+    branch: PathBranch | None = None
     modes: int = 1  # critical where this branch began
     rejections: int = 0  # two for each, less one for each accepted step
-    searched: Equilibrium | None = None  # from where it was looked for a bifurcation ahead
+    searched: PathEquilibrium | None = None  # from where it was looked for a bifurcation ahead
 
     @property
     def sense(self) -> float:
@@ -112,12 +112,12 @@ class Walk:
         """Whether all requested values are reached."""
         return self.number >= len(self.targets)
 
-    def move(self, new: Equilibrium, reached: int = 0) -> Walk:
+    def move(self, new: PathEquilibrium, reached: int = 0) -> Walk:
         """Return the walk one equilibrium further on the same smooth piece."""
         trail = (*self.trail, new)
         return replace(self, before=self.here, here=new, trail=trail, number=self.number + reached)
 
-    def restart(self, new: Equilibrium, step: float, same_piece: bool = False) -> Walk:
+    def restart(self, new: PathEquilibrium, step: float, same_piece: bool = False) -> Walk:
         """Return the walk at an equilibrium from which the slope alone predicts."""
         trail = (*self.trail, new) if same_piece else (new,)
         return replace(self, before=None, here=new, step=step, trail=trail, rejections=0)
@@ -136,6 +136,6 @@ class Walk:
             end += 1
         return range(self.number, end)
 
-    def moved(self, new: Equilibrium) -> float:
+    def moved(self, new: PathEquilibrium) -> float:
         """Return the largest motion between here and another equilibrium."""
         return largest_motion(self.problem, new.x - self.here.x)

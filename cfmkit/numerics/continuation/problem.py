@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 FORCE_WEIGHT = 1e-4  # of the square of a force, in its unit, in the arc length; a motion has 1
 
 
-class Linearisation(Protocol):
+class LinearisedProblem(Protocol):
     """Residual, tangent and inertia at one place, for n unknowns."""
 
     @property
@@ -33,7 +33,7 @@ class Linearisation(Protocol):
         """Return the tangent's inverse times columns (n, k), or None if it is singular."""
 
 
-class Problem(Protocol):
+class ContinuationProblem(Protocol):
     """A structure with n unknowns: motions, which are of size one, and forces.
 
     A mode is a direction in which the structure gives way, a column of n.
@@ -47,10 +47,10 @@ class Problem(Protocol):
     def motions(self) -> Any:
         """Which unknowns are motions, (n,) of bool."""
 
-    def linearise(self, x: FloatArray, drive: float) -> Linearisation:
+    def linearise(self, x: FloatArray, drive: float) -> LinearisedProblem:
         """Return residual and tangent at any place."""
 
-    def modes(self, at: Equilibrium, count: int) -> tuple[FloatArray, FloatArray]:
+    def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
         """Return the eigenvalues nearest to zero, nearest first, and their modes, (k,) and (n, k)."""
 
     def orient(self, modes: FloatArray) -> FloatArray:
@@ -58,7 +58,7 @@ class Problem(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class PathEquilibrium:
     """A converged place on a path."""
 
     x: FloatArray  # (n,)
@@ -75,22 +75,22 @@ class Border(NamedTuple):
     level: float
 
 
-def arc_weights(problem: Problem, span: float) -> FloatArray:
+def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
     """Return the weights of the squares of (x, drive) in the arc length, (n + 1,)."""
     return np.append(np.where(problem.motions, 1.0, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)
 
 
-def largest_motion(problem: Problem, x: FloatArray) -> float:
+def largest_motion(problem: ContinuationProblem, x: FloatArray) -> float:
     """Return the largest size of a motion."""
     return float(np.abs(x[problem.motions]).max(initial=0.0))
 
 
-def keep_motions(problem: Problem, x: FloatArray) -> FloatArray:
+def keep_motions(problem: ContinuationProblem, x: FloatArray) -> FloatArray:
     """Return x with its forces zero."""
     return np.where(problem.motions, x, 0.0)
 
 
-def force_change(problem: Problem, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
+def force_change(problem: ContinuationProblem, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
     """Return the largest change of a force over what a step may change: `largest` units and a share of the force."""
     allowed = largest * problem.unit + share * np.abs(old)
     return float((np.abs(new - old) / allowed)[~problem.motions].max(initial=0.0))

@@ -12,7 +12,7 @@ from cfmkit.numerics.continuation.problem import force_change, largest_motion
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.path import Walk
-    from cfmkit.numerics.continuation.problem import Equilibrium
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 FORCE_SHARE = 0.5  # of a force by which a step may change it, besides `Options.largest_force` units
 MISSED_SHARE = 0.4  # of a step's motion by which its prediction may miss
@@ -24,12 +24,12 @@ ROUNDING = 1e-7  # motions that small say nothing
 class Trial(NamedTuple):
     """A step that was tried."""
 
-    new: Equilibrium | None  # None if it is rejected
+    new: PathEquilibrium | None  # None if it is rejected
     misfit: float = np.inf  # error of the prediction as a share of the step
     excess: float = 0.0  # by how much a rejected step changes forces too much, if that is all
 
 
-def hermite(a: Equilibrium, b: Equilibrium, drive: float) -> FloatArray:
+def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
     """Return the cubic through two equilibria with their slopes at a drive."""
     width = b.drive - a.drive
     if width == 0:
@@ -65,7 +65,7 @@ def advance(walk: Walk, goal: float) -> Trial:
     return Trial(new, missed / (moved + 1e-8))
 
 
-def _keeps_direction(walk: Walk, new: Equilibrium, moved: float) -> bool:
+def _keeps_direction(walk: Walk, new: PathEquilibrium, moved: float) -> bool:
     """Return True if the chord of a step agrees with the slopes at its ends, in direction and length.
 
     Without the second a step hops from the end of a branch onto the path that it joins, unnoticed.
