@@ -140,7 +140,7 @@ def differences(seen: Mapping[str, Any], known: Mapping[str, Any], tolerance: fl
     compared: list[tuple[str, Any, Any, float]] = [("effort", seen["effort"], known["effort"], tolerance)]
     for name, scale in (("motion", 1 / size), ("reaction", size / length)):
         nodes = list(known[name])
-        values = [np.array([record[name][node] for node in nodes]) * scale for record in (seen, known)]
+        values = [np.reshape([record[name][node] for node in nodes], (-1, 3)) * scale for record in (seen, known)]
         compared.append((name, *values, tolerance))
     beams = list(known["stress"])
     compared.append(

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 CASES = {case["name"]: case for case in read_cases()}
-EVERY = 12
+EVERY = 8
 """One case of so many is tried at every run, the others with the slow tests."""
+TOLERANCE = 1e-6  # of what is compared: a path at 1e-9 has a true error of some 1e-7 where tension is high
 
 
 @pytest.mark.parametrize(
@@ -24,8 +25,7 @@ EVERY = 12
 )
 def test_the_path_is_as_it_was(name: str) -> None:
     case: Mapping[str, Any] = CASES[name]
-    tolerance = max(1e-7, case["frozen_at"])
     network, drive, control = (from_json(case[part]) for part in ("network", "drive", "control"))
-    path = trace(network, drive, replace(control, tolerance=tolerance))
+    path = trace(network, drive, replace(control, tolerance=case["frozen_at"]))
     length = float(np.mean([fitted.length for fitted in path.fits.values()]))
-    assert differences(observe(path), case["expected"], 3 * tolerance + 3 * case["frozen_at"], length) == []
+    assert differences(observe(path), case["expected"], TOLERANCE, length) == []

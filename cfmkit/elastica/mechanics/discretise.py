@@ -45,7 +45,7 @@ FRAME_OF_DRIVE = 3
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
-class Scales(NamedTuple):
+class MechanicsUnits(NamedTuple):
     """Units of length [m], force [N] and the drive (m, rad or 1)."""
 
     length: float
@@ -58,7 +58,7 @@ class Scales(NamedTuple):
         return self.force * self.length
 
 
-class Elements(NamedTuple):
+class BeamElements(NamedTuple):
     """Elements at their q Gauss points; e elements of one degree."""
 
     angle: Any  # (e, q) of the axis at rest [rad]
@@ -98,7 +98,7 @@ class Discretisation:
     """All arrays of a network under a drive, and the names behind its unknowns."""
 
     degree: int
-    elements: Elements
+    elements: BeamElements
     attachments: Attachments
     springs: tuple[Attached, ...]
     loads: tuple[Attached, ...]
@@ -106,10 +106,11 @@ class Discretisation:
     free: Any  # indices of those that are solved for
     base: Any  # (size,) values of the held ones
     rate: Any  # (size,) their change with the drive
-    scales: Scales
+    scales: MechanicsUnits
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
     fits: Mapping[str, Fit]
+    floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
 
     @property
     def n_motions(self) -> int:
@@ -123,7 +124,7 @@ def discretise(
     degree: int = 10,
     pieces: int = 1,
     tension: Mapping[str, float] | None = None,
-    scales: Scales | None = None,
+    scales: MechanicsUnits | None = None,
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -137,7 +138,7 @@ def discretise(
         Elements for every smooth piece of a beam, at least.
     tension : mapping, optional
         Beams under a large tension N to their L sqrt(N/EI).
-    scales : Scales, optional
+    scales : MechanicsUnits, optional
         Units; found from the beams unless given.
 
     Raises
@@ -145,10 +146,10 @@ def discretise(
     cfmkit.errors.InputError
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
-    return _Builder(network, drive, degree, pieces, tension or {}, scales).build()
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales).build()
 
 
-class _Builder:
+class _ArrayBuilder:
     """Numbers unknowns and attachments and collects the elements."""
 
     def __init__(
@@ -184,15 +185,15 @@ class _Builder:
         free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits,
+            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]),
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
-    def _scales(self) -> Scales:
+    def _scales(self) -> MechanicsUnits:
         length = float(np.mean([np.real(fitted.length) for fitted in self.fits.values()]))
         section = next(iter(self.network.beams.values())).section
         rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
-        return Scales(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
+        return MechanicsUnits(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
 
     def _body(self) -> tuple[int, int, int]:
         return next(self.count), next(self.count), next(self.count)
@@ -254,6 +255,7 @@ class _Builder:
                 "cuts": (left, right),
                 "raw": beam.closure == "raw",
                 "inner": k < len(cuts) - 2,
+                "floored": floor > 0,
             }
             last = piece["ends"][1]
 
@@ -293,7 +295,7 @@ class _Builder:
         self.places.append((np.array([*body, body[2]]), np.zeros(2), origin + arm + np.array([x, y]), 0.0))
         return len(self.places) - 1
 
-    def _elements(self, pieces: list[dict[str, Any]], attachments: Attachments) -> tuple[Elements, int]:
+    def _elements(self, pieces: list[dict[str, Any]], attachments: Attachments) -> tuple[BeamElements, int]:
         """Return the elements and the number of unknowns: bubbles and forces are numbered behind motions of ends."""
         bubbles = [[next(self.count) for _ in range(self.degree - 1)] for _ in pieces]
         forces = [[next(self.count), next(self.count)] for _ in pieces]
@@ -303,7 +305,7 @@ class _Builder:
         tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
         beams = tuple(piece["beam"] for piece in pieces)
         line = self._line_loads()
-        elements = Elements(
+        elements = BeamElements(
             **tables, line=np.array([line[name] for name in beams]), gap=np.zeros((len(pieces), 2)), ends=ends,
             unknowns=unknowns, beam=beams, cuts=np.array([piece["cuts"] for piece in pieces]),
         )  # fmt: skip
@@ -321,7 +323,7 @@ class _Builder:
                     sums[load.beam] = sums[load.beam] + added
         return sums
 
-    def _gaps(self, pieces: list[dict[str, Any]], elements: Elements, attachments: Attachments) -> Any:
+    def _gaps(self, pieces: list[dict[str, Any]], elements: BeamElements, attachments: Attachments) -> Any:
         """Return by how much the last element of each beam that is forced into place misses its node."""
         place = attachments.origin + attachments.arm
         span = place[elements.ends[:, 1]] - place[elements.ends[:, 0]]
@@ -331,7 +333,7 @@ class _Builder:
 
     # -- what is held ----------------------------------------------------------------------------------------------
     def _constraints(
-        self, size: int, elements: Elements, attachments: Attachments, acting: list[Attached]
+        self, size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
         displaced = [value for node in self.network.nodes.values() for value in node.support.displacement]
@@ -370,7 +372,7 @@ def _fits(network: Network) -> dict[str, Fit]:
     return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
 
 
-def _used(size: int, elements: Elements, attachments: Attachments, acting: list[Attached]) -> Any:
+def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
     """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
     used = np.zeros(size, bool)
     used[elements.unknowns[:, [0, 1, 3, 4, 5, *range(7, elements.unknowns.shape[1])]]] = True
@@ -418,6 +420,6 @@ def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
 
 def without_floor(discretisation: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
-    axial = discretisation.elements.axial.copy()
-    axial[elements] = 0.0
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial))
+    axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
+    axial[elements], floored[elements] = 0.0, False
+    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.mechanics.poses import Poses, poses
+from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _contributions(network: Discretisation, z: Any, drive: Any, share: Any) -> I
         yield TERMS[type(attached.item)](network, attached, z, share, drive)
 
 
-def _end_poses(network: Discretisation, z: Any) -> tuple[Poses, Poses]:
+def _end_poses(network: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
     return tuple(poses(network.attachments, z, network.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
 
 
@@ -154,9 +154,10 @@ def count_unstable(network: Discretisation, tangent: Any) -> int:
     are maxima of the functional, or constraints with one negative and one positive pivot each. Under loads that follow:
     the negative real eigenvalues of the motions' stiffness.
     """
+    from scipy.linalg import lapack
+
     if any(load.item.follows for load in network.loads):
         return int((motion_eigenvalues(network, tangent) < 0).sum())
-    from scipy.linalg import lapack
 
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0

@@ -178,10 +178,15 @@ class CompiledEquations(NumpyEquations):
         return self._counted(march, start.unstable) if self.follows else march
 
     def _counted(self, march: March, unstable: int) -> March:
-        """Return a march with eigenvalues counted, as far as their number stays the same."""
+        """Return a march with eigenvalues counted, as far as their number stays the same.
+
+        They are counted at the last state; at the others only if that differs.
+        """
         states: list[State] = []
+        last = march.states[-1:]
+        same = all(self._unstable(state.free, state.way, 0) == unstable for state in last)
         for state in march.states:
-            if self._unstable(state.free, state.way, 0) != unstable:
+            if not same and self._unstable(state.free, state.way, 0) != unstable:
                 return March(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
             states.append(replace(state, unstable=unstable))
         return replace(march, states=tuple(states))

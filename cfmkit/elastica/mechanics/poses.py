@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Attachments
 
 
-class Poses(NamedTuple):
+class AttachmentPoses(NamedTuple):
     """Places of k attachments and what moves them; dX/d(x, y, rotation) is the jacobian, d2X/drotation2 = -arm."""
 
     place: Any  # (..., k, 2)
@@ -19,7 +19,7 @@ class Poses(NamedTuple):
     unknowns: Any  # (k, 4)
 
 
-def poses(attachments: Attachments, z: Any, which: Any) -> Poses:
+def poses(attachments: Attachments, z: Any, which: Any) -> AttachmentPoses:
     """Return the poses of attachments at the values of all unknowns, (size,) or of several states (n, size)."""
     unknowns = attachments.unknowns[which]
     cos, sin = attachments.frame[which].T
@@ -30,4 +30,4 @@ def poses(attachments: Attachments, z: Any, which: Any) -> Poses:
     jacobian = np.empty((*place.shape, 3), np.result_type(arm, cos))
     jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 0, 2] = cos, -sin, -arm[..., 1]
     jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = sin, cos, arm[..., 0]
-    return Poses(place, arm, jacobian, unknowns)
+    return AttachmentPoses(place, arm, jacobian, unknowns)

@@ -1,0 +1,76 @@
+"""The error of a path on its functional: the same equilibria with a higher degree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.mechanics.refine import embed
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.problem import largest_motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.results.path import Path
+
+DEGREES_MORE = 4
+MAX_POINTS = 10  # at which the degree is raised
+BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
+SAFETY = 1.5
+ROUNDING = 1e-13
+MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
+NO_EFFORT, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
+
+
+def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
+    """Return the estimated errors of efforts, reactions and motions of nodes at points, relative to the largest ones.
+
+    `finer` is the path's network with a degree that is `DEGREES_MORE` higher. Infinite where it has no equilibrium
+    nearby, or one of another stability.
+    """
+    if not len(path) or not len(indices):
+        return np.zeros(len(indices))
+    problem, scales = NetworkProblem(finer), path.network.scales
+    n_bodies = int(path.network.elements.unknowns[:, 8].min())
+    guesses = embed(path.network, finer, path.at.z[list(indices)])
+    states, known = guesses.copy(), np.ones(len(indices), bool)
+    for row, index in enumerate(indices):
+        guess, drive = guesses[row, finer.free], float(path.at.drive[index])
+        near = correct(problem, guess, drive)
+        if (
+            near is None
+            or largest_motion(problem, near.x - guess) > MAX_CHANGE
+            or near.unstable != path.unstable[index]
+        ):
+            known[row] = False
+        else:
+            states[row, finer.free] = near.x
+    at = Equilibria(finer, states, path.at.drive[list(indices)])
+    fine = replace(path, at=at)
+    efforts: Any = np.abs(fine.effort - path.effort[list(indices)])
+    forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
+    moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
+    size = max(float(np.abs(path.effort).max()), NO_EFFORT * scales.moment / scales.drive)
+    reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), NO_MOTION)
+    load = max(float(np.abs(path.residual[:, :n_bodies]).max()), NO_EFFORT)
+    relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
+    return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+
+
+def pick_points(path: Path) -> list[int]:
+    """Return the indices of the points at which the error of a path is estimated, none beside an event."""
+    if not len(path):
+        return []
+    at = path.at_requested if len(path.at_requested) else np.arange(len(path))
+    chosen = {*at[np.linspace(0, len(at) - 1, min(len(at), MAX_POINTS - 1)).astype(int)].tolist()}
+    chosen.add(int(at[np.abs(path.effort[at]).argmax()]))
+    width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
+    places = [event.drive for event in path.events]
+    return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

@@ -1,0 +1,155 @@
+"""What is done where a path loses its stability: locate it, say so, and go on along a stable branch if there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cfmkit.numerics.continuation.branches import (
+    AMPLITUDES,
+    LAST_AMPLITUDES,
+    descend,
+    enter_branch,
+    find_beside,
+    opens_at,
+)
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.events import locate_loss
+from cfmkit.numerics.continuation.path import Branch, End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.problem import Equilibrium, largest_motion
+from cfmkit.numerics.continuation.steps import advance
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.events import Located
+
+Items = Generator[Point | Event, None, Walk | Ending | None]
+"""What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
+
+FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
+NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
+"""Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
+ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
+LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
+LOOK_PAST_BY = 2e-3, 2e-2
+"""Shares of the range ahead of here and of the goal at which the path may be less stable."""
+LOOK_PAST_MISS = 0.02  # motion
+FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
+
+
+def lose_stability(walk: Walk, new: Equilibrium) -> Items:
+    """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
+    problem, options, here = walk.problem, walk.options, walk.here
+    found = locate_loss(walk, new)
+    if found is None:
+        return None
+    far = next(
+        (
+            e
+            for e in reversed(walk.trail)
+            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.trail[0].drive)
+        ),
+        here,
+    )
+    slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
+    modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
+    if options.branch == "primary":
+        modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
+        yield Event("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
+        walk = yield from _reach_bifurcation(walk, found, far, slope)
+        return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
+    if options.branch == "stop":
+        yield from _reach_bifurcation(walk, found, far, slope)
+        return Ending(End.JUMPS, found.drive, "stability is lost")
+    mode = problem.orient(modes)
+    onto = enter_branch(walk, found.x, found.drive, mode, AMPLITUDES)
+    for clusters in NEAR_CLUSTERS, WIDE_CLUSTERS:  # not one mode by itself: all that become unstable soon, together
+        several = None if onto else _pass_together(walk, new, found, slope, clusters)
+        if several is not None:
+            onto, modes, after = several
+        onto = onto or enter_branch(walk, found.x, found.drive, mode, LAST_AMPLITUDES)
+    yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
+    walk = yield from _reach_bifurcation(walk, found, far, slope)
+    if onto is None:
+        return Ending(End.JUMPS, found.drive, "stability is lost and no stable equilibrium is near")
+    return (yield from _begin_branch(walk, found, onto, after))
+
+
+def _well_before(walk: Walk, drive: float, distance: float) -> Equilibrium | None:
+    """Return the last equilibrium of this piece that is farther than a distance from a drive."""
+    return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
+
+
+def _pass_together(
+    walk: Walk, new: Equilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
+) -> tuple[Equilibrium, FloatArray, int] | None:
+    """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
+    problem, here = walk.problem, walk.here
+    for factor in clusters:
+        width = factor * walk.options.cluster
+        ahead = walk.sense * width * walk.options.span
+        saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
+        if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
+            continue
+        onto = descend(problem, saddle, walk.options.sign)
+        if onto is None or onto.unstable > here.unstable or not opens_at(problem, found.x, found.drive, onto):
+            continue
+        return onto, problem.modes(found.near, saddle.unstable - here.unstable)[1], saddle.unstable
+    return None
+
+
+def _reach_bifurcation(walk: Walk, found: Located, far: Equilibrium, slope: FloatArray) -> Generator[Point, None, Walk]:
+    """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
+    problem, unstable = walk.problem, walk.here.unstable
+    for number in walk.targets_up_to(found.drive):
+        goal = float(walk.targets[number])
+        guess = found.x + (goal - found.drive) * slope
+        at = advance(walk, goal).new
+        if at is None or at.unstable > unstable:
+            at = correct(problem, guess, goal)
+        if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
+            at = Equilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
+        yield Point(at, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    return walk
+
+
+def _begin_branch(walk: Walk, found: Located, onto: Equilibrium, after: int) -> Generator[Point, None, Walk]:
+    """Yield the first points of a branch; return the walk on it."""
+    branch = Branch(found.drive, walk.options.sign)
+    for number in walk.targets_up_to(onto.drive) if not walk.done else ():
+        goal = float(walk.targets[number])
+        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)
+        walk = replace(walk, number=number + 1)
+    yield Point(onto, -1, branch)
+    modes = after - walk.here.unstable
+    walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
+    return replace(walk, branch=branch, modes=modes)
+
+
+def look_past(walk: Walk, goal: float) -> Items:
+    """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
+    problem, span, here = walk.problem, walk.options.span, walk.here
+    far, primary = (
+        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0],
+        walk.options.branch == "primary",
+    )
+    for share in LOOK_PAST_BY:
+        for origin in (here.drive, goal):
+            drive = origin + walk.sense * share * span
+            guess = far.x + (drive - far.drive) * far.rate
+            past = correct(problem, guess, drive)
+            if (
+                past is not None
+                and (past.unstable > here.unstable or (primary and past.unstable != here.unstable))
+                and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
+            ):
+                return (yield from lose_stability(replace(walk, here=far), past))
+    return None
+
+
+def start_unstable(walk: Walk) -> Walk | None:
+    """Return the walk at a stable equilibrium below an unstable start, or None."""
+    onto = descend(walk.problem, walk.here, walk.options.sign)
+    return None if onto is None else walk.restart(onto, FIRST_STEP_BELOW * walk.options.span)
