@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ from cfmkit.elastica import (
 from cfmkit.elastica.mechanics.design_derivatives import effort_slopes
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, NumpyEquations, Plan, begin
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import engine, equations, march_many
 from cfmkit.elastica.results.frequencies import frequencies
 from cfmkit.elastica.vibration import NetworkMasses
@@ -48,6 +49,7 @@ from cfmkit.elastica.vibration import NetworkMasses
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+DEGREES = ((1e-4, 5), (1e-6, 7), (1e-8, 9))
 CURVE = Displacement("n5", -np.pi / 2, np.arange(1, 33) * 0.5 * MM)
 
 
@@ -65,11 +67,16 @@ def row(name: str, old: Callable[[], Any], new: Callable[[], Any], turns: int = 
     print(f"{name:44s} {before:9.3f} {after:9.3f} {unit}  {before / after:6.2f}", flush=True)
 
 
+def _effort(case: Any, tolerance: float) -> Any:
+    """Return the efforts of the shooting engine on a new path."""
+    return trace(*case, Control(tolerance=tolerance)).effort
+
+
 def march(net: Network, drive: Any, degree: int, kind: Any = equations) -> Any:
     """Return the march to the points of a drive."""
     own = kind(discretise(net, drive, degree))
     goals = drive.points / own.network.scales.drive
-    return own.march(begin(own), goals, Plan(0.05 * abs(goals[-1]), abs(goals[-1]), tolerance=1e-8))
+    return own.march(begin(own), goals, MarchPlan(0.05 * abs(goals[-1]), abs(goals[-1]), tolerance=1e-8))
 
 
 def curves() -> None:
@@ -80,13 +87,10 @@ def curves() -> None:
         Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}),
         Loading((PointLoad("b", fy=1.0, follows=True),), np.arange(1, 21) * 0.05),
     )
-    for tolerance, degree in ((1e-4, 5), (1e-6, 7), (1e-8, 9)):
-        control = Control(tolerance=tolerance)
-        row(f"Lan, 32 points, {tolerance:.0e}: degree {degree}",
-            lambda control=control: trace(lan(), CURVE, control).effort, lambda degree=degree: march(lan(), CURVE, degree))  # fmt: skip
-    for name, case, degree in (("coil of 20 turns", coil, 8), ("load that follows, 20 points", follower, 8)):
-        row(f"{name}, 1e-6: degree {degree}",
-            lambda case=case: trace(*case, Control(tolerance=1e-6)).effort, lambda case=case, degree=degree: march(*case, degree))  # fmt: skip
+    lans = [((lan(), CURVE), f"Lan, 32 points, {tolerance:.0e}", tolerance, degree) for tolerance, degree in DEGREES]
+    others = [(coil, "coil of 20 turns, 1e-06", 1e-6, 8), (follower, "load that follows, 20 points, 1e-06", 1e-6, 8)]
+    for case, name, tolerance, degree in (*lans, *others):
+        row(f"{name}: degree {degree}", partial(_effort, case, tolerance), partial(march, *case, degree))
     row(
         "Lan in numpy beside C: degree 6",
         lambda: march(lan(), CURVE, 6, NumpyEquations),
@@ -138,8 +142,12 @@ def results() -> None:
         return effort_slopes(new.at, set_up(new.network, (lan(), CURVE), stepped), rates)
 
     row("13 gradients, 32 points, 1e-5: degree 6", lambda: gradient(path, lan, SHAPE).effort, slopes)
-    row("largest stresses of 4 beams, 32 points", lambda: [replace(path).beam_stress(b)[0] for b in path.layout.network.beams],
-        lambda: [replace(new).beam_stress(b)[0] for b in new.net.beams])  # fmt: skip
+    names = list(new.net.beams)
+    row(
+        "largest stresses of 4 beams, 32 points",
+        lambda: [replace(path).beam_stress(name) for name in names],
+        lambda: [replace(new).beam_stress(name) for name in names],
+    )
     masses, some = NetworkMasses(dict.fromkeys(new.net.beams, 1100.0)), [8, 16, 24]
     row("5 frequencies, held and free, 3 points", lambda: today.frequencies(path, masses, 5, path.at_requested[some]),
         lambda: frequencies(new, masses, 5, some), 3)  # fmt: skip

@@ -12,14 +12,14 @@ from varied_networks import LAN, X, arms, lan, pushed, turned
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import effort_slopes, unknown_slopes
-from cfmkit.elastica.mechanics.designs import Designs, design_of, set_up
+from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 
 FINE = Control(tolerance=1e-11)
 
 
-def stepped(template: Any, build: Any, x: Any) -> Designs:
+def stepped(template: Any, build: Any, x: Any) -> NetworkDesigns:
     """Return a complex step in each variable of a function that builds network and drive."""
     each = [build(x + 1j * COMPLEX_STEP * unit) for unit in np.eye(len(x))]
     return set_up(template, build(x), each)

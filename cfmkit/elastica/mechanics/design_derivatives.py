@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.designs import Designs
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 
@@ -111,14 +111,14 @@ def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArra
     return found
 
 
-def effort_slopes(at: Equilibria, designs: Designs, rates: FloatArray | None = None) -> FloatArray:
+def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | None = None) -> FloatArray:
     """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m].
 
     Parameters
     ----------
     at : Equilibria
         Under a drive by a motion, of the designs' template.
-    designs : Designs
+    designs : NetworkDesigns
         A complex step of `COMPLEX_STEP` in each variable.
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path, if they are known.
@@ -135,7 +135,7 @@ def effort_slopes(at: Equilibria, designs: Designs, rates: FloatArray | None = N
     return np.asarray(total * network.scales.moment / network.scales.drive)
 
 
-def _contracted(known: dict[str, Any], designs: Designs) -> FloatArray:
+def _contracted(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
     total = 0.0
     for name, table in (designs.tables | designs.places).items():
         if np.iscomplexobj(table):
@@ -144,7 +144,7 @@ def _contracted(known: dict[str, Any], designs: Designs) -> FloatArray:
     return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
 
 
-def _changed_terms(designs: Designs) -> list[list[tuple[Discretisation, Attached]]]:
+def _changed_terms(designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
     """Return the springs and loads of each design that have a complex step, with the arrays of that design."""
     found: list[list[tuple[Discretisation, Attached]]] = []
     if not (designs.template.springs or designs.template.loads):
@@ -192,7 +192,7 @@ def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     return found
 
 
-def unknown_slopes(at: Equilibria, designs: Designs) -> FloatArray:
+def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     """Return the derivatives of all unknowns by variables, (p, k, size).
 
     Raises

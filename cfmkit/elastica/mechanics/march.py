@@ -17,12 +17,12 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
-    Linearised,
-    March,
+    LinearEquations,
     MarchCode,
+    MarchPlan,
+    MarchState,
+    NaturalMarch,
     NumpyEquations,
-    Plan,
-    State,
     begin,
 )
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.designs import Designs
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 MAX_DEGREE = 40
@@ -116,9 +116,9 @@ class CompiledEquations(NumpyEquations):
         compiled().evaluate(self.row, *given, found, np.empty(0), 1.0)
         return found
 
-    def linearise(self, free: FloatArray, way: float) -> Linearised:
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        out = Linearised(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
+        out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
         compiled().linearise(self.row, np.ascontiguousarray(free, float), *out, way)
         return out
 
@@ -150,7 +150,7 @@ class CompiledEquations(NumpyEquations):
         push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
-    ) -> State | None:
+    ) -> MarchState | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
         x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
         nothing = np.empty(0)
@@ -158,9 +158,9 @@ class CompiledEquations(NumpyEquations):
         if compiled().solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
             return None
         way = float(at[0])
-        return State(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+        return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
 
-    def march(self, start: State, targets: FloatArray, plan: Plan) -> March:
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
         rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
@@ -171,28 +171,28 @@ class CompiledEquations(NumpyEquations):
         here = np.concatenate([start.free, start.rate, [start.way]])
         code = compiled().march(self.row, given, here, known, goals, rows, stored)
         states = tuple(
-            State(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
+            MarchState(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
             for row in rows[: stored[0]].copy()
         )
-        march = March(states, MarchCode(code), float(given[0]))
+        march = NaturalMarch(states, MarchCode(code), float(given[0]))
         return self._counted(march, start.unstable) if self.follows else march
 
-    def _counted(self, march: March, unstable: int) -> March:
+    def _counted(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with eigenvalues counted, as far as their number stays the same.
 
         They are counted at the last state; at the others only if that differs.
         """
-        states: list[State] = []
+        states: list[MarchState] = []
         last = march.states[-1:]
         same = all(self._unstable(state.free, state.way, 0) == unstable for state in last)
         for state in march.states:
             if not same and self._unstable(state.free, state.way, 0) != unstable:
-                return March(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
             states.append(replace(state, unstable=unstable))
         return replace(march, states=tuple(states))
 
 
-def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
+def _plan_row(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     return np.array(
         [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
@@ -200,13 +200,13 @@ def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
 
 
 def march_many(
-    designs: Designs, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+    designs: NetworkDesigns, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
 ) -> tuple[FloatArray, Any]:
     """Return the efforts of many designs under a drive by a motion, each followed from rest.
 
     Parameters
     ----------
-    designs : Designs
+    designs : NetworkDesigns
         Real ones, without constant loads or displaced supports.
     targets : (k,) array
         Values of the drive [m or rad].
@@ -225,7 +225,7 @@ def march_many(
     own = equations(designs.template)
     goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
     span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
-    plan = Plan(first_step * span, span, tolerance=tolerance)
+    plan = MarchPlan(first_step * span, span, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
     if isinstance(own, CompiledEquations) and not own.follows:
         kept = design_arrays(own, designs)
@@ -238,17 +238,17 @@ def march_many(
     return efforts * own.effort_unit, codes
 
 
-def march_one(own: NumpyEquations, goals: FloatArray, plan: Plan, efforts: FloatArray, code: Any) -> None:
+def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: FloatArray, code: Any) -> None:
     """Follow one network from rest; put its efforts at the goals and how it ended into the arrays given."""
     start = begin(own)
-    march = March((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+    march = NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
     code[0] = march.code
     for state in march.states:
         if state.target >= 0:
             efforts[state.target] = state.effort
 
 
-def design_arrays(own: CompiledEquations, designs: Designs) -> dict[str, Any]:
+def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
     rule, tables = basis(own.network.degree), designs.tables
     found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}

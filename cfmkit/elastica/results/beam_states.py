@@ -137,7 +137,7 @@ def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
     return np.stack([found.x[0], found.y[0]], axis=-1)
 
 
-class Sections(NamedTuple):
+class BeamSections(NamedTuple):
     """Section forces and stresses at places of a beam, (p, k) each."""
 
     place: Any  # fraction of the arc length
@@ -153,7 +153,7 @@ class Sections(NamedTuple):
         return bending + np.abs(self.axial_stress) if axial else bending
 
 
-def sections(net: Network, beam: str, found: BeamStates) -> Sections:
+def sections(net: Network, beam: str, found: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam."""
     angle = found.angle + found.turn
     cos, sin = np.cos(angle), np.sin(angle)
@@ -161,4 +161,4 @@ def sections(net: Network, beam: str, found: BeamStates) -> Sections:
     area = net.beams[beam].section.width * found.thickness
     bending = 6 * found.moment / (area * found.thickness)
     place = np.broadcast_to(found.place, found.moment.shape)
-    return Sections(place, found.moment, normal, shear, bending, normal / area)
+    return BeamSections(place, found.moment, normal, shear, bending, normal / area)

@@ -39,7 +39,7 @@ from cfmkit.numerics.one_blas_thread import one_blas_thread
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.results.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 10, 2
@@ -53,7 +53,7 @@ N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
 @one_blas_thread
 def frequencies(
-    path: Path,
+    path: EquilibriumPath,
     masses: NetworkMasses,
     count: int,
     points: Any = None,
@@ -63,10 +63,10 @@ def frequencies(
 
     Parameters
     ----------
-    path : Path
+    path : EquilibriumPath
         The equilibria.
     masses : NetworkMasses
-        Density of every beam, masses of nodes. Sections rotate with inertia where they shear, too.
+        Density of every beam, masses of nodes. BeamSections rotate with inertia where they shear, too.
     count : int
         How many frequencies, at least 1.
     points : (p,) int array, optional
@@ -83,7 +83,7 @@ def frequencies(
     _check(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
     fine = raise_degree(path.network, _degree(path.network, count))
-    system = _System(path, fine, masses)
+    system = _VibratingNetwork(path, fine, masses)
     by_load = isinstance(path.given, Loading)
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
     grows = np.zeros((2, len(chosen)), dtype=bool)
@@ -101,7 +101,7 @@ def frequencies(
     return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
 
 
-def _check(path: Path, masses: NetworkMasses, count: int) -> None:
+def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
     if missing := [name for name in path.net.beams if name not in masses.density]:
@@ -130,10 +130,10 @@ class _Matrices:
     mass: FloatArray
 
 
-class _System:
+class _VibratingNetwork:
     """Stiffness and mass about one pose after another."""
 
-    def __init__(self, path: Path, fine: Discretisation, masses: NetworkMasses) -> None:
+    def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.net, self.fine, self.masses = path.net, fine, masses
         self.order = fine.degree - 1  # of forces and, by one more, positions: as smooth as sines of the rotation
         rule = basis(fine.degree)

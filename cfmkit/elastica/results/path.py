@@ -34,7 +34,7 @@ N_PLACES = 17
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path(ShortRepr):
+class EquilibriumPath(ShortRepr):
     """Equilibria of a network under a drive, n points in the order of the path; SI."""
 
     net: Network  # the model
@@ -155,7 +155,7 @@ class Path(ShortRepr):
         """Return where the sampled places of a beam lie, (k,) [fraction of the arc length]."""
         return read_only(self.states(beam).place)
 
-    def sections(self, beam: str) -> beam_states.Sections:
+    def sections(self, beam: str) -> beam_states.BeamSections:
         """Return section forces and stresses along a beam at all points; arrays (n, k)."""
         return beam_states.sections(self.net, beam, self.states(beam))
 
@@ -178,7 +178,7 @@ class Path(ShortRepr):
         """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
         return {}
 
-    def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.StressExtremes:
+    def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:
         """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""
         return stress_extremes.signed_extremes(self.net, self.at, beam, axial)
 

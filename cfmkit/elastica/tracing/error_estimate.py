@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.results.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
 
 DEGREES_MORE = 4
 MAX_POINTS = 10  # at which the degree is raised
@@ -29,7 +29,7 @@ MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
 NO_EFFORT, NO_MOTION = 1e-12, 1e-6  # forces and motions that are none, dimensionless
 
 
-def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
+def point_errors(path: EquilibriumPath, finer: Discretisation, indices: Sequence[int]) -> FloatArray:
     """Return the estimated errors of efforts, reactions and motions of nodes at points, relative to the largest ones.
 
     `finer` is the path's network with a degree that is `DEGREES_MORE` higher. Infinite where it has no equilibrium
@@ -64,7 +64,7 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
 
 
-def pick_points(path: Path) -> list[int]:
+def pick_points(path: EquilibriumPath) -> list[int]:
     """Return the indices of the points at which the error of a path is estimated, none beside an event."""
     if not len(path):
         return []

@@ -12,7 +12,7 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.outcome.path import Event, PathStatus
-from cfmkit.elastica.results.path import Path
+from cfmkit.elastica.results.path import EquilibriumPath
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import Start, find_start, is_stretched
@@ -56,7 +56,7 @@ class Mesh:
         """Return the arrays of a network, with a higher degree by `more`."""
         return discretise(network, drive, self.degree + more, self.pieces, self.tension)
 
-    def finer(self, path: Path) -> Discretisation:
+    def finer(self, path: EquilibriumPath) -> Discretisation:
         """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
         fine = self.arrays(path.net, path.given, DEGREES_MORE)
         return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
@@ -65,12 +65,12 @@ class Mesh:
 class Attempt(NamedTuple):
     """A path on one discretisation."""
 
-    path: Path
+    path: EquilibriumPath
     mesh: Mesh
     first: Buckling | None  # first loss of stability
 
 
-def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
+def trace(network: Network, drive: Drive, control: Control | None = None) -> EquilibriumPath:
     """Return the path of equilibria of a network under a drive, from rest through all requested points.
 
     Parameters
@@ -84,7 +84,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 
     Returns
     -------
-    Path
+    EquilibriumPath
         Converged points only. `Path.status` says whether the path reaches all requested points, and if not, why.
     """
     control = control or Control()
@@ -149,7 +149,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
     return best
 
 
-def _end_alike(path: Path, before: Path) -> bool:
+def _end_alike(path: EquilibriumPath, before: EquilibriumPath) -> bool:
     """Return True if two paths end early at the same place: no degree leads further."""
     early = (PathStatus.LIMIT_POINT, PathStatus.JUMPS, PathStatus.LOST)
     if path.status not in early or not len(path) or not len(before):
@@ -201,13 +201,13 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
 def _path(
     network: Network, drive: Drive, start: Start, points: list[Point], events: tuple[Event, ...],
     status: PathStatus, message: str,
-) -> Path:  # fmt: skip
+) -> EquilibriumPath:  # fmt: skip
     arrays = start.problem.network
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
     names = [_name_branch(point.branch, arrays.scales.drive) for point in points]
-    return Path(
+    return EquilibriumPath(
         network, drive, Equilibria(arrays, z, drives),
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
@@ -243,7 +243,7 @@ def _explain(start: Start, ending: Ending, unit: float) -> tuple[PathStatus, str
     return status, text
 
 
-def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
+def _are_settled(path: EquilibriumPath, before: EquilibriumPath | None, control: Control) -> bool:
     """Return True if bifurcations far along the primary path lie where they do at another degree.
 
     The path itself says nothing about their error: a straight column has none, while its high modes have waves.
@@ -257,11 +257,11 @@ def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
     return bool(shift <= max(EVENT_TOLERANCE, control.tolerance) * _span(path))
 
 
-def _span(path: Path) -> float:
+def _span(path: EquilibriumPath) -> float:
     return float(np.ptp(np.append(path.given.points, 0.0)))
 
 
-def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
+def _tension(path: EquilibriumPath, known: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
     e = path.network.elements
     if not len(path):
