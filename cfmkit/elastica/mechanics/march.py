@@ -135,11 +135,9 @@ class CompiledEquations(NumpyEquations):
             raise np.linalg.LinAlgError("the tangent is singular")
         return found, self._unstable(free, way, int(count[0]))
 
-    def _unstable(self, free: FloatArray, way: float, pivots: int) -> int:
-        """Return the count of C; under loads that follow it is a parity, and eigenvalues are counted."""
-        if not self.follows:
-            return pivots
-        return energy.count_unstable(self.network, self.linearise(free, way).tangent)
+    def _unstable(self, free: FloatArray, way: float, told: int) -> int:
+        """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
+        return told if told >= 0 else energy.count_unstable(self.network, self.linearise(free, way).tangent)
 
     def solve(
         self,
@@ -178,15 +176,10 @@ class CompiledEquations(NumpyEquations):
         return self._counted(march, start.unstable) if self.follows else march
 
     def _counted(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
-        """Return a march with eigenvalues counted, as far as their number stays the same.
-
-        They are counted at the last state; at the others only if that differs.
-        """
+        """Return a march with its unstable directions counted, as far as their number stays the same."""
         states: list[MarchState] = []
-        last = march.states[-1:]
-        same = all(self._unstable(state.free, state.way, 0) == unstable for state in last)
         for state in march.states:
-            if not same and self._unstable(state.free, state.way, 0) != unstable:
+            if self._unstable(state.free, state.way, state.unstable) != unstable:
                 return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
             states.append(replace(state, unstable=unstable))
         return replace(march, states=tuple(states))

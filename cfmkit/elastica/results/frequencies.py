@@ -37,16 +37,19 @@ from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
-DEGREE_OF_FIRST, DEGREE_PER_MODE = 10, 2
+DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
 MAX_DEGREE = 36
 MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
 NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is zero
+ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
@@ -119,15 +122,15 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
 
 
 def _degree(network: Discretisation, count: int) -> int:
-    return max(network.degree, min(MAX_DEGREE, DEGREE_OF_FIRST + DEGREE_PER_MODE * count))
+    return max(network.degree, min(MAX_DEGREE, DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count)))
 
 
 @dataclass(frozen=True)
 class _Matrices:
-    """Stiffness and mass of all unknowns, those of the elements' insides behind the others; masses in kg."""
+    """Stiffness and the root of the mass, M = R R^T, of all unknowns: elements' insides behind the others; kg."""
 
-    stiffness: FloatArray
-    mass: FloatArray
+    stiffness: FloatArray  # (n, n)
+    root: FloatArray  # (n, m): what the unknowns move a point by, times the root of its mass
 
 
 class _VibratingNetwork:
@@ -147,15 +150,21 @@ class _VibratingNetwork:
 
     def at(self, z: FloatArray, drive: float) -> _Matrices:
         """Return the matrices about a pose."""
-        stiffness, mass = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
         self._vary(stiffness, z, drive)
-        self._weigh(mass, z)
+        columns = [self._spread(*given) for given in self._weighed(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
             moves, unknowns = self._node(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
-            np.add.at(mass, (unknowns[:, None], unknowns), moves.T @ (size[:, None] * moves))
-        return _Matrices(stiffness, mass)
+            columns.append(self._spread(unknowns, moves, size))
+        return _Matrices(stiffness, np.hstack(columns))
+
+    def _spread(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
+        """Return columns of the root, (size, m), of points that some unknowns move by moves (m, unknowns)."""
+        column = np.zeros((self.size, len(moves)))
+        np.add.at(column, unknowns, moves.T * np.sqrt(masses))
+        return column
 
     def _vary(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
@@ -182,8 +191,8 @@ class _VibratingNetwork:
                     stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
                     stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
 
-    def _weigh(self, mass: FloatArray, z: FloatArray) -> None:
-        """Add the masses of beams, and the inertia of their sections."""
+    def _weighed(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
+        """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
         fine, e, u = self.fine, self.fine.elements, self.rule.places
         ends = [poses(fine.attachments, z, e.ends[:, side]).jacobian for side in (0, 1)]
         rotations = e.unknowns[:, energy.rotation_columns(fine.degree)]
@@ -196,10 +205,9 @@ class _VibratingNetwork:
             for axis in (0, 1):
                 moves = np.hstack([np.outer(1 - u, ends[0][k, axis]), np.outer(u, ends[1][k, axis]), self.bubbles])
                 unknowns = np.concatenate([e.unknowns[k, [0, 1, 2, 4, 5, 6]], self.positions[k, axis]])
-                np.add.at(mass, (unknowns[:, None], unknowns), (moves.T * density) @ moves)
+                yield unknowns, moves, density
             if section.shear:  # slenderness at which inertia of sections counts is that at which shear does
-                inertia, values = density * (thickness / fine.scales.length) ** 2 / 12, self.rule.values
-                np.add.at(mass, (rotations[k][:, None], rotations[k]), (values.T * inertia) @ values)
+                yield rotations[k], self.rule.values, density * (thickness / fine.scales.length) ** 2 / 12
 
     def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
         """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
@@ -222,36 +230,31 @@ def _chosen(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""
     driven = np.empty(0, int) if is_held else np.flatnonzero(fine.rate)
-    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.mass))])
-    stiffness, mass = matrices.stiffness[np.ix_(own, own)], matrices.mass[np.ix_(own, own)]
+    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
+    stiffness, root = matrices.stiffness[np.ix_(own, own)], matrices.root[own]
     if row is None or not is_held:
-        return stiffness, mass
+        return stiffness, root
     tied = np.append(row[own], 0.0)
-    stiffness, mass = (np.pad(matrix, (0, 1)) for matrix in (stiffness, mass))
+    stiffness, root = np.pad(stiffness, (0, 1)), np.pad(root, ((0, 1), (0, 0)))
     stiffness[-1], stiffness[:, -1] = tied, tied
-    return stiffness, mass
+    return stiffness, root
 
 
-def _squares(stiffness: FloatArray, mass: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
+def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
     found = np.full(count, np.nan)
-    size = np.sqrt(np.diag(mass))
-    size[size == 0.0] = 1.0
-    own, vectors = np.linalg.eigh(mass / np.outer(size, size))
-    heavy = own > np.finfo(float).eps * len(own) * own[-1]
-    root = size[:, None] * vectors[:, heavy] * np.sqrt(own[heavy])
-    shift = 1.0 / max(float(np.trace(mass)) / len(own), np.finfo(float).tiny)  # EI / (mass length^3) or so
+    shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
     symmetric = np.abs(stiffness - stiffness.T).max() <= np.finfo(float).eps * np.abs(stiffness).max()
     try:
-        flexible = root.T @ np.linalg.solve(stiffness + shift * mass, root)
+        flexible = root.T @ np.linalg.solve(stiffness + shift * root @ root.T, root)
     except np.linalg.LinAlgError:
         return found, False, not symmetric
     if symmetric:
         inverse = np.linalg.eigvalsh(0.5 * (flexible + flexible.T))
-        inverse = inverse[np.argsort(-np.abs(inverse))][:count]
-        inverse = inverse[np.abs(inverse) > np.finfo(float).eps * np.abs(inverse).max(initial=0.0)]
-        squares = np.sort(1 / inverse - shift)
-        if (1 / inverse < 0).any() or (squares < -NEUTRAL * shift).any():
+        largest = float(np.abs(inverse).max(initial=0.0))
+        lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
+        squares = 1 / lowest - shift
+        if inverse[0] < -ROUNDING * largest or (squares < -NEUTRAL * shift).any():
             return found, False, False
         found[: len(squares)] = np.where(squares < NEUTRAL * shift, 0.0, squares)
         return found, False, False
