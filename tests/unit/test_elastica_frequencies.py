@@ -8,6 +8,7 @@ import beam_networks
 import numpy as np
 import pytest
 from functional_paths import functional_path
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import cfmkit.elastica.vibration as today
@@ -145,3 +146,27 @@ def test_masses_must_be_known() -> None:
         frequencies(path, NetworkMasses({"x": 1.0}, {"there": (1.0, 0.0)}), 1)
     with pytest.raises(InputError, match="at least one frequency"):
         frequencies(path, WHOLE, 0)
+
+
+def test_a_stubby_beam_has_the_frequencies_of_timoshenko() -> None:
+    """Shear and the inertia of sections, as the boundary-value problem has them; slenderness 20."""
+    length = 20 * THICKNESS
+    section = Section(MODULUS, WIDTH, THICKNESS, axial=True, shear=True)
+    net = Network({"root": Node(0, 0, CLAMPED), "tip": Node(length, 0)}, {"x": Beam("root", "tip", section)})
+    found = frequencies(functional_path(net, Loading((PointLoad("tip", fx=1.0),), np.array([1e-9])), 8), WHOLE, 3)
+    area, second = WIDTH * THICKNESS, WIDTH * THICKNESS**3 / 12
+    slip = 5 / 6 * MODULUS / 2.6 * area
+
+    def missed(omega: float) -> float:
+        slopes = np.array(
+            [
+                [0.0, 1.0, 0.0, 1.0 / slip],
+                [0.0, 0.0, 1.0 / (MODULUS * second), 0.0],
+                [0.0, -DENSITY * second * omega**2, 0.0, -1.0],
+                [-DENSITY * area * omega**2, 0.0, 0.0, 0.0],
+            ]
+        )
+        return float(np.linalg.det(expm(slopes * length)[2:, 2:]))
+
+    for value in 2 * np.pi * found.free[-1]:
+        assert missed(value * (1 - 1e-6)) * missed(value * (1 + 1e-6)) < 0
