@@ -15,6 +15,9 @@ from cfmkit.elastica.mechanics.design_derivatives import effort_slopes, unknown_
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.results import beam_states
+from cfmkit.elastica.results.output_slopes import output_slopes
+from cfmkit.elastica.results.path import node_motion, strain_energy
 
 FINE = Control(tolerance=1e-11)
 
@@ -111,3 +114,39 @@ def test_the_effort_s_slope_by_an_array_is_a_difference_of_the_functional() -> N
     ]
     unit = at.network.scales.moment / at.network.scales.drive
     np.testing.assert_allclose(effort_slopes(at, designs, rates)[:, 3], np.array(direct) * unit, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("build", "x"), [*CASES[:2], pytest.param(pushed, X, marks=pytest.mark.slow)])
+def test_slopes_of_other_outputs_are_those_of_the_shooting_engine(build: Any, x: Any) -> None:
+    """Motions of nodes, energy, forces on the ends of beams, stresses at their ends."""
+    net, drive = build(x)
+    known = gradient(trace(net, drive, FINE), build, x)
+    at, _ = equilibria(net, drive)
+    beam, node = next(iter(net.beams)), "b" if "b" in net.nodes else "n3"
+    ends = np.array([0.0, 1.0])
+
+    def end_force(model: Any, states: Any) -> Any:
+        seen = beam_states.states(model, states, beam, ends)
+        return np.stack([seen.h[:, -1], seen.v[:, -1], seen.moment[:, -1]], axis=-1)
+
+    def stress(model: Any, states: Any) -> Any:
+        seen = beam_states.sections(model, beam, beam_states.states(model, states, beam, ends))
+        return np.stack([seen.bending_stress[:, 0], seen.axial_stress[:, 0]], axis=-1)
+
+    outputs = {
+        "motion": lambda _, states: node_motion(states, node),
+        "energy": lambda _, states: strain_energy(states) * at.network.scales.moment,
+        "force": end_force,
+        "stress": stress,
+    }
+    found = output_slopes(at, stepped(at.network, build, x), outputs)
+    sections = known.sections(beam)
+    wanted = {
+        "motion": known.motion[node],
+        "energy": known.energy,
+        "force": known.end_force(beam, 1),
+        "stress": np.stack([sections.bending_stress[:, 0], sections.axial_stress[:, 0]], axis=1),
+    }
+    for name, slopes in wanted.items():
+        size = np.abs(slopes * x).max()
+        np.testing.assert_allclose(found[name] * x, slopes * x, rtol=1e-5, atol=1e-6 * size, err_msg=name)
