@@ -27,6 +27,7 @@ from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,11 +56,15 @@ def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     last = z[..., e.unknowns[:, -2:]]
     first = last + load * e.length[:, None]
     w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
-    density = e.rigidity * at.curvature**2 / 2 - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
+    bent = bending(e, at.curvature)
+    density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
     start = poses(network.attachments, z, e.ends[:, 0])
     found = {
         "weight": density,
-        "rigidity": w * at.curvature**2 / 2,
+        "rigidity": w * bent.energy / e.rigidity,
+        "rest": w * bent.by_rest,
+        "curl": w * bent.by_curl,
+        "hindrance": w * bent.by_hindrance,
         "angle": -w * at.shear * f,
         "axial": -w * at.normal**2 / 2,
         "shear": -w * at.shear**2 / 2,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.beam import Fit, fit
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
@@ -74,6 +74,9 @@ class BeamElements(NamedTuple):
     unknowns: Any  # (e, degree + 9): those of both ends (x, y, body's and own rotation), bubbles, force
     beam: tuple[str, ...]  # the beam each one is a piece of
     cuts: FloatArray  # (e, 2) where it begins and ends, parameter of the beam's shape
+    rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
+    curl: Any = None  # (e, q) th^4/K^2 by u
+    hindrance: Any = None  # (e, q) nu^2/(1 - nu^2), 0 unless it is wide
 
 
 class Attachments(NamedTuple):
@@ -159,6 +162,7 @@ class _ArrayBuilder:
         self.count = itertools.count()
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
         self.fits = _fits(network)
+        self.wide = any(beam.section.wide for beam in network.beams.values())
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -275,6 +279,17 @@ class _ArrayBuilder:
             "shear": shear * force + 0.0 * t,
             "ahead": whole - integrals_to_points(self.degree) @ speed,
             "length": whole,
+        } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
+
+    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
+        """Return the tables of wide strips."""
+        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
+        curl, hindrance = beam.section.curling(thickness)
+        angle = fitted.angle(t, inside) + 0.0 * t
+        return {
+            "rest": slopes_at_points(self.degree) @ angle,
+            "curl": curl / (speed * self.scales.length) ** 2,
+            "hindrance": hindrance + 0.0 * speed,
         }
 
     def _floor(self, beam: Beam, fitted: Fit) -> float:
@@ -301,7 +316,8 @@ class _ArrayBuilder:
         forces = [[next(self.count), next(self.count)] for _ in pieces]
         ends = np.array([piece["ends"] for piece in pieces])
         unknowns = np.hstack([attachments.unknowns[ends[:, 0]], attachments.unknowns[ends[:, 1]], bubbles, forces])
-        columns = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+        columns: tuple[str, ...] = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+        columns += ("rest", "curl", "hindrance") if self.wide else ()
         tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
         beams = tuple(piece["beam"] for piece in pieces)
         line = self._line_loads()

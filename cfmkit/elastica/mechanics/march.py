@@ -40,7 +40,7 @@ MAX_DEGREE = 40
 SWITCH = "CFMKIT_WITHOUT_C"
 """Environment variable that keeps everything in numpy, whatever its value."""
 KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
-"""Springs and loads that march.c has; networks with others run on numpy."""
+"""Springs and loads that march.c has; networks with others, and with wide strips, run on numpy."""
 
 COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
 ADDRESSES = (
@@ -81,7 +81,7 @@ def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
         Whether the way is the share of what is constant instead of the drive.
     """
     kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
-    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
+    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE and network.elements.curl is None
     return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
 
 
@@ -283,7 +283,7 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     slot[network.free] = np.arange(len(network.free))
     bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
     springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
-    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name not in ("beam", "cuts")}
+    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name in ADDRESSES}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
     given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
     given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}

@@ -18,6 +18,7 @@ import numpy as np
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
@@ -70,7 +71,8 @@ def element_states(net: Network, at: Equilibria, beam: str, element: int, fracti
     network, scales, given = at.network, at.network.scales, tuple(np.asarray(fractions, float).tolist())
     rule, e, fitted = basis(network.degree), network.elements, network.fits[beam]
     values, cumulated, through = _matrices(network.degree, given)
-    fields = energy.fields(_one_element(network, element), at.z, at.drive)
+    one = _one_element(network, element)
+    fields = energy.fields(one, at.z, at.drive)
     speed = (e.weight[element] / rule.weights)[None]
     own = at.z[:, e.unknowns[element]]
     rotation = own[:, energy.rotation_columns(network.degree)]
@@ -80,7 +82,7 @@ def element_states(net: Network, at: Equilibria, beam: str, element: int, fracti
     )
     softer = e.axial[element] - e.shear[element]
     turning = shear * (1 + softer * normal)
-    first = e.weight[element] * e.rigidity[element] * curvature
+    first = e.weight[element] * bending(one.elements, curvature[:, None]).moment[:, 0]
     moment = -(first @ rule.slopes[:, 0] - (e.weight[element] * turning) @ rule.values[:, 0])
     load = energy.line_load(network, at.drive)[..., element, :]
     ahead = e.length[element] - cumulated @ speed[0]
@@ -118,8 +120,8 @@ def _one_element(network: Discretisation, element: int) -> Any:
 
     e = network.elements
     one = slice(element, element + 1)
-    named = {name: getattr(e, name)[one] for name in e._fields if name not in ("beam", "cuts")}
-    return replace(network, elements=e._replace(**named, beam=e.beam[one], cuts=e.cuts[one]))
+    named = {name: table[one] for name, table in e._asdict().items() if table is not None}
+    return replace(network, elements=e._replace(**named))
 
 
 def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:

@@ -14,6 +14,7 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.outcome.path import PathStatus, StressPeak, most_stressed
@@ -237,7 +238,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
 def strain_energy(at: Equilibria) -> Any:
     """Return the strain energy of beams and springs, (p,), dimensionless."""
     e, fields = at.network.elements, energy.fields(at.network, at.z, at.drive)
-    density = e.rigidity * fields.curvature**2 + e.axial * fields.normal**2 + e.shear * fields.shear**2
+    density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
     for spring in at.network.springs:
         term = TERMS[type(spring.item)]
