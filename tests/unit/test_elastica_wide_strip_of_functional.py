@@ -32,6 +32,7 @@ from cfmkit.elastica.mechanics.design_derivatives import effort_slopes
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.mechanics.march import CompiledEquations, equations
 from cfmkit.elastica.mechanics.wide_strip import curling_share
 
 X = np.array([0.3, 0.02, 2e9, 0.35, 0.9])  # thickness [mm], width [m], modulus [Pa], Poisson's ratio, curvature
@@ -65,6 +66,21 @@ def test_the_hessian_of_a_wide_strip_is_the_derivative_of_its_gradient() -> None
     tangent = energy.hessian(network, z, 0.1)
     size = float(np.abs(tangent).max())
     assert tangent == pytest.approx(np.stack(stepped, axis=1) / COMPLEX_STEP, rel=1e-11, abs=1e-11 * size)
+
+
+def test_c_and_numpy_have_the_same_wide_strips() -> None:
+    """Bent a little, where the law is a series, and much, where it is not."""
+    net, drive = strips(X)
+    network = discretise(net, drive, 7, 2)
+    own = equations(network)
+    if not isinstance(own, CompiledEquations):
+        pytest.skip("the compiled module was not built")
+    for size in (0.01, 0.3, 3.0):
+        z = size * np.random.default_rng(2).standard_normal(network.size)
+        gradient, hessian = own.evaluate(z, 0.1, 0.6)
+        right = energy.gradient(network, z, 0.1, 0.6), energy.hessian(network, z, 0.1, 0.6)
+        for found, known in zip((gradient, hessian), right, strict=True):
+            assert np.abs(found - known).max() < 1e-12 * np.abs(known).max()
 
 
 def test_paths_stresses_and_energies_are_those_of_the_shooting_engine() -> None:

@@ -40,13 +40,13 @@ MAX_DEGREE = 40
 SWITCH = "CFMKIT_WITHOUT_C"
 """Environment variable that keeps everything in numpy, whatever its value."""
 KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
-"""Springs and loads that march.c has; networks with others, and with wide strips, run on numpy."""
+"""Springs and loads that march.c has; networks with others run on numpy."""
 
 COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
 ADDRESSES = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
     "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
-    "spring", "load_at", "load",
+    "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 
@@ -81,7 +81,7 @@ def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
         Whether the way is the share of what is constant instead of the drive.
     """
     kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
-    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE and network.elements.curl is None
+    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
     return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
 
 
@@ -97,7 +97,8 @@ class CompiledEquations(NumpyEquations):
         super().__post_init__()
         arrays = model_arrays(self)
         counts = model_counts(self.network, self.ramp)
-        row = np.array([*counts.values(), *(arrays[name].ctypes.data for name in ADDRESSES)], np.int64)
+        addresses = (arrays[name].ctypes.data if name in arrays else 0 for name in ADDRESSES)
+        row = np.array([*counts.values(), *addresses], np.int64)
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
@@ -290,7 +291,11 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
     whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
-    return {name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64) for name in ADDRESSES}
+    return {
+        name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64)
+        for name in ADDRESSES
+        if given[name] is not None
+    }
 
 
 def _leaves(network: Discretisation, slot: Any) -> Any:
