@@ -104,6 +104,7 @@ class NetworkProblem:
             inverse, vectors = inverse[real].real, vectors[:, real].real
         else:
             inverse, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        inverse = np.where(inverse == 0, np.finfo(float).tiny, inverse)
         order = np.argsort(-np.abs(inverse))[:count]
         return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
 

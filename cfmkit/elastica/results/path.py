@@ -194,6 +194,10 @@ class EquilibriumPath(ShortRepr):
         )
 
 
+Path = EquilibriumPath
+"""Its name once the shooting engine, which has a class of that name, is gone."""
+
+
 def node_motion(at: Equilibria, node: str) -> Any:
     """Return displacement and rotation of a node, (p, 3) [m, m, rad]."""
     network = at.network

@@ -12,8 +12,8 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.outcome.path import Event, PathStatus
-from cfmkit.elastica.results.path import EquilibriumPath
-from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors
+from cfmkit.elastica.results.path import Path
+from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import Start, find_start, is_stretched
 from cfmkit.numerics.continuation.follow import follow
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
 DEGREES = 5, 14  # with which a path is tried first, by its tolerance
-MORE_FOR_FOLDS = 2  # degrees
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
 MAX_PIECES = 4
 MAX_ROUNDS = 6
 FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four at once
+NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
 MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam that is not cut: it locks
@@ -56,7 +56,7 @@ class Mesh:
         """Return the arrays of a network, with a higher degree by `more`."""
         return discretise(network, drive, self.degree + more, self.pieces, self.tension)
 
-    def finer(self, path: EquilibriumPath) -> Discretisation:
+    def finer(self, path: Path) -> Discretisation:
         """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
         fine = self.arrays(path.net, path.given, DEGREES_MORE)
         return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
@@ -65,12 +65,12 @@ class Mesh:
 class Attempt(NamedTuple):
     """A path on one discretisation."""
 
-    path: EquilibriumPath
+    path: Path
     mesh: Mesh
     first: Buckling | None  # first loss of stability
 
 
-def trace(network: Network, drive: Drive, control: Control | None = None) -> EquilibriumPath:
+def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
     """Return the path of equilibria of a network under a drive, from rest through all requested points.
 
     Parameters
@@ -84,7 +84,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Equ
 
     Returns
     -------
-    EquilibriumPath
+    Path
         Converged points only. `Path.status` says whether the path reaches all requested points, and if not, why.
     """
     control = control or Control()
@@ -114,7 +114,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Equ
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES)) + MORE_FOR_FOLDS * control.through_folds
+    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
     mesh, best, before = Mesh(degree), None, None
     for count in range(MAX_ROUNDS):
         attempt = trace_on(network, drive, control, mesh)
@@ -126,8 +126,9 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
             mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
             best = attempt
             continue
-        errors = point_errors(path, mesh.finer(path), pick_points(path))
-        path = replace(path, error=float(errors.max(initial=0.0)))
+        path = _with_error(path, mesh)
+        if tolerance < path.error < NEARLY * tolerance:
+            path = _with_error(polish(path), mesh)
         attempt = attempt._replace(path=path)
         if best is None or not path.error > best.path.error:
             best = attempt
@@ -149,7 +150,12 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> Attemp
     return best
 
 
-def _end_alike(path: EquilibriumPath, before: EquilibriumPath) -> bool:
+def _with_error(path: Path, mesh: Mesh) -> Path:
+    errors = point_errors(path, mesh.finer(path), pick_points(path))
+    return replace(path, error=float(errors.max(initial=0.0)))
+
+
+def _end_alike(path: Path, before: Path) -> bool:
     """Return True if two paths end early at the same place: no degree leads further."""
     early = (PathStatus.LIMIT_POINT, PathStatus.JUMPS, PathStatus.LOST)
     if path.status not in early or not len(path) or not len(before):
@@ -201,13 +207,13 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
 def _path(
     network: Network, drive: Drive, start: Start, points: list[Point], events: tuple[Event, ...],
     status: PathStatus, message: str,
-) -> EquilibriumPath:  # fmt: skip
+) -> Path:  # fmt: skip
     arrays = start.problem.network
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
     names = [_name_branch(point.branch, arrays.scales.drive) for point in points]
-    return EquilibriumPath(
+    return Path(
         network, drive, Equilibria(arrays, z, drives),
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
@@ -239,11 +245,11 @@ def _explain(start: Start, ending: Ending, unit: float) -> tuple[PathStatus, str
         text += "or nothing holds the network, the drive cannot move it, or its springs are prestressed too far"
         return PathStatus.NO_START, text
     status = PathStatus[ending.end.name]
-    text = status.value if ending.end is End.COMPLETE else f"{ending.message} at {ending.drive * unit:.6g}"
+    text = status.value if ending.end is End.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
     return status, text
 
 
-def _are_settled(path: EquilibriumPath, before: EquilibriumPath | None, control: Control) -> bool:
+def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
     """Return True if bifurcations far along the primary path lie where they do at another degree.
 
     The path itself says nothing about their error: a straight column has none, while its high modes have waves.
@@ -257,11 +263,11 @@ def _are_settled(path: EquilibriumPath, before: EquilibriumPath | None, control:
     return bool(shift <= max(EVENT_TOLERANCE, control.tolerance) * _span(path))
 
 
-def _span(path: EquilibriumPath) -> float:
+def _span(path: Path) -> float:
     return float(np.ptp(np.append(path.given.points, 0.0)))
 
 
-def _tension(path: EquilibriumPath, known: Mapping[str, float]) -> dict[str, float]:
+def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
     e = path.network.elements
     if not len(path):

@@ -12,6 +12,7 @@ from cfmkit.numerics.continuation.branch_ends import find_joined_path
 from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
+from cfmkit.numerics.continuation.folds import pass_fold
 from cfmkit.numerics.continuation.path import End, Ending, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.losses import Items
     from cfmkit.numerics.continuation.problem import Equilibrium
 
+LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
 FIRST_LENGTH = 0.02  # where no step before says better
 LENGTHS = 1e-6, 0.05  # shortest and longest first step
 STEADY_STEPS = 3  # in which the drive leads, until it does so again
@@ -66,7 +68,11 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if steady >= STEADY_STEPS and count >= STEADY_STEPS and drive_step > STEADY_STEP * options.span:
             return _natural(walk)
         if count > LOCKED_STEPS and abs(move.new.drive - begin.drive) < LOCKED_SHARE * options.span:
-            return Ending(End.LIMIT_POINT, move.new.drive, "it locks, or turns too sharply to follow")
+            return Ending(
+                End.LIMIT_POINT,
+                move.new.drive,
+                "the drive cannot go on at {place}: it locks, or turns too sharply to follow",
+            )
         if count > MAX_STEPS:
             return None
     return None
@@ -89,11 +95,11 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
     return walk
 
 
-def _end_at_fold(
-    walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, loses_one: bool, fineness: float
-) -> Items:
+def _end_at_fold(walk: Walk, begin: Equilibrium, move: ArcMove, fold: Located, after: int, fineness: float) -> Items:
     """Go on where the drive turns back: at a limit point, or behind the end of a branch."""
-    joined = find_joined_path(walk, fold, begin.unstable)
+    joined, loses_one = find_joined_path(walk, fold, begin.unstable), after == begin.unstable + 1
+    if joined is None and loses_one and walk.options.through_folds:
+        return (yield from pass_fold(walk, move, fold, after))
     if joined is None and loses_one:
         return (yield from _stop_at_limit_point(walk, begin, fold))
     if joined is None and fineness > FINEST_RETRY:  # the step came to another path, or a sharp corner lies in it
@@ -105,7 +111,7 @@ def _end_at_fold(
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
     if joined is None:
-        return Ending(End.LOST, fold.drive, "the end of a branch")
+        return Ending(End.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined
     yield event
     walk = replace(walk, branch=None)
@@ -115,7 +121,7 @@ def _end_at_fold(
         goal = float(walk.targets[number])
         at = correct(walk.problem, beyond.x + (goal - beyond.drive) * beyond.rate, goal)
         if at is None:
-            return Ending(End.LOST, goal, "behind the end of a branch")
+            return Ending(End.LOST, goal, "the path was lost behind the end of a branch at {place}")
         yield Point(at, number, walk.branch)
         walk = replace(walk, number=number + 1)
     yield Point(beyond, -1, walk.branch)
@@ -135,4 +141,4 @@ def _stop_at_limit_point(walk: Walk, begin: Equilibrium, fold: Located) -> Items
         yield Point(at, number, walk.branch)
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
-    return Ending(End.LIMIT_POINT, fold.drive, "a limit point")
+    return Ending(End.LIMIT_POINT, fold.drive, LIMIT_POINT)

@@ -154,10 +154,10 @@ def locate_stability_change_on_arc(problem: Problem, move: ArcMove, span: float)
     return locate(problem, move.old, move.new, solve, stability_value(problem, move.old), CLOSE_TO_BIFURCATION)
 
 
-def locate_fold(problem: Problem, move: ArcMove, span: float) -> tuple[Located, bool] | None:
-    """Return where the drive turns back within a step along the arc, and whether stability changes there by one.
+def locate_fold(problem: Problem, move: ArcMove, span: float) -> tuple[Located, int] | None:
+    """Return where the drive turns back within a step along the arc, and the unstable directions behind it.
 
-    At a limit point one direction becomes unstable; at the end of a branch none does. It is judged well behind the
+    At a limit point their number changes by one; at the end of a branch it does not. They are counted well behind the
     fold: counts right beside it are noise.
     """
 
@@ -174,4 +174,4 @@ def locate_fold(problem: Problem, move: ArcMove, span: float) -> tuple[Located, 
     if fold is None:
         return None
     past = solve(fold.share + 0.3 * (1 - fold.share))
-    return fold, past is not None and past.unstable == move.old.unstable + 1
+    return fold, move.new.unstable if past is None or past.unstable == move.old.unstable else past.unstable

@@ -1,53 +1,81 @@
-"""A path followed by its arc length all along: through limit points, past bifurcations, up to the last value."""
+"""A stretch behind a limit point of the drive: followed by its arc length until the drive leads on again."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.continuation.arc import follow_arc, unit_tangent
+from cfmkit.numerics.continuation.arc import ArcMove, follow_arc
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold, locate_stability_change_on_arc
-from cfmkit.numerics.continuation.path import End, Ending, Event, Point
+from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
+from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
-    from cfmkit.numerics.continuation.arc import ArcMove
     from cfmkit.numerics.continuation.events import Located
-    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.losses import Items
+    from cfmkit.numerics.continuation.problem import Equilibrium
 
-FIRST_LENGTH = 0.02
 BEYOND = 0.5  # share of the range by which a path may leave it
+STEADY_STEPS = 3  # in which the drive leads, until it does so again
+STEADY_SHARE = 1.5  # motion by the slope over that of the step, up to which the drive leads
 
 
-def follow_through_folds(walk: Walk) -> Iterator[Point | Event | Ending]:
-    """Yield points, events and the ending of a path by its arc length; requested values every time they are passed."""
-    problem, options, begin = walk.problem, walk.options, walk.here
-    along = np.append(begin.rate, 1.0) * walk.sense
-    tangent = unit_tangent(problem, begin, along, options.span)
-    last, limits = begin, _limits(walk)
-    for move in follow_arc(problem, begin, tangent, FIRST_LENGTH, options):
-        fold = locate_fold(problem, move, options.span) if move.folds else None
-        if fold is not None:
-            yield Event("limit point", fold[0].drive, move.old.unstable, move.new.unstable, fold[0].near)
-        elif move.new.unstable != move.old.unstable:
-            found = locate_stability_change_on_arc(problem, move, options.span)
-            drive = found.drive if found else move.new.drive
-            yield Event("bifurcation", drive, move.old.unstable, move.new.unstable, found.near if found else None)
-        for point in _passed(walk, move, fold[0] if fold else None):
-            yield point
-            if point.target == len(walk.targets) - 1:
-                yield Ending(End.COMPLETE, point.at.drive)
-                return
-        if not limits[0] <= move.new.drive <= limits[1]:
-            yield Ending(End.OUTSIDE, move.new.drive, "the drive left its range")
-            return
-        yield Point(move.new, -1, walk.branch)
-        last = move.new
-    yield Ending(End.LOST, last.drive, "the path was lost along its arc")
+def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
+    """Follow a path through a limit point of the drive that lies within a step; return where the drive leads again.
+
+    Requested values are delivered every time they are passed: those of the present run, which go one way. It ends
+    where the last of them is passed first.
+    """
+    problem, options, begin, sense = walk.problem, walk.options, move.old, walk.sense
+    run = _run(walk)
+    yield Event("limit point", fold.drive, begin.unstable, after, fold.near)
+    steady, limits = 0, _limits(walk)
+    for step in itertools.chain((move,), follow_arc(problem, move.new, move.tangent, move.length, options)):
+        passed_fold = fold if step is move else None
+        if step is not move and step.folds:
+            located = locate_fold(problem, step, options.span)
+            if located is not None:
+                passed_fold, after = located
+                yield Event("limit point", passed_fold.drive, step.old.unstable, after, passed_fold.near)
+        elif step.new.unstable != step.old.unstable and step is not move:
+            found = locate_stability_change_on_arc(problem, step, options.span)
+            drive = found.drive if found else step.new.drive
+            yield Event("bifurcation", drive, step.old.unstable, step.new.unstable, found.near if found else None)
+        last = yield from _pass_values(walk, run, step, passed_fold)
+        walk = replace(walk, number=max(walk.number, last + 1))
+        if last == run[-1]:
+            return walk.restart(step.new if walk.done else _land(walk, step, last), walk.step)
+        if not limits[0] <= step.new.drive <= limits[1]:
+            yield Point(step.new, -1, walk.branch)
+            return Ending(End.OUTSIDE, step.new.drive, "the drive left its range at {place}")
+        yield Point(step.new, -1, walk.branch)
+        change = abs(step.new.drive - step.old.drive)
+        moved = largest_motion(problem, step.new.x - step.old.x)
+        leads = step.tangent[-1] * sense > 0 and (
+            largest_motion(problem, step.new.rate) * change < STEADY_SHARE * moved
+        )
+        steady = steady + 1 if leads and not step.folds else 0
+        if steady >= STEADY_STEPS and step.new.unstable <= begin.unstable:
+            ahead = next(number for number in run if (walk.targets[number] - step.new.drive) * sense > 0)
+            return replace(walk, number=ahead).restart(step.new, change)
+    return Ending(End.LOST, walk.here.drive, "the path was lost along its arc at {place}")
+
+
+def _run(walk: Walk) -> range:
+    """Return the numbers of the requested values around the next one that go one way."""
+    targets, sense = np.insert(walk.targets, 0, 0.0), walk.sense
+    first = last = walk.number
+    while first > 0 and (targets[first + 1] - targets[first]) * sense > 0:
+        first -= 1
+    while last + 1 < len(walk.targets) and (walk.targets[last + 1] - walk.targets[last]) * sense > 0:
+        last += 1
+    return range(first, last + 1)
 
 
 def _limits(walk: Walk) -> tuple[float, float]:
@@ -55,13 +83,28 @@ def _limits(walk: Walk) -> tuple[float, float]:
     return min(0.0, float(walk.targets.min())) - beyond, max(0.0, float(walk.targets.max())) + beyond
 
 
-def _passed(walk: Walk, move: ArcMove, fold: Located | None) -> Iterator[Point]:
-    """Yield requested values within a step along the arc, on both sides of a fold in it."""
-    turns = [move.old.drive, *([fold.drive] if fold else []), move.new.drive]
+def _land(walk: Walk, step: ArcMove, number: int) -> Equilibrium:
+    """Return the equilibrium at a requested value within a step."""
+    goal = float(walk.targets[number])
+    return _at(walk, step.new, goal) or step.new
+
+
+def _at(walk: Walk, anchor: Equilibrium, goal: float) -> Equilibrium | None:
+    return correct(walk.problem, anchor.x + (goal - anchor.drive) * anchor.rate, goal)
+
+
+def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) -> Generator[Point, None, int]:
+    """Yield requested values within a step, on both sides of a fold in it; return the last one's number, or -1."""
+    turns = [step.old.drive, *([fold.drive] if fold else []), step.new.drive]
+    passed = -1
     for low, high in itertools.pairwise(turns):
-        inside = [j for j, value in enumerate(walk.targets) if (value - low) * (value - high) <= 0 and value != low]
+        inside = [j for j in run if (walk.targets[j] - low) * (walk.targets[j] - high) <= 0 and walk.targets[j] != low]
         for number in sorted(inside, key=lambda j: abs(walk.targets[j] - low)):
-            anchor, goal = (move.old if low == move.old.drive else move.new), float(walk.targets[number])
-            at = correct(walk.problem, anchor.x + (goal - anchor.drive) * anchor.rate, goal)
+            anchor = step.old if low == step.old.drive else step.new
+            at = _at(walk, anchor, float(walk.targets[number]))
             if at is not None:
                 yield Point(at, number, walk.branch)
+                passed = max(passed, number)
+            if number == run[-1]:
+                return passed
+    return passed

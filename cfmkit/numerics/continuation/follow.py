@@ -10,7 +10,6 @@ import numpy as np
 from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.folds import follow_through_folds
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_unstable
 from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
@@ -68,7 +67,7 @@ def follow(
         yield item
         between += isinstance(item, Point) and item.target < 0
         if between > options.most_points:
-            yield Ending(End.FULL, item.at.drive)  # type: ignore[union-attr]
+            yield Ending(End.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
             return
 
 
@@ -83,12 +82,9 @@ def _items(
     if start.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
-            yield Ending(End.JUMPS, start.drive, "unstable at the start")
+            yield Ending(End.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
             return
         walk = moved
-    if options.through_folds and not walk.done:
-        yield from follow_through_folds(walk)
-        return
     march = getattr(problem, "march", None)
     while not walk.done:
         if march is not None and walk.rejections == 0:
@@ -117,7 +113,9 @@ def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
     if _is_locked(walk):
-        return Ending(End.LIMIT_POINT, here.drive, "the structure locks: a force grows beyond all bounds")
+        return Ending(
+            End.LIMIT_POINT, here.drive, "the drive cannot go on at {place}: it locks, a force grows beyond all bounds"
+        )
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
@@ -206,5 +204,5 @@ def _reject(walk: Walk, goal: float) -> Items:
             if outcome is not None:
                 return outcome
     if walk.step < FINEST_STEP * options.span or walk.rejections > MAX_REJECTIONS:
-        return Ending(End.LOST, here.drive, "no step converged")
+        return Ending(End.LOST, here.drive, "no step converged at {place}")
     return walk

@@ -61,7 +61,8 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
-        return Ending(End.JUMPS, found.drive, "stability is lost")
+        yield Point(new, -1, walk.branch)
+        return Ending(End.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
     mode = problem.orient(modes)
     onto = enter_branch(walk, found.x, found.drive, mode, AMPLITUDES)
     for clusters in NEAR_CLUSTERS, WIDE_CLUSTERS:  # not one mode by itself: all that become unstable soon, together
@@ -71,8 +72,10 @@ def lose_stability(walk: Walk, new: Equilibrium) -> Items:
         onto = onto or enter_branch(walk, found.x, found.drive, mode, LAST_AMPLITUDES)
     yield Event("bifurcation", found.drive, here.unstable, after, found.near, modes)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
+    if onto is None and options.through_folds:
+        return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
     if onto is None:
-        return Ending(End.JUMPS, found.drive, "stability is lost and no stable equilibrium is near")
+        return Ending(End.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there")
     return (yield from _begin_branch(walk, found, onto, after))
 
 

@@ -74,7 +74,7 @@ class Ending:
 
     end: End
     drive: float
-    message: str = ""
+    message: str = ""  # why, with {place} for the drive there
 
 
 class March(NamedTuple):
