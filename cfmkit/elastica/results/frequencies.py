@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
+LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
+"""Elements a beam from which on it is a chain, and the order of forces in one: coils of many turns."""
 MAX_DEGREE = 36
 MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
 NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is zero
@@ -113,7 +115,7 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
         if name not in path.net.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
     elements, degree = len(path.network.elements.length), _degree(path.network, count)
-    size = path.network.size + elements * 5 * degree
+    size = path.network.size + elements * (degree - path.network.degree + 4 * _order(path.network, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -122,7 +124,18 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
 
 
 def _degree(network: Discretisation, count: int) -> int:
-    return max(network.degree, min(MAX_DEGREE, DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count)))
+    """Return the degree of the rotations: modes of a beam are spread over its elements."""
+    wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(network))
+    return max(network.degree, min(MAX_DEGREE, wanted))
+
+
+def _order(network: Discretisation, degree: int) -> int:
+    """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
+    return degree - 1 if _elements_a_beam(network) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
+
+
+def _elements_a_beam(network: Discretisation) -> float:
+    return len(network.elements.beam) / len(set(network.elements.beam))
 
 
 @dataclass(frozen=True)
@@ -138,7 +151,7 @@ class _VibratingNetwork:
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.net, self.fine, self.masses = path.net, fine, masses
-        self.order = fine.degree - 1  # of forces and, by one more, positions: as smooth as sines of the rotation
+        self.order = _order(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
