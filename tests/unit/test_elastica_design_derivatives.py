@@ -84,7 +84,7 @@ def test_networks_of_plain_beams_are_set_up_together_as_one_by_one() -> None:
             alone, mine = discretise(*pair, 7, scales=template.scales), design_of(together, number)
             for record, other in ((mine.elements, alone.elements), (mine.attachments, alone.attachments)):
                 for name in record._fields:
-                    if name not in ("beam", "cuts"):
+                    if name not in ("beam", "cuts") and getattr(alone.elements, name, 0) is not None:
                         own, right = np.asarray(getattr(record, name)), np.asarray(getattr(other, name))
                         size = max(float(np.abs(right.real).max()), 1e-300)
                         assert np.abs(own.real - right.real).max() < 1e-12 * size, name
