@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import Equilibrium
 
 LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
+TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
 FIRST_LENGTH = 0.02  # where no step before says better
 LENGTHS = 1e-6, 0.05  # shortest and longest first step
 STEADY_STEPS = 3  # in which the drive leads, until it does so again
@@ -71,7 +72,7 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
             return Ending(
                 End.LIMIT_POINT,
                 move.new.drive,
-                "the drive cannot go on at {place}: it locks, or turns too sharply to follow",
+                TOO_SHARP,
             )
         if count > MAX_STEPS:
             return None

@@ -15,13 +15,14 @@ from cfmkit.numerics.continuation.path import End, Ending, Event, Point, Walk
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Iterator
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.losses import Items
-    from cfmkit.numerics.continuation.problem import Equilibrium
 
 BEYOND = 0.5  # share of the range by which a path may leave it
+SHORTEST_RETRY = 1e-4  # of the first step, where a step ends on another path
 STEADY_STEPS = 3  # in which the drive leads, until it does so again
 STEADY_SHARE = 1.5  # motion by the slope over that of the step, up to which the drive leads
 
@@ -33,24 +34,32 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
     where the last of them is passed first.
     """
     problem, options, begin, sense = walk.problem, walk.options, move.old, walk.sense
-    run = _run(walk)
-    yield Event("limit point", fold.drive, begin.unstable, after, fold.near)
-    steady, limits = 0, _limits(walk)
-    for step in itertools.chain((move,), follow_arc(problem, move.new, move.tangent, move.length, options)):
-        passed_fold = fold if step is move else None
-        if step is not move and step.folds:
-            located = locate_fold(problem, step, options.span)
+    run, steady, limits, shortest = _run(walk), 0, _limits(walk), SHORTEST_RETRY * move.length
+    arc: Iterator[ArcMove] = itertools.chain((move,), follow_arc(problem, move.new, move.tangent, move.length, options))
+    while (step := next(arc, None)) is not None:
+        passed_fold: Located | None = None
+        if step.folds:
+            located = (fold, after) if step is move else locate_fold(problem, step, options.span)
+            if located is not None and located[1] != step.new.unstable and step.length > shortest:
+                # it has come to another path behind the fold, over a sharp corner
+                arc = follow_arc(problem, step.old, step.tangent_before, 0.2 * step.length, options)
+                continue
             if located is not None:
-                passed_fold, after = located
-                yield Event("limit point", passed_fold.drive, step.old.unstable, after, passed_fold.near)
-        elif step.new.unstable != step.old.unstable and step is not move:
+                passed_fold = located[0]
+                yield Event("limit point", passed_fold.drive, step.old.unstable, located[1], passed_fold.near)
+        elif step.new.unstable != step.old.unstable:
             found = locate_stability_change_on_arc(problem, step, options.span)
+            if found is None and step.length > shortest:
+                arc = follow_arc(problem, step.old, step.tangent_before, 0.2 * step.length, options)
+                continue
             drive = found.drive if found else step.new.drive
             yield Event("bifurcation", drive, step.old.unstable, step.new.unstable, found.near if found else None)
-        last = yield from _pass_values(walk, run, step, passed_fold)
-        walk = replace(walk, number=max(walk.number, last + 1))
-        if last == run[-1]:
-            return walk.restart(step.new if walk.done else _land(walk, step, last), walk.step)
+        point: Point | None = None
+        for point in _pass_values(walk, run, step, passed_fold):
+            yield point
+            walk = replace(walk, number=max(walk.number, point.target + 1))
+        if point is not None and point.target == run[-1]:
+            return walk.restart(point.at, walk.step)
         if not limits[0] <= step.new.drive <= limits[1]:
             yield Point(step.new, -1, walk.branch)
             return Ending(End.OUTSIDE, step.new.drive, "the drive left its range at {place}")
@@ -83,28 +92,26 @@ def _limits(walk: Walk) -> tuple[float, float]:
     return min(0.0, float(walk.targets.min())) - beyond, max(0.0, float(walk.targets.max())) + beyond
 
 
-def _land(walk: Walk, step: ArcMove, number: int) -> Equilibrium:
-    """Return the equilibrium at a requested value within a step."""
-    goal = float(walk.targets[number])
-    return _at(walk, step.new, goal) or step.new
+def _guess(step: ArcMove, fold: Located | None, side: int, goal: float) -> FloatArray:
+    """Return the unknowns at a drive within a step, before (0) or behind (1) a fold, where they go like a root."""
+    if fold is None:
+        share = (goal - step.old.drive) / (step.new.drive - step.old.drive)
+        return np.asarray(step.old.x + share * (step.new.x - step.old.x))
+    end = step.new if side else step.old
+    share = np.sqrt(abs((goal - fold.drive) / (end.drive - fold.drive)))
+    return np.asarray(fold.x + share * (end.x - fold.x))
 
 
-def _at(walk: Walk, anchor: Equilibrium, goal: float) -> Equilibrium | None:
-    return correct(walk.problem, anchor.x + (goal - anchor.drive) * anchor.rate, goal)
-
-
-def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) -> Generator[Point, None, int]:
-    """Yield requested values within a step, on both sides of a fold in it; return the last one's number, or -1."""
+def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) -> Iterator[Point]:
+    """Yield requested values within a step, on both sides of a fold in it, up to the last of a run."""
     turns = [step.old.drive, *([fold.drive] if fold else []), step.new.drive]
-    passed = -1
-    for low, high in itertools.pairwise(turns):
+    room = largest_motion(walk.problem, step.new.x - step.old.x)
+    for side, (low, high) in enumerate(itertools.pairwise(turns)):
         inside = [j for j in run if (walk.targets[j] - low) * (walk.targets[j] - high) <= 0 and walk.targets[j] != low]
         for number in sorted(inside, key=lambda j: abs(walk.targets[j] - low)):
-            anchor = step.old if low == step.old.drive else step.new
-            at = _at(walk, anchor, float(walk.targets[number]))
-            if at is not None:
+            guess = _guess(step, fold, side, float(walk.targets[number]))
+            at = correct(walk.problem, guess, float(walk.targets[number]))
+            if at is not None and largest_motion(walk.problem, at.x - guess) <= room:
                 yield Point(at, number, walk.branch)
-                passed = max(passed, number)
-            if number == run[-1]:
-                return passed
-    return passed
+                if number == run[-1]:
+                    return

@@ -34,6 +34,7 @@ STEEP = 0.5  # motion over the drive's range, by the slope
 MAX_REJECTIONS = 90
 FINEST_STEP = 1e-13  # share of the range
 SHORT_STEP = 1e-9  # share of the range: shorter steps count as rejections
+LOCKED = "the drive cannot go on at {place}: the structure locks, a force grows beyond all bounds"
 LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
 """Force, in its unit, and step as a share of the range, from which on a structure is locked: pulled straight, say."""
 
@@ -113,9 +114,7 @@ def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
     if _is_locked(walk):
-        return Ending(
-            End.LIMIT_POINT, here.drive, "the drive cannot go on at {place}: it locks, a force grows beyond all bounds"
-        )
+        return Ending(End.LIMIT_POINT, here.drive, LOCKED)
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
