@@ -59,7 +59,7 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
     --------
     >>> g, first, second = curling_share(np.array([0.0, 1.0, 1e8]))
     >>> g.round(6).tolist()
-    [1.0, 0.994472, 0.02]
+    [1.0, 0.994488, 0.02]
     """
     small = np.real(z) < 1.0
     near, far = _by_series(np.where(small, z, 0.0)), _closed(np.where(small, 1.0, z))
