@@ -8,20 +8,20 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
-from cfmkit.elastica.mechanics.equations import MarchCode, Plan, State, begin
+from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState, begin
 from cfmkit.elastica.mechanics.march import equations
 
 
-def states(network: Discretisation, goals: Any) -> list[State]:
+def states(network: Discretisation, goals: Any) -> list[MarchState]:
     """Return the states at dimensionless values of the drive; what is constant is applied first."""
     ramp, own = equations(network, True), equations(network)
     first = begin(ramp)
     assert first is not None
-    loaded = ramp.march(first, np.array([1.0]), Plan(0.25, 1.0))
+    loaded = ramp.march(first, np.array([1.0]), MarchPlan(0.25, 1.0))
     assert loaded.code is MarchCode.DONE
     start = begin(own, loaded.states[-1].free)
     assert start is not None
-    march = own.march(start, np.asarray(goals, float), Plan(0.2 * abs(goals[-1]), abs(goals[-1]), tolerance=1e-12))
+    march = own.march(start, np.asarray(goals, float), MarchPlan(0.2 * abs(goals[-1]), abs(goals[-1]), tolerance=1e-12))
     assert march.code is MarchCode.DONE
     found = [state for state in march.states if state.target >= 0]
     return [own.solve(state.free, state.way) or state for state in found]

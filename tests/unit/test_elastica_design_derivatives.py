@@ -12,14 +12,17 @@ from varied_networks import LAN, X, arms, lan, pushed, turned
 from cfmkit.elastica import Control, Displacement, gradient, trace
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import effort_slopes, unknown_slopes
-from cfmkit.elastica.mechanics.designs import Designs, design_of, set_up
+from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.results import beam_states
+from cfmkit.elastica.results.output_slopes import output_slopes
+from cfmkit.elastica.results.path import node_motion, strain_energy
 
 FINE = Control(tolerance=1e-11)
 
 
-def stepped(template: Any, build: Any, x: Any) -> Designs:
+def stepped(template: Any, build: Any, x: Any) -> NetworkDesigns:
     """Return a complex step in each variable of a function that builds network and drive."""
     each = [build(x + 1j * COMPLEX_STEP * unit) for unit in np.eye(len(x))]
     return set_up(template, build(x), each)
@@ -81,7 +84,7 @@ def test_networks_of_plain_beams_are_set_up_together_as_one_by_one() -> None:
             alone, mine = discretise(*pair, 7, scales=template.scales), design_of(together, number)
             for record, other in ((mine.elements, alone.elements), (mine.attachments, alone.attachments)):
                 for name in record._fields:
-                    if name not in ("beam", "cuts"):
+                    if name not in ("beam", "cuts") and getattr(alone.elements, name, 0) is not None:
                         own, right = np.asarray(getattr(record, name)), np.asarray(getattr(other, name))
                         size = max(float(np.abs(right.real).max()), 1e-300)
                         assert np.abs(own.real - right.real).max() < 1e-12 * size, name
@@ -111,3 +114,39 @@ def test_the_effort_s_slope_by_an_array_is_a_difference_of_the_functional() -> N
     ]
     unit = at.network.scales.moment / at.network.scales.drive
     np.testing.assert_allclose(effort_slopes(at, designs, rates)[:, 3], np.array(direct) * unit, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("build", "x"), [*CASES[:2], pytest.param(pushed, X, marks=pytest.mark.slow)])
+def test_slopes_of_other_outputs_are_those_of_the_shooting_engine(build: Any, x: Any) -> None:
+    """Motions of nodes, energy, forces on the ends of beams, stresses at their ends."""
+    net, drive = build(x)
+    known = gradient(trace(net, drive, FINE), build, x)
+    at, _ = equilibria(net, drive)
+    beam, node = next(iter(net.beams)), "b" if "b" in net.nodes else "n3"
+    ends = np.array([0.0, 1.0])
+
+    def end_force(model: Any, states: Any) -> Any:
+        seen = beam_states.states(model, states, beam, ends)
+        return np.stack([seen.h[:, -1], seen.v[:, -1], seen.moment[:, -1]], axis=-1)
+
+    def stress(model: Any, states: Any) -> Any:
+        seen = beam_states.sections(model, beam, beam_states.states(model, states, beam, ends))
+        return np.stack([seen.bending_stress[:, 0], seen.axial_stress[:, 0]], axis=-1)
+
+    outputs = {
+        "motion": lambda _, states: node_motion(states, node),
+        "energy": lambda _, states: strain_energy(states) * at.network.scales.moment,
+        "force": end_force,
+        "stress": stress,
+    }
+    found = output_slopes(at, stepped(at.network, build, x), outputs)
+    sections = known.sections(beam)
+    wanted = {
+        "motion": known.motion[node],
+        "energy": known.energy,
+        "force": known.end_force(beam, 1),
+        "stress": np.stack([sections.bending_stress[:, 0], sections.axial_stress[:, 0]], axis=1),
+    }
+    for name, slopes in wanted.items():
+        size = np.abs(slopes * x).max()
+        np.testing.assert_allclose(found[name] * x, slopes * x, rtol=1e-5, atol=1e-6 * size, err_msg=name)

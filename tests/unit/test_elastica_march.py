@@ -34,9 +34,9 @@ from cfmkit.elastica import (
     guided,
 )
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.designs import Designs, set_up
+from cfmkit.elastica.mechanics.designs import NetworkDesigns, set_up
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, NumpyEquations, Plan, begin
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import SWITCH, CompiledEquations, compiled, engine, equations, march_many
 from cfmkit.families.beam.network_from_spec import assemble
 
@@ -177,9 +177,9 @@ def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
     ends = []
     for kind in (equations, NumpyEquations):
         ramp, own = kind(network, True), kind(network)
-        loaded = ramp.march(begin(ramp), np.array([1.0]), Plan(0.5, 1.0)).states[-1]
+        loaded = ramp.march(begin(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
         start, goals = begin(own, loaded.free), beam_networks.drives(net, seed)[number].points / network.scales.drive
-        ends.append(own.march(start, goals, Plan(0.3 * abs(goals[0]), abs(goals[-1]), on_branch=True)))
+        ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), on_branch=True)))
     one, other = ends
     assert one.code is other.code is MarchCode.DONE
     assert len(one.states) == len(other.states)
@@ -209,7 +209,7 @@ def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
     )
     critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
     own = kind(discretise(net, Displacement("b", np.pi, np.array([1.2 * critical])), 8))
-    march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, Plan(0.01 * critical / 0.1, critical / 0.1))
+    march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
     assert march.code is MarchCode.STABILITY_CHANGES
     assert 0.5 * critical < march.states[-1].way * 0.1 < critical
 
@@ -224,7 +224,7 @@ def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
     return net, Displacement("b", np.pi, TARGETS)
 
 
-def leaves(count: int, taper: bool = False) -> Designs:
+def leaves(count: int, taper: bool = False) -> NetworkDesigns:
     pairs = [leaf(thickness, taper) for thickness in np.linspace(0.5e-3, 1e-3, count)]
     return set_up(discretise(*pairs[0], 8), pairs[0], pairs)
 
@@ -237,7 +237,7 @@ def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
     for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
         own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
         goals = TARGETS / own.network.scales.drive
-        march = own.march(begin(own), goals, Plan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
+        march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
         assert row == pytest.approx(known, rel=1e-7)
 

@@ -27,12 +27,13 @@ from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.designs import Designs
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 
@@ -55,11 +56,15 @@ def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
     last = z[..., e.unknowns[:, -2:]]
     first = last + load * e.length[:, None]
     w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
-    density = e.rigidity * at.curvature**2 / 2 - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
+    bent = bending(e, at.curvature)
+    density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
     start = poses(network.attachments, z, e.ends[:, 0])
     found = {
         "weight": density,
-        "rigidity": w * at.curvature**2 / 2,
+        "rigidity": w * bent.energy / e.rigidity,
+        "rest": w * bent.by_rest,
+        "curl": w * bent.by_curl,
+        "hindrance": w * bent.by_hindrance,
         "angle": -w * at.shear * f,
         "axial": -w * at.normal**2 / 2,
         "shear": -w * at.shear**2 / 2,
@@ -111,14 +116,14 @@ def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArra
     return found
 
 
-def effort_slopes(at: Equilibria, designs: Designs, rates: FloatArray | None = None) -> FloatArray:
+def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | None = None) -> FloatArray:
     """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m].
 
     Parameters
     ----------
     at : Equilibria
         Under a drive by a motion, of the designs' template.
-    designs : Designs
+    designs : NetworkDesigns
         A complex step of `COMPLEX_STEP` in each variable.
     rates : (p, n) array, optional
         Slopes of the free unknowns along the path, if they are known.
@@ -135,7 +140,7 @@ def effort_slopes(at: Equilibria, designs: Designs, rates: FloatArray | None = N
     return np.asarray(total * network.scales.moment / network.scales.drive)
 
 
-def _contracted(known: dict[str, Any], designs: Designs) -> FloatArray:
+def _contracted(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
     total = 0.0
     for name, table in (designs.tables | designs.places).items():
         if np.iscomplexobj(table):
@@ -144,7 +149,7 @@ def _contracted(known: dict[str, Any], designs: Designs) -> FloatArray:
     return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
 
 
-def _changed_terms(designs: Designs) -> list[list[tuple[Discretisation, Attached]]]:
+def _changed_terms(designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
     """Return the springs and loads of each design that have a complex step, with the arrays of that design."""
     found: list[list[tuple[Discretisation, Attached]]] = []
     if not (designs.template.springs or designs.template.loads):
@@ -192,7 +197,7 @@ def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     return found
 
 
-def unknown_slopes(at: Equilibria, designs: Designs) -> FloatArray:
+def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     """Return the derivatives of all unknowns by variables, (p, k, size).
 
     Raises

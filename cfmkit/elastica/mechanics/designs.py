@@ -27,9 +27,11 @@ if TYPE_CHECKING:
 
 TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
 
+CURLING = ("rest", "curl", "hindrance")  # of wide strips
+
 
 @dataclass(frozen=True, eq=False)
-class Designs:
+class NetworkDesigns:
     """Arrays of d networks of one topology; real, or with a complex step each.
 
     `tables` are those of `Elements`, `places` origin, arm and frame of `Attachments`, all with the designs as first
@@ -50,7 +52,7 @@ def set_up(
     origin: tuple[Network, Drive],
     networks: Sequence[tuple[Network, Drive]],
     make: Callable[[Network, Drive], Discretisation] | None = None,
-) -> Designs:
+) -> NetworkDesigns:
     """Return the arrays of networks of one topology.
 
     Parameters
@@ -69,9 +71,10 @@ def set_up(
         return _plain(template, origin, pairs)
     alone = make or (lambda net, drive: discretise(net, drive, template.degree, scales=template.scales))
     each = tuple(alone(*pair) for pair in pairs)
-    stack = {name: np.array([getattr(one.elements, name) for one in each]) for name in TABLES}
+    names = (*TABLES, *(CURLING if template.elements.curl is not None else ()))
+    stack = {name: np.array([getattr(one.elements, name) for one in each]) for name in names}
     places = {name: np.array([getattr(one.attachments, name) for one in each]) for name in ("origin", "arm", "frame")}
-    return Designs(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)
+    return NetworkDesigns(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)
 
 
 def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
@@ -90,7 +93,9 @@ def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: S
     )
 
 
-def _plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> Designs:
+def _plain(
+    template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
+) -> NetworkDesigns:
     scales, rule = template.scales, basis(template.degree)
     names = list(template.nodes)
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
@@ -120,7 +125,7 @@ def _plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Seque
     }
     frames, base = _supports(template, origin, pairs, [names[k] for k in master])
     places = {"origin": place, "arm": arm} | ({} if frames is None else {"frame": frames})
-    return Designs(template, len(pairs), tables, places, base, (), tuple(pairs))
+    return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs))
 
 
 def _whose(origin: tuple[Network, Drive], names: list[str]) -> tuple[Any, Any]:
@@ -204,7 +209,7 @@ def _supports(
     return (frames.real, base.real) if real else (frames, base)
 
 
-def design_of(designs: Designs, number: int) -> Discretisation:
+def design_of(designs: NetworkDesigns, number: int) -> Discretisation:
     """Return the arrays of one design as a `Discretisation`."""
     if designs.each:
         return designs.each[number]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.beam import Fit, fit
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
@@ -40,6 +40,8 @@ MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates 
 TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
 LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
+TABLE_COLUMNS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+"""Tables of every element."""
 FRAME_OF_DRIVE = 3
 """What `driven` says of a node that is held nowhere: its frame is that of the drive, of which it moves along x."""
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
@@ -74,6 +76,9 @@ class BeamElements(NamedTuple):
     unknowns: Any  # (e, degree + 9): those of both ends (x, y, body's and own rotation), bubbles, force
     beam: tuple[str, ...]  # the beam each one is a piece of
     cuts: FloatArray  # (e, 2) where it begins and ends, parameter of the beam's shape
+    rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
+    curl: Any = None  # (e, q) th^4/K^2 by u
+    hindrance: Any = None  # (e, q) nu^2/(1 - nu^2), 0 unless it is wide
 
 
 class Attachments(NamedTuple):
@@ -158,7 +163,9 @@ class _ArrayBuilder:
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = itertools.count()
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.fits = _fits(network)
+        self.bundle = _bundle(network)
+        self.fits = _fits(network, self.bundle)
+        self.wide = any(beam.section.wide for beam in network.beams.values())
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -169,6 +176,7 @@ class _ArrayBuilder:
 
     def build(self) -> Discretisation:
         """Return the arrays."""
+        self.together = self._plain_tables()
         pieces = [piece for name, beam in self.network.beams.items() for piece in self._beam(name, beam)]
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
@@ -244,11 +252,13 @@ class _ArrayBuilder:
         fitted = self.fits[name]
         start = self._attach(beam.start, beam.start_offset, beam.start_joint == "pin")
         end = self._attach(beam.end, beam.end_offset, beam.end_joint == "pin")
-        cuts = _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
+        known = self.together.get(name)
+        cuts = [0.0, 1.0] if known else _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
         floor = self._floor(beam, fitted)
         last = start
         for k, (left, right) in enumerate(itertools.pairwise(cuts)):
-            piece = self._piece(beam, fitted, left, right, floor)
+            piece = known or self._piece(beam, fitted, left, right)
+            piece["axial"] = piece["axial"] + floor
             piece["ends"] = last, (end if k == len(cuts) - 2 else self._inner_body(last, piece))
             yield piece | {
                 "beam": name,
@@ -259,7 +269,25 @@ class _ArrayBuilder:
             }
             last = piece["ends"][1]
 
-    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float, floor: float) -> dict[str, Any]:
+    def _plain_tables(self) -> dict[str, dict[str, Any]]:
+        """Return the tables of plain beams of one element, by name: in a few array operations for all of them."""
+        bundle, rule = self.bundle, basis(self.degree)
+        if not bundle.plain or self.pieces > 1 or self.wide:
+            return {}
+        length, force = self.scales.length, self.scales.force
+        speed = bundle.length[:, None] / length
+        powers = np.vander(rule.places, bundle.coefficients.shape[1], increasing=True)
+        angle, weight, ones = bundle.coefficients @ powers.T, speed * rule.weights, np.ones(len(rule.places))
+        rigidity = bundle.bending[:, None] / (force * length**2) / speed**2 * ones
+        axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
+        tables = zip(angle, weight, rigidity, axial, shear, speed * (1 - rule.places), speed[:, 0], strict=True)
+        return {
+            name: dict(zip(TABLE_COLUMNS, own, strict=True))
+            for name, own in zip((bundle.names[k] for k in bundle.plain), tables, strict=True)
+            if _turns_little(self.network.beams[name]) and self.tension.get(name, 0.0) <= TAUT
+        }
+
+    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float) -> dict[str, Any]:
         """Return the tables of an element between two parameters of a beam's shape."""
         length, force = self.scales.length, self.scales.force
         rule, inside = basis(self.degree), 0.5 * (left + right)
@@ -271,17 +299,26 @@ class _ArrayBuilder:
             "angle": fitted.angle(t, inside) + 0.0 * t,
             "weight": speed * rule.weights,
             "rigidity": rigidity / (force * length**2) / speed**2,
-            "axial": axial * force + floor + 0.0 * t,
+            "axial": axial * force + 0.0 * t,
             "shear": shear * force + 0.0 * t,
             "ahead": whole - integrals_to_points(self.degree) @ speed,
             "length": whole,
+        } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
+
+    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
+        """Return the tables of wide strips."""
+        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
+        curl, hindrance = beam.section.curling(thickness)
+        angle = fitted.angle(t, inside) + 0.0 * t
+        return {
+            "rest": slopes_at_points(self.degree) @ angle,
+            "curl": curl / (speed * self.scales.length) ** 2,
+            "hindrance": hindrance + 0.0 * speed,
         }
 
     def _floor(self, beam: Beam, fitted: Fit) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
-        if beam.section.axial or len(fitted.course.breaks) > 2:
-            return 0.0
-        if np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0:
+        if beam.section.axial or len(fitted.course.breaks) > 2 or not _is_straight(beam, fitted):
             return 0.0
         rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
@@ -301,7 +338,7 @@ class _ArrayBuilder:
         forces = [[next(self.count), next(self.count)] for _ in pieces]
         ends = np.array([piece["ends"] for piece in pieces])
         unknowns = np.hstack([attachments.unknowns[ends[:, 0]], attachments.unknowns[ends[:, 1]], bubbles, forces])
-        columns = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+        columns = (*TABLE_COLUMNS, *(("rest", "curl", "hindrance") if self.wide else ()))
         tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
         beams = tuple(piece["beam"] for piece in pieces)
         line = self._line_loads()
@@ -357,8 +394,8 @@ class _ArrayBuilder:
         return np.flatnonzero(~held), base, rate
 
 
-def _fits(network: Network) -> dict[str, Fit]:
-    """Return how each beam is fitted between its nodes; plain ones are fitted together."""
+def _bundle(network: Network) -> Bundle:
+    """Return the beams of a network; plain ones are fitted together."""
     ends = np.array(
         [
             (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
@@ -366,9 +403,17 @@ def _fits(network: Network) -> dict[str, Fit]:
             for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
         ]
     )
-    bundle = Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
-    reach = ends[1::2] - ends[::2]
-    alone = {bundle.names[k]: fit(bundle.beams[k], reach[k]) for k in bundle.others}
+    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
+
+
+def _fits(network: Network, bundle: Bundle) -> dict[str, Fit]:
+    """Return how each beam is fitted between its nodes."""
+    alone = {}
+    for name in (bundle.names[k] for k in bundle.others):
+        beam = network.beams[name]
+        start, end = network.nodes[beam.start], network.nodes[beam.end]
+        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
+        alone[name] = fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
     return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
 
 
@@ -399,6 +444,13 @@ def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     cuts = [left + (right - left) * k / count for left, right in itertools.pairwise(marks) for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
+
+
+def _is_straight(beam: Beam, fitted: Fit) -> bool:
+    """Return True if a beam without corners is straight before it is loaded."""
+    if isinstance(beam.shape, Polynomial):
+        return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
+    return not np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0
 
 
 def _turns_little(beam: Beam) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,7 +91,7 @@ def _element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) 
     start, end = _end_poses(network, z)
     last = z[e.unknowns[:, -2:]]
     first = last + line_load(network, drive, share) * e.length[:, None]
-    bend = e.weight * e.rigidity * at.curvature
+    bend = e.weight * bending(e, at.curvature).moment
     turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
     own = np.zeros(e.unknowns.shape, np.result_type(bend, turning, start.place, first))
     own[:, rotation_columns(network.degree)] = bend @ rule.slopes - turning @ rule.values
@@ -108,7 +109,7 @@ def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> An
     columns, softer = rotation_columns(network.degree), e.axial - e.shear
     f, g = 1 + softer * at.normal, softer * at.shear
     own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
-    bend, turn = e.weight * e.rigidity, e.weight * (at.normal * f - g * at.shear)
+    bend, turn = e.weight * bending(e, at.curvature).stiffness, e.weight * (at.normal * f - g * at.shear)
     slopes, values = rule.slopes, rule.values
     own[:, columns[:, None], columns] = (slopes.T * bend[:, None, :]) @ slopes + (values.T * turn[:, None, :]) @ values
     by_force = np.stack([g * at.cos - f * at.sin, g * at.sin + f * at.cos], axis=1) * e.weight[:, None, :]
@@ -142,7 +143,8 @@ def values(network: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> 
 def strain_energy(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the energy of beams and springs."""
     e, at = network.elements, fields(network, z, drive, share)
-    beams = e.weight * (e.rigidity * at.curvature**2 + e.axial * at.normal**2 + e.shear * at.shear**2)
+    strain = e.axial * at.normal**2 + e.shear * at.shear**2
+    beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
     springs = (TERMS[type(spring.item)](network, spring, z, share, drive).energy for spring in network.springs)
     return beams.sum() / 2 + sum(springs)
 

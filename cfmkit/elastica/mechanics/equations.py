@@ -44,7 +44,7 @@ class MarchCode(IntEnum):
     NO_START = 5  # no equilibrium at the start
 
 
-class Linearised(NamedTuple):
+class LinearEquations(NamedTuple):
     """The equations at some unknowns: residual (n,), tangent (n, n), change of the residual along the way (n,)."""
 
     residual: FloatArray
@@ -53,7 +53,7 @@ class Linearised(NamedTuple):
 
 
 @dataclass(frozen=True)
-class State:
+class MarchState:
     """An equilibrium: free unknowns (n,) and their slopes along the way, all dimensionless."""
 
     free: Any
@@ -65,12 +65,12 @@ class State:
 
 
 @dataclass(frozen=True)
-class Plan:
+class MarchPlan:
     """How a march goes on from a state."""
 
     step: float  # first one, along the way
     span: float  # range of the way
-    before: State | None = None  # the state before the first, for a cubic prediction
+    before: MarchState | None = None  # the state before the first, for a cubic prediction
     largest_turn: float = 0.35  # change of a motion in one step
     tolerance: float = 1e-10
     on_branch: bool = False  # check that every state leads back: a branch may end
@@ -78,10 +78,10 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class March:
+class NaturalMarch:
     """States that were reached, why the march ended, and the step it would go on with."""
 
-    states: tuple[State, ...]
+    states: tuple[MarchState, ...]
     code: MarchCode
     step: float
 
@@ -135,13 +135,13 @@ class NumpyEquations:
         each = [energy.gradient(self.network, *pair) for pair in zip(z, drive, strict=True)]
         return np.array(each).reshape(z.shape)
 
-    def linearise(self, free: FloatArray, way: float) -> Linearised:
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         drive, share = self.factors(way)
         z, chosen = energy.values(self.network, free, drive, share), self.network.free
         tangent = energy.hessian(self.network, z, drive, share)[np.ix_(chosen, chosen)]
         stepped = self.gradient(free, way + 1j * COMPLEX_STEP)[chosen]
-        return Linearised(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
+        return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
 
     def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
         """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
@@ -163,7 +163,7 @@ class NumpyEquations:
         push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
-    ) -> State | None:
+    ) -> MarchState | None:
         """Return the equilibrium at a place of the way, or where border . (free, way) = level; None if there is none.
 
         Parameters
@@ -201,12 +201,12 @@ class NumpyEquations:
             old, old_way, free, way = free, way, free + change, way + along
             if quick and largest**2 < tolerance:
                 effort = self._effort(old, old_way) + float(at.change @ step)
-                return State(free, way, rate, energy.count_unstable(self.network, at.tangent), effort)
+                return MarchState(free, way, rate, energy.count_unstable(self.network, at.tangent), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             stands = moved < SAME_EQUILIBRIUM and largest < 2e-5 and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
                 unstable = energy.count_unstable(self.network, at.tangent)
-                return State(free, way, rate, unstable, self._effort(free, way))
+                return MarchState(free, way, rate, unstable, self._effort(free, way))
             last = largest
         return None
 
@@ -214,7 +214,7 @@ class NumpyEquations:
         moved = self.network.base if self.ramp else self.network.rate
         return float(self.gradient(free, way) @ moved)
 
-    def march(self, start: State, targets: FloatArray, plan: Plan) -> March:
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens.
 
         A step is accepted if motions and forces change little, the prediction was good, and the chord agrees with the
@@ -240,7 +240,7 @@ class _Judgement(NamedTuple):
     agrees: bool  # the chord with the slopes at its ends: else it is another path
 
 
-def predict(here: State, before: State | None, goal: float) -> FloatArray:
+def predict(here: MarchState, before: MarchState | None, goal: float) -> FloatArray:
     """Return the cubic through two states and their slopes at a place of the way, or the tangent of one."""
     if before is None or before.way == here.way:
         return np.asarray(here.free + (goal - here.way) * here.rate)
@@ -250,7 +250,7 @@ def predict(here: State, before: State | None, goal: float) -> FloatArray:
     return np.asarray(ends + d * (s * (1 - s) ** 2 * before.rate + s * s * (s - 1) * here.rate))
 
 
-def _judge(equations: NumpyEquations, here: State, new: State, guess: FloatArray) -> _Judgement:
+def _judge(equations: NumpyEquations, here: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
     moves = np.isinf(equations.unit)
     chord = new.free - here.free
     forces, ahead = ~moves, new.way - here.way
@@ -265,7 +265,7 @@ def _judge(equations: NumpyEquations, here: State, new: State, guess: FloatArray
     return _Judgement(moved, missed, force, bool(along and bend <= 0.25 * moved + SAME_EQUILIBRIUM))
 
 
-def _leads_back(equations: NumpyEquations, here: State, new: State, moved: float, tolerance: float) -> bool:
+def _leads_back(equations: NumpyEquations, here: MarchState, new: MarchState, moved: float, tolerance: float) -> bool:
     """Return True if going back from a new state along its slope leads to the last one: else the branch has ended."""
     guess = new.free - (new.way - here.way) * new.rate
     back = equations.solve(guess, here.way, tolerance=tolerance, quick=True)
@@ -275,9 +275,9 @@ def _leads_back(equations: NumpyEquations, here: State, new: State, moved: float
     return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
 
 
-def _march(equations: NumpyEquations, start: State, targets: FloatArray, plan: Plan) -> March:
+def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
     here, before, step = start, plan.before, plan.step
-    states: list[State] = []
+    states: list[MarchState] = []
     passed = rejected = 0
     while passed < len(targets) and len(states) < plan.room:
         left = float(targets[passed] - here.way)
@@ -298,9 +298,9 @@ def _march(equations: NumpyEquations, start: State, targets: FloatArray, plan: P
         else:
             rejected = max(0, rejected - 1)
             if not same:
-                return March(tuple(states), MarchCode.STABILITY_CHANGES, step)
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, step)
             if plan.on_branch and not _leads_back(equations, here, new, seen.moved, plan.tolerance):
-                return March(tuple(states), MarchCode.BRANCH_ENDS, step)
+                return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
             before, here = here, replace(new, target=passed if lands else -1)
             states.append(here)
             passed += lands
@@ -313,10 +313,10 @@ def _march(equations: NumpyEquations, start: State, targets: FloatArray, plan: P
         if before is not None and step < 0.25 * abs(here.way - before.way):
             before = None
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
-            return March(tuple(states), MarchCode.STEPS_FAIL, step)
-    return March(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)
+            return NaturalMarch(tuple(states), MarchCode.STEPS_FAIL, step)
+    return NaturalMarch(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)
 
 
-def begin(equations: NumpyEquations, free: FloatArray | None = None, way: float = 0.0) -> State | None:
+def begin(equations: NumpyEquations, free: FloatArray | None = None, way: float = 0.0) -> MarchState | None:
     """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
     return equations.solve(np.zeros(equations.n) if free is None else free, way)

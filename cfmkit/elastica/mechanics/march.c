@@ -19,7 +19,8 @@ enum { DONE, STABILITY_CHANGES, STEPS_FAIL, FULL, BRANCH_ENDS, NO_START };
 struct Work {
     double *z, *gradient, *step, *slope, *change; /* (size), (size), (free) each */
     Factors factors;
-    Int *slots;
+    Factors symmetric; /* under loads that follow: of the symmetric part of the tangent */
+    int definite;      /* whether that part, forces condensed, is positive: then nothing diverges */
     Term term;
 };
 
@@ -28,7 +29,9 @@ Work *work_open(const Model *m) {
     const size_t size = (size_t)m->size, n = (size_t)m->free;
     if (!w) return NULL;
     w->z = calloc(2 * size + 3 * n + 1, sizeof(double));
-    if (!w->z || !factors_open(&w->factors, m->free, m->follows != 0)) { work_close(w); return NULL; }
+    int opened = w->z && factors_open(&w->factors, m->free, m->follows != 0);
+    if (opened && m->follows) opened = factors_open(&w->symmetric, m->free, 0);
+    if (!opened) { work_close(w); return NULL; }
     w->gradient = w->z + size;
     w->step = w->gradient + size;
     w->slope = w->step + n;
@@ -39,6 +42,7 @@ Work *work_open(const Model *m) {
 void work_close(Work *w) {
     if (!w) return;
     factors_close(&w->factors);
+    factors_close(&w->symmetric);
     free(w->z);
     free(w);
 }
@@ -60,6 +64,8 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
     if (with_factors) {
         memset(w->change, 0, (size_t)m->free * sizeof(double));
         factors_begin(&w->factors);
+        if (m->follows) factors_begin(&w->symmetric);
+        w->definite = m->follows != 0;
     }
     for (Int k = 0; k < terms(m); k++) {
         term(m, k, w->z, at, with_factors, t);
@@ -77,13 +83,32 @@ static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
         }
         if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
         const Int element = k - m->springs - m->loads;
-        if (element >= 0 && !m->follows && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
+        if (!m->follows) {
+            if (element >= 0 && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
+            continue;
+        }
+        for (Int i = 0; i < t->count; i++)
+            for (Int j = 0; j < i; j++) {
+                double *one = t->hessian + i * t->count + j, *other = t->hessian + j * t->count + i;
+                *one = *other = 0.5 * (*one + *other);
+            }
+        if (!factors_add(&w->symmetric, slots, t->count, t->hessian)) return 0;
+        if (element >= 0 && !factors_eliminate(&w->symmetric, m->leaves, element)) w->definite = 0;
     }
+    if (with_factors && m->follows)
+        w->definite = w->definite && factors_finish(&w->symmetric, 0) && w->symmetric.negative == 2 * m->elements;
     return !with_factors || factors_finish(&w->factors, m->follows != 0);
 }
 
-static Int unstable_of(const Model *m, const Factors *f) {
-    return m->follows ? f->negative : f->negative - 2 * m->elements;
+/* Unstable directions. Under loads that follow: their parity, all that a march compares. */
+static Int unstable_of(const Model *m, const Work *w) {
+    if (!m->follows) return w->factors.negative - 2 * m->elements;
+    return w->definite ? 0 : w->factors.negative;
+}
+
+/* The same to hand out: negative, -1 or -2, where only the parity is known. */
+static Int told_unstable(const Model *m, const Work *w) {
+    return m->follows && !w->definite ? -1 - w->factors.negative : unstable_of(m, w);
 }
 
 /* Gradients (count, size) at states (count, size), with Hessians (count, size, size) unless that is NULL. */
@@ -140,7 +165,7 @@ int resolve(const Model *m, const double *x, double way, double *right, Int coun
         place(m, w, x, at);
         if (assemble(m, w, at, 1)) {
             for (Int k = 0; k < count; k++) factors_solve(&w->factors, m->follows != 0, right + k * m->free);
-            *unstable = unstable_of(m, &w->factors);
+            *unstable = told_unstable(m, w);
             code = CONVERGED;
         }
     }
@@ -157,7 +182,7 @@ typedef struct {
     int quick; /* accept when the next correction would be below the tolerance */
 } Goal;
 
-typedef struct { Int unstable; double effort; } Found; /* effort: gradient of what the drive moves */
+typedef struct { Int unstable, told; double effort; } Found; /* effort: gradient of what the drive moves */
 
 static double effort_of(const Model *m, const Work *w, Stage at) {
     double sum = 0.0;
@@ -197,7 +222,8 @@ static int newton(const Model *m, Work *w, double *x, double *way, const Goal *g
                 w->step[a] = (goal->push ? goal->push[a] : 0.0) - w->gradient[i];
                 w->slope[a] = -w->change[a];
             }
-        found->unstable = unstable_of(m, &w->factors);
+        found->unstable = unstable_of(m, w);
+        found->told = told_unstable(m, w);
         factors_solve(&w->factors, m->follows != 0, w->step);
         factors_solve(&w->factors, m->follows != 0, w->slope);
         double along = 0.0;
@@ -235,12 +261,12 @@ static int newton(const Model *m, Work *w, double *x, double *way, const Goal *g
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
           int quick, double *rate, double *found) {
     const Goal goal = {border, level, push, tolerance, quick};
-    Found end = {0, 0.0};
+    Found end = {0, 0, 0.0};
     Work *w = work_open(m);
     if (!w) return DIVERGED;
     const int code = newton(m, w, x, way, &goal, &end);
     memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
-    found[0] = (double)end.unstable;
+    found[0] = (double)end.told;
     found[1] = end.effort;
     work_close(w);
     return code;
@@ -307,7 +333,7 @@ static void store(Int n, double *row, const double *x, const double *rate, doubl
     memcpy(row + n, rate, (size_t)n * sizeof(double));
     row[2 * n] = way;
     row[2 * n + 1] = found->effort;
-    row[2 * n + 2] = (double)found->unstable;
+    row[2 * n + 2] = (double)found->told;
     row[2 * n + 3] = target;
 }
 
@@ -318,7 +344,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
     const Goal goal = {NULL, 0.0, NULL, plan->tolerance, 1};
     int code = DONE, known = before != NULL, rejected = 0;
     Int kept = 0, passed = 0;
-    Found found = {(Int)plan->unstable, 0.0};
+    Found found = {(Int)plan->unstable, (Int)plan->unstable, 0.0};
     double *memory = calloc((size_t)(6 * n + 1), sizeof(double)), *old_x = memory, *old_rate = memory + n;
     double *guess = memory + 2 * n, *next = memory + 3 * n, *scratch = memory + 4 * n;
     Known here = {x, rate, *way}, old = {old_x, old_rate, 0.0};

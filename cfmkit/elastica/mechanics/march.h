@@ -29,6 +29,7 @@ typedef struct {
     const double *spring;                     /* (springs, 6) */
     const Int *load_at;                       /* (loads, 3): place, grows, follows */
     const double *load;                       /* (loads, 3): force x, y, moment */
+    const double *rest, *curl, *hindrance;    /* (e, q): of wide strips; NULL without any */
 } Model;
 
 /* Where on the way: both factors and their change with what is followed. */

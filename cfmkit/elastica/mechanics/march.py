@@ -17,12 +17,12 @@ from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
-    Linearised,
-    March,
+    LinearEquations,
     MarchCode,
+    MarchPlan,
+    MarchState,
+    NaturalMarch,
     NumpyEquations,
-    Plan,
-    State,
     begin,
 )
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.designs import Designs
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
 
 MAX_DEGREE = 40
@@ -46,7 +46,7 @@ COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "r
 ADDRESSES = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
     "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
-    "spring", "load_at", "load",
+    "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 
@@ -97,7 +97,8 @@ class CompiledEquations(NumpyEquations):
         super().__post_init__()
         arrays = model_arrays(self)
         counts = model_counts(self.network, self.ramp)
-        row = np.array([*counts.values(), *(arrays[name].ctypes.data for name in ADDRESSES)], np.int64)
+        addresses = (arrays[name].ctypes.data if name in arrays else 0 for name in ADDRESSES)
+        row = np.array([*counts.values(), *addresses], np.int64)
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
@@ -116,9 +117,9 @@ class CompiledEquations(NumpyEquations):
         compiled().evaluate(self.row, *given, found, np.empty(0), 1.0)
         return found
 
-    def linearise(self, free: FloatArray, way: float) -> Linearised:
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        out = Linearised(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
+        out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
         compiled().linearise(self.row, np.ascontiguousarray(free, float), *out, way)
         return out
 
@@ -135,11 +136,9 @@ class CompiledEquations(NumpyEquations):
             raise np.linalg.LinAlgError("the tangent is singular")
         return found, self._unstable(free, way, int(count[0]))
 
-    def _unstable(self, free: FloatArray, way: float, pivots: int) -> int:
-        """Return the count of C; under loads that follow it is a parity, and eigenvalues are counted."""
-        if not self.follows:
-            return pivots
-        return energy.count_unstable(self.network, self.linearise(free, way).tangent)
+    def _unstable(self, free: FloatArray, way: float, told: int) -> int:
+        """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
+        return told if told >= 0 else energy.count_unstable(self.network, self.linearise(free, way).tangent)
 
     def solve(
         self,
@@ -150,7 +149,7 @@ class CompiledEquations(NumpyEquations):
         push: FloatArray | None = None,
         tolerance: float = 1e-10,
         quick: bool = False,
-    ) -> State | None:
+    ) -> MarchState | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
         x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
         nothing = np.empty(0)
@@ -158,9 +157,9 @@ class CompiledEquations(NumpyEquations):
         if compiled().solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
             return None
         way = float(at[0])
-        return State(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+        return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
 
-    def march(self, start: State, targets: FloatArray, plan: Plan) -> March:
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
         rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
@@ -171,28 +170,23 @@ class CompiledEquations(NumpyEquations):
         here = np.concatenate([start.free, start.rate, [start.way]])
         code = compiled().march(self.row, given, here, known, goals, rows, stored)
         states = tuple(
-            State(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
+            MarchState(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
             for row in rows[: stored[0]].copy()
         )
-        march = March(states, MarchCode(code), float(given[0]))
+        march = NaturalMarch(states, MarchCode(code), float(given[0]))
         return self._counted(march, start.unstable) if self.follows else march
 
-    def _counted(self, march: March, unstable: int) -> March:
-        """Return a march with eigenvalues counted, as far as their number stays the same.
-
-        They are counted at the last state; at the others only if that differs.
-        """
-        states: list[State] = []
-        last = march.states[-1:]
-        same = all(self._unstable(state.free, state.way, 0) == unstable for state in last)
+    def _counted(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
+        """Return a march with its unstable directions counted, as far as their number stays the same."""
+        states: list[MarchState] = []
         for state in march.states:
-            if not same and self._unstable(state.free, state.way, 0) != unstable:
-                return March(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
+            if self._unstable(state.free, state.way, state.unstable) != unstable:
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
             states.append(replace(state, unstable=unstable))
         return replace(march, states=tuple(states))
 
 
-def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
+def _plan_row(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
     """Return a `Plan` of march.h."""
     return np.array(
         [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
@@ -200,13 +194,13 @@ def _plan_row(plan: Plan, unstable: int, start: bool) -> FloatArray:
 
 
 def march_many(
-    designs: Designs, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+    designs: NetworkDesigns, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
 ) -> tuple[FloatArray, Any]:
     """Return the efforts of many designs under a drive by a motion, each followed from rest.
 
     Parameters
     ----------
-    designs : Designs
+    designs : NetworkDesigns
         Real ones, without constant loads or displaced supports.
     targets : (k,) array
         Values of the drive [m or rad].
@@ -225,7 +219,7 @@ def march_many(
     own = equations(designs.template)
     goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
     span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
-    plan = Plan(first_step * span, span, tolerance=tolerance)
+    plan = MarchPlan(first_step * span, span, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
     if isinstance(own, CompiledEquations) and not own.follows:
         kept = design_arrays(own, designs)
@@ -238,17 +232,17 @@ def march_many(
     return efforts * own.effort_unit, codes
 
 
-def march_one(own: NumpyEquations, goals: FloatArray, plan: Plan, efforts: FloatArray, code: Any) -> None:
+def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: FloatArray, code: Any) -> None:
     """Follow one network from rest; put its efforts at the goals and how it ended into the arrays given."""
     start = begin(own)
-    march = March((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+    march = NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
     code[0] = march.code
     for state in march.states:
         if state.target >= 0:
             efforts[state.target] = state.effort
 
 
-def design_arrays(own: CompiledEquations, designs: Designs) -> dict[str, Any]:
+def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
     rule, tables = basis(own.network.degree), designs.tables
     found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
@@ -290,14 +284,18 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     slot[network.free] = np.arange(len(network.free))
     bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
     springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
-    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name not in ("beam", "cuts")}
+    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name in ADDRESSES}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
     given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
     given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
     whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
-    return {name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64) for name in ADDRESSES}
+    return {
+        name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64)
+        for name in ADDRESSES
+        if given[name] is not None
+    }
 
 
 def _leaves(network: Discretisation, slot: Any) -> Any:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.equations import MarchCode, Plan, State
+from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.polynomials import shape_functions
 from cfmkit.elastica.model.network import PointLoad
@@ -78,7 +78,7 @@ class NetworkProblem:
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
-        plan = Plan(
+        plan = MarchPlan(
             walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
             self.next_correction, on_branch=walk.branch is not None, room=2 * len(left) + ROOM,
         )  # fmt: skip
@@ -157,11 +157,11 @@ class NetworkProblem:
         return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
 
 
-def _state(at: PathEquilibrium) -> State:
-    return State(at.x, at.drive, at.rate, at.unstable, at.effort)
+def _state(at: PathEquilibrium) -> MarchState:
+    return MarchState(at.x, at.drive, at.rate, at.unstable, at.effort)
 
 
-def _equilibrium(state: State) -> PathEquilibrium:
+def _equilibrium(state: MarchState) -> PathEquilibrium:
     return PathEquilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
 
 

@@ -30,6 +30,9 @@ def raise_degree(network: Discretisation, degree: int) -> Discretisation:
     tables = {name: getattr(e, name) @ to_new for name in DENSITIES}
     tables["weight"] = speed * new.weights
     tables["rigidity"] = ((e.rigidity * (e.weight / old.weights) ** 2) @ to_new) / speed**2
+    if e.curl is not None:
+        tables["rest"], tables["hindrance"] = e.rest @ to_new, e.hindrance @ to_new
+        tables["curl"] = ((e.curl * (e.weight / old.weights) ** 2) @ to_new) / speed**2
     count, ends = len(e.length), _n_end_motions(network)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)

@@ -24,6 +24,46 @@ static Pose pose(const Model *m, const double *z, Int k) {
     return p;
 }
 
+/* The share of its curling that a wide strip can do, g, and two derivatives by z = th^4: see wide_strip.py. */
+static void curling_share(double z, double *g, double *first, double *second) {
+    static const double series[] = {  /* SERIES of wide_strip.py */
+        1.0, -0.005555555555555555, 4.4091710758377414e-05, -3.522589501425479e-07,
+        2.8148759863668038e-09, -2.2493633758277303e-11, 1.7974634993836147e-13,
+        -1.4363508775581866e-15, 1.1477862247352577e-17};
+    *g = *first = *second = 0.0;
+    if (z < 1.0) {
+        for (int k = (int)(sizeof series / sizeof *series) - 1; k >= 0; k--) {
+            *second = *second * z + 2.0 * *first;
+            *first = *first * z + *g;
+            *g = *g * z + series[k];
+        }
+        return;
+    }
+    const double th = sqrt(sqrt(z)), e = exp(-th), c = cos(th), s = sin(th), below = 1.0 + 2.0 * e * s - e * e;
+    const double f = 2.0 * e * (1.0 - e * e) * s / (below * below);
+    const double grows = 2.0 * e * ((1.0 + e * e) * s + (1.0 - e * e) * c) / (below * below)
+                         - 2.0 * f * (1.0 + 2.0 * e * c + e * e) / below;
+    *g = 2.0 / th * (1.0 - 2.0 * e * c + e * e) / below;
+    const double once = (4.0 * f - *g) / th, twice = (4.0 * grows - 2.0 * once) / th, cube = th * th * th;
+    *first = once / (4.0 * cube);
+    *second = (twice - 3.0 * once / th) / (16.0 * cube * cube);
+}
+
+/* Moment and stiffness of bending at a point. */
+static void bending(const Model *m, Int o, double curvature, double *moment, double *stiffness) {
+    const double rigidity = m->rigidity[o];
+    *moment = rigidity * curvature;
+    *stiffness = rigidity;
+    if (!m->curl || m->hindrance[o] == 0.0) return;
+    const double n = m->hindrance[o], whole = curvature + m->rest[o], by = 2.0 * m->curl[o] * whole;
+    double g, first, second;
+    curling_share(m->curl[o] * whole * whole, &g, &first, &second);
+    const double stiff = 1.0 + n * (1.0 - g), rising = -n * first * by;
+    const double curved = -n * (second * by * by + 2.0 * m->curl[o] * first);
+    *moment = rigidity * (curvature * stiff + 0.5 * curvature * curvature * rising);
+    *stiffness = rigidity * (stiff + 2.0 * curvature * rising + 0.5 * curvature * curvature * curved);
+}
+
 /* Sums over the Gauss points of an element. */
 typedef struct {
     double rotation[MAX_SHAPES], change[MAX_SHAPES], by_x[MAX_SHAPES], by_y[MAX_SHAPES];
@@ -42,7 +82,9 @@ static void gauss_point(const Model *m, Int o, const double *N, const double *S,
     const double f = 1.0 + (a - b) * normal, g = (a - b) * shear;
     sum->reach[0] += w * ((1.0 + a * normal) * c - b * shear * s);
     sum->reach[1] += w * ((1.0 + a * normal) * s + b * shear * c);
-    const double bent = w * m->rigidity[o] * curvature, turned = w * shear * f;
+    double moment, stiffness;
+    bending(m, o, curvature, &moment, &stiffness);
+    const double bent = w * moment, turned = w * shear * f;
     for (Int k = 0; k < shapes; k++) sum->rotation[k] += bent * S[k] - turned * N[k];
     const double gx = growth[0] * ahead, gy = growth[1] * ahead;
     if (gx != 0.0 || gy != 0.0) {
@@ -53,11 +95,13 @@ static void gauss_point(const Model *m, Int o, const double *N, const double *S,
         sum->reach_change[1] += w * (a * more_normal * s + b * more_shear * c);
     }
     if (!h) return;
-    const double stiff = w * (normal * f - g * shear), ux = w * (g * c - f * s), uy = w * (g * s + f * c);
+    const double stiff = w * (normal * f - g * shear), stiffer = w * (stiffness - m->rigidity[o]);
+    const double ux = w * (g * c - f * s), uy = w * (g * s + f * c);
     for (Int i = 0; i < shapes; i++) {
         const double own = stiff * N[i];
         double *row = h + i * ld;
         for (Int j = 0; j <= i; j++) row[j] += own * N[j];
+        if (stiffer != 0.0) for (Int j = 0; j <= i; j++) row[j] += stiffer * S[i] * S[j];
         sum->by_x[i] -= ux * N[i];
         sum->by_y[i] -= uy * N[i];
     }

@@ -18,6 +18,7 @@ import numpy as np
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
@@ -70,7 +71,8 @@ def element_states(net: Network, at: Equilibria, beam: str, element: int, fracti
     network, scales, given = at.network, at.network.scales, tuple(np.asarray(fractions, float).tolist())
     rule, e, fitted = basis(network.degree), network.elements, network.fits[beam]
     values, cumulated, through = _matrices(network.degree, given)
-    fields = energy.fields(_one_element(network, element), at.z, at.drive)
+    one = _one_element(network, element)
+    fields = energy.fields(one, at.z, at.drive)
     speed = (e.weight[element] / rule.weights)[None]
     own = at.z[:, e.unknowns[element]]
     rotation = own[:, energy.rotation_columns(network.degree)]
@@ -80,7 +82,7 @@ def element_states(net: Network, at: Equilibria, beam: str, element: int, fracti
     )
     softer = e.axial[element] - e.shear[element]
     turning = shear * (1 + softer * normal)
-    first = e.weight[element] * e.rigidity[element] * curvature
+    first = e.weight[element] * bending(one.elements, curvature[:, None]).moment[:, 0]
     moment = -(first @ rule.slopes[:, 0] - (e.weight[element] * turning) @ rule.values[:, 0])
     load = energy.line_load(network, at.drive)[..., element, :]
     ahead = e.length[element] - cumulated @ speed[0]
@@ -118,8 +120,8 @@ def _one_element(network: Discretisation, element: int) -> Any:
 
     e = network.elements
     one = slice(element, element + 1)
-    named = {name: getattr(e, name)[one] for name in e._fields if name not in ("beam", "cuts")}
-    return replace(network, elements=e._replace(**named, beam=e.beam[one], cuts=e.cuts[one]))
+    named = {name: table[one] for name, table in e._asdict().items() if table is not None}
+    return replace(network, elements=e._replace(**named))
 
 
 def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
@@ -137,7 +139,7 @@ def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
     return np.stack([found.x[0], found.y[0]], axis=-1)
 
 
-class Sections(NamedTuple):
+class BeamSections(NamedTuple):
     """Section forces and stresses at places of a beam, (p, k) each."""
 
     place: Any  # fraction of the arc length
@@ -153,7 +155,7 @@ class Sections(NamedTuple):
         return bending + np.abs(self.axial_stress) if axial else bending
 
 
-def sections(net: Network, beam: str, found: BeamStates) -> Sections:
+def sections(net: Network, beam: str, found: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam."""
     angle = found.angle + found.turn
     cos, sin = np.cos(angle), np.sin(angle)
@@ -161,4 +163,4 @@ def sections(net: Network, beam: str, found: BeamStates) -> Sections:
     area = net.beams[beam].section.width * found.thickness
     bending = 6 * found.moment / (area * found.thickness)
     place = np.broadcast_to(found.place, found.moment.shape)
-    return Sections(place, found.moment, normal, shear, bending, normal / area)
+    return BeamSections(place, found.moment, normal, shear, bending, normal / area)

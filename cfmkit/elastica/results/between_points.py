@@ -19,7 +19,7 @@ from cfmkit.elastica.outcome.between_points import FEWEST, KNOWN, BetweenLoads, 
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.results.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
 
 
 class _Spot(NamedTuple):
@@ -31,7 +31,7 @@ class _Spot(NamedTuple):
 
 
 class _OfFunctional:
-    """Equilibria of the functional between points; for `BetweenPoints` of a `cfmkit.elastica.results.path.Path`."""
+    """Equilibria of the functional between points: what `BetweenPoints` needs of an `EquilibriumPath`."""
 
     path: Any
     axial: bool
@@ -62,11 +62,11 @@ class _OfFunctional:
             known = vars(self)["_own_equations"] = equations(self.path.network)
         return known
 
-    def _path_of(self, y: FloatArray, loads: FloatArray, near: Any, accurate: Any) -> Path:
+    def _path_of(self, y: FloatArray, loads: FloatArray, near: Any, accurate: Any) -> EquilibriumPath:
         network = self.path.network
         z = network.base + loads[:, None] * network.rate
         z[:, network.free] = y
-        path: Path = replace(
+        path: EquilibriumPath = replace(
             self.path,
             at=Equilibria(network, z, loads),
             unstable=self.path.unstable[self._order][near],
@@ -110,13 +110,13 @@ class BetweenLoadStates(_OfFunctional, BetweenLoads):  # type: ignore[misc]
 
 
 def between_points(
-    path: Path, unit: float = 1.0, axial: bool = True, allowed: float | None = None
+    path: EquilibriumPath, unit: float = 1.0, axial: bool = True, allowed: float | None = None
 ) -> BetweenStates | None:
     """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.
 
     Parameters
     ----------
-    path : Path
+    path : EquilibriumPath
         Under a displacement or a rotation.
     unit : float
         What the effort is multiplied by: parts side by side.
@@ -134,7 +134,12 @@ def between_points(
 
 
 def between_loads(
-    path: Path, node: str, along: float | None, unit: float = 1.0, axial: bool = True, allowed: float | None = None
+    path: EquilibriumPath,
+    node: str,
+    along: float | None,
+    unit: float = 1.0,
+    axial: bool = True,
+    allowed: float | None = None,
 ) -> BetweenLoadStates | None:
     """Return a path under loads at every place of a node's motion.
 
@@ -143,7 +148,7 @@ def between_loads(
 
     Parameters
     ----------
-    path : Path
+    path : EquilibriumPath
         Under loads.
     node : str
         Whose motion it is over.

@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.results.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
 
 OPEN_FORCE = 1e-9  # dimensionless force that may be left where a force is open: rounding leaves 1e-14
 
 
-def cross_stiffness(path: Path, node: str, direction: float, points: Any = None) -> FloatArray:
+def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: Any = None) -> FloatArray:
     """Return the force across a direction per displacement across it at a node, at points of a path, (p,) [N/m].
 
     Parameters
     ----------
-    path : Path
+    path : EquilibriumPath
         The equilibria, driven by a displacement of the node along the direction, or by loads.
     node : str
         A node that no link moves.
@@ -51,7 +51,7 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
     return read_only(np.array(found) * scales.force / scales.length)
 
 
-def poles(path: Path, node: str, direction: float) -> NDArray[np.bool_]:
+def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool_]:
     """Return between which neighbouring points of a path `cross_stiffness` is unbounded, (p - 1,).
 
     It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
@@ -63,7 +63,9 @@ def poles(path: Path, node: str, direction: float) -> NDArray[np.bool_]:
     return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
 
 
-def _blocks(path: Path, node: str, direction: float, chosen: Any) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+def _blocks(
+    path: EquilibriumPath, node: str, direction: float, chosen: Any
+) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield the stiffness across, its coupling (2, k) to what follows, by row and by column, and that of those (k, k).
 
     The network is the same but for the node, whose axes are turned along the direction and which nothing guides.

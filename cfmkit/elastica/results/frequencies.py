@@ -37,23 +37,28 @@ from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.results.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
     from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
-DEGREE_OF_FIRST, DEGREE_PER_MODE = 10, 2
+DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
+LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
+"""Elements a beam from which on it is a chain, and the order of forces in one: coils of many turns."""
 MAX_DEGREE = 36
 MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
 NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is zero
+ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
 
 
 @one_blas_thread
 def frequencies(
-    path: Path,
+    path: EquilibriumPath,
     masses: NetworkMasses,
     count: int,
     points: Any = None,
@@ -63,10 +68,10 @@ def frequencies(
 
     Parameters
     ----------
-    path : Path
+    path : EquilibriumPath
         The equilibria.
     masses : NetworkMasses
-        Density of every beam, masses of nodes. Sections rotate with inertia where they shear, too.
+        Density of every beam, masses of nodes. BeamSections rotate with inertia where they shear, too.
     count : int
         How many frequencies, at least 1.
     points : (p,) int array, optional
@@ -83,7 +88,7 @@ def frequencies(
     _check(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
     fine = raise_degree(path.network, _degree(path.network, count))
-    system = _System(path, fine, masses)
+    system = _VibratingNetwork(path, fine, masses)
     by_load = isinstance(path.given, Loading)
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
     grows = np.zeros((2, len(chosen)), dtype=bool)
@@ -101,7 +106,7 @@ def frequencies(
     return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
 
 
-def _check(path: Path, masses: NetworkMasses, count: int) -> None:
+def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
     if missing := [name for name in path.net.beams if name not in masses.density]:
@@ -110,7 +115,7 @@ def _check(path: Path, masses: NetworkMasses, count: int) -> None:
         if name not in path.net.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
     elements, degree = len(path.network.elements.length), _degree(path.network, count)
-    size = path.network.size + elements * 5 * degree
+    size = path.network.size + elements * (degree - path.network.degree + 4 * _order(path.network, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -119,23 +124,34 @@ def _check(path: Path, masses: NetworkMasses, count: int) -> None:
 
 
 def _degree(network: Discretisation, count: int) -> int:
-    return max(network.degree, min(MAX_DEGREE, DEGREE_OF_FIRST + DEGREE_PER_MODE * count))
+    """Return the degree of the rotations: modes of a beam are spread over its elements."""
+    wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(network))
+    return max(network.degree, min(MAX_DEGREE, wanted))
+
+
+def _order(network: Discretisation, degree: int) -> int:
+    """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
+    return degree - 1 if _elements_a_beam(network) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
+
+
+def _elements_a_beam(network: Discretisation) -> float:
+    return len(network.elements.beam) / len(set(network.elements.beam))
 
 
 @dataclass(frozen=True)
 class _Matrices:
-    """Stiffness and mass of all unknowns, those of the elements' insides behind the others; masses in kg."""
+    """Stiffness and the root of the mass, M = R R^T, of all unknowns: elements' insides behind the others; kg."""
 
-    stiffness: FloatArray
-    mass: FloatArray
+    stiffness: FloatArray  # (n, n)
+    root: FloatArray  # (n, m): what the unknowns move a point by, times the root of its mass
 
 
-class _System:
+class _VibratingNetwork:
     """Stiffness and mass about one pose after another."""
 
-    def __init__(self, path: Path, fine: Discretisation, masses: NetworkMasses) -> None:
+    def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.net, self.fine, self.masses = path.net, fine, masses
-        self.order = fine.degree - 1  # of forces and, by one more, positions: as smooth as sines of the rotation
+        self.order = _order(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
@@ -147,15 +163,21 @@ class _System:
 
     def at(self, z: FloatArray, drive: float) -> _Matrices:
         """Return the matrices about a pose."""
-        stiffness, mass = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
         self._vary(stiffness, z, drive)
-        self._weigh(mass, z)
+        columns = [self._spread(*given) for given in self._weighed(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
             moves, unknowns = self._node(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
-            np.add.at(mass, (unknowns[:, None], unknowns), moves.T @ (size[:, None] * moves))
-        return _Matrices(stiffness, mass)
+            columns.append(self._spread(unknowns, moves, size))
+        return _Matrices(stiffness, np.hstack(columns))
+
+    def _spread(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
+        """Return columns of the root, (size, m), of points that some unknowns move by moves (m, unknowns)."""
+        column = np.zeros((self.size, len(moves)))
+        np.add.at(column, unknowns, moves.T * np.sqrt(masses))
+        return column
 
     def _vary(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
@@ -182,8 +204,8 @@ class _System:
                     stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
                     stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
 
-    def _weigh(self, mass: FloatArray, z: FloatArray) -> None:
-        """Add the masses of beams, and the inertia of their sections."""
+    def _weighed(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
+        """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
         fine, e, u = self.fine, self.fine.elements, self.rule.places
         ends = [poses(fine.attachments, z, e.ends[:, side]).jacobian for side in (0, 1)]
         rotations = e.unknowns[:, energy.rotation_columns(fine.degree)]
@@ -196,10 +218,9 @@ class _System:
             for axis in (0, 1):
                 moves = np.hstack([np.outer(1 - u, ends[0][k, axis]), np.outer(u, ends[1][k, axis]), self.bubbles])
                 unknowns = np.concatenate([e.unknowns[k, [0, 1, 2, 4, 5, 6]], self.positions[k, axis]])
-                np.add.at(mass, (unknowns[:, None], unknowns), (moves.T * density) @ moves)
+                yield unknowns, moves, density
             if section.shear:  # slenderness at which inertia of sections counts is that at which shear does
-                inertia, values = density * (thickness / fine.scales.length) ** 2 / 12, self.rule.values
-                np.add.at(mass, (rotations[k][:, None], rotations[k]), (values.T * inertia) @ values)
+                yield rotations[k], self.rule.values, density * (thickness / fine.scales.length) ** 2 / 12
 
     def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
         """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
@@ -222,36 +243,31 @@ def _chosen(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""
     driven = np.empty(0, int) if is_held else np.flatnonzero(fine.rate)
-    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.mass))])
-    stiffness, mass = matrices.stiffness[np.ix_(own, own)], matrices.mass[np.ix_(own, own)]
+    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
+    stiffness, root = matrices.stiffness[np.ix_(own, own)], matrices.root[own]
     if row is None or not is_held:
-        return stiffness, mass
+        return stiffness, root
     tied = np.append(row[own], 0.0)
-    stiffness, mass = (np.pad(matrix, (0, 1)) for matrix in (stiffness, mass))
+    stiffness, root = np.pad(stiffness, (0, 1)), np.pad(root, ((0, 1), (0, 0)))
     stiffness[-1], stiffness[:, -1] = tied, tied
-    return stiffness, mass
+    return stiffness, root
 
 
-def _squares(stiffness: FloatArray, mass: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
+def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
     found = np.full(count, np.nan)
-    size = np.sqrt(np.diag(mass))
-    size[size == 0.0] = 1.0
-    own, vectors = np.linalg.eigh(mass / np.outer(size, size))
-    heavy = own > np.finfo(float).eps * len(own) * own[-1]
-    root = size[:, None] * vectors[:, heavy] * np.sqrt(own[heavy])
-    shift = 1.0 / max(float(np.trace(mass)) / len(own), np.finfo(float).tiny)  # EI / (mass length^3) or so
+    shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
     symmetric = np.abs(stiffness - stiffness.T).max() <= np.finfo(float).eps * np.abs(stiffness).max()
     try:
-        flexible = root.T @ np.linalg.solve(stiffness + shift * mass, root)
+        flexible = root.T @ np.linalg.solve(stiffness + shift * root @ root.T, root)
     except np.linalg.LinAlgError:
         return found, False, not symmetric
     if symmetric:
         inverse = np.linalg.eigvalsh(0.5 * (flexible + flexible.T))
-        inverse = inverse[np.argsort(-np.abs(inverse))][:count]
-        inverse = inverse[np.abs(inverse) > np.finfo(float).eps * np.abs(inverse).max(initial=0.0)]
-        squares = np.sort(1 / inverse - shift)
-        if (1 / inverse < 0).any() or (squares < -NEUTRAL * shift).any():
+        largest = float(np.abs(inverse).max(initial=0.0))
+        lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
+        squares = 1 / lowest - shift
+        if inverse[0] < -ROUNDING * largest or (squares < -NEUTRAL * shift).any():
             return found, False, False
         found[: len(squares)] = np.where(squares < NEUTRAL * shift, 0.0, squares)
         return found, False, False

@@ -14,6 +14,7 @@ from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
 from cfmkit.elastica.outcome.path import PathStatus, StressPeak, most_stressed
@@ -34,7 +35,7 @@ N_PLACES = 17
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Path(ShortRepr):
+class EquilibriumPath(ShortRepr):
     """Equilibria of a network under a drive, n points in the order of the path; SI."""
 
     net: Network  # the model
@@ -155,7 +156,7 @@ class Path(ShortRepr):
         """Return where the sampled places of a beam lie, (k,) [fraction of the arc length]."""
         return read_only(self.states(beam).place)
 
-    def sections(self, beam: str) -> beam_states.Sections:
+    def sections(self, beam: str) -> beam_states.BeamSections:
         """Return section forces and stresses along a beam at all points; arrays (n, k)."""
         return beam_states.sections(self.net, beam, self.states(beam))
 
@@ -178,7 +179,7 @@ class Path(ShortRepr):
         """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
         return {}
 
-    def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.StressExtremes:
+    def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:
         """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""
         return stress_extremes.signed_extremes(self.net, self.at, beam, axial)
 
@@ -191,6 +192,10 @@ class Path(ShortRepr):
         return StressPeak(
             read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])
         )
+
+
+Path = EquilibriumPath
+"""Its name once the shooting engine, which has a class of that name, is gone."""
 
 
 def node_motion(at: Equilibria, node: str) -> Any:
@@ -237,7 +242,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
 def strain_energy(at: Equilibria) -> Any:
     """Return the strain energy of beams and springs, (p,), dimensionless."""
     e, fields = at.network.elements, energy.fields(at.network, at.z, at.drive)
-    density = e.rigidity * fields.curvature**2 + e.axial * fields.normal**2 + e.shear * fields.shear**2
+    density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
     for spring in at.network.springs:
         term = TERMS[type(spring.item)]

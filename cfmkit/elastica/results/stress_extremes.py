@@ -28,7 +28,7 @@ last grid is (2/48)^5 of an element wide, where a parabola's top is known to rou
 TIED = 1e-9  # share by which one element's stress must be higher than that of the one before it
 
 
-class StressExtremes(NamedTuple):
+class SideExtremes(NamedTuple):
     """Highest and lowest stress on both sides of a beam at p points, tension positive.
 
     The first axis after the points is the side: that of positive bending stress M t / 2I, then the other; the second
@@ -105,12 +105,12 @@ def _evaluate(series: FloatArray, grid: FloatArray) -> FloatArray:
     return np.asarray(series[..., 0, None] + grid * ahead - 0.5 * last)
 
 
-def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> StressExtremes:
+def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> SideExtremes:
     """Return the highest and lowest stress on both sides of a beam at every point."""
     sense = np.array([1.0, -1.0, 1.0, -1.0])  # of highest and lowest
     signs = np.stack([sense * [1.0, 1.0, -1.0, -1.0], sense * float(axial)], axis=1)
     value, place, element, fraction = extremes(net, at, beam, signs)
-    return StressExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, element, fraction)))
+    return SideExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, element, fraction)))
 
 
 def largest_stress(net: Network, at: Equilibria, beam: str, axial: bool) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ from cfmkit.elastica.outcome.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import Options, PathBranch, PathEnd, PathEnding, PathEvent, Point
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +39,7 @@ class DriveStart(NamedTuple):
     events: tuple[Event, ...]  # on the way; drives are shares of what is applied
     branch: PathBranch | None  # on which that is
     first: Buckling | None  # on the way
-    stopped: tuple[str, PathEnding] | None  # what could not be applied, and how the way to it ended
+    stopped: tuple[str, PathStop] | None  # what could not be applied, and how the way to it ended
 
 
 def find_start(network: Discretisation, control: Control) -> DriveStart:
@@ -61,7 +61,7 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
         )
         begin = correct(ramp, at.x, 0.0)
         if begin is None:
-            return DriveStart(problem, None, tuple(events), branch, first, (what, PathEnding(PathEnd.LOST, 0.0)))
+            return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
         for item in follow(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, PathEvent):
                 events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
@@ -69,7 +69,7 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
                     first = Buckling(ramp, item, what)
             elif isinstance(item, Point):
                 at, branch = item.at, item.branch
-            elif item.end is not PathEnd.COMPLETE:
+            elif item.end is not WhyStopped.COMPLETE:
                 return DriveStart(problem, None, tuple(events), branch, first, (what, item))
         if branch is not None and not branch.label:
             branch = branch._replace(label=what)

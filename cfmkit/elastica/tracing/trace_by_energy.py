@@ -17,7 +17,7 @@ from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, po
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
 from cfmkit.numerics.continuation.follow import follow
-from cfmkit.numerics.continuation.path import Options, PathBranch, PathEnd, PathEnding, PathEvent, Point
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -180,7 +180,7 @@ def trace_on(
     arrays = mesh.arrays(network, drive)
     start = find_start(arrays, control)
     events, first, points = [*start.events], start.first, list[Point]()
-    ending = PathEnding(PathEnd.LOST, 0.0)
+    ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
         for item in follow(start.problem, start.at, drive.points / unit, _options(drive, control, unit), start.branch):
@@ -194,7 +194,7 @@ def trace_on(
                         break
             else:
                 ending = item
-    while ending.end is PathEnd.COMPLETE and points and points[-1].target < 0:
+    while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
     return TraceAttempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
@@ -238,20 +238,22 @@ def _name_branch(branch: PathBranch | None, unit: float) -> str:
     return f"bifurcated {where}, sign {branch.sign:+d}"
 
 
-def _explain(start: DriveStart, ending: PathEnding, unit: float) -> tuple[PathStatus, str]:
+def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStatus, str]:
     """Return the status of a path, and why it ended."""
     if start.at is None:
         if start.stopped is None:
             return PathStatus.NO_START, RIGID
         what, stop = start.stopped
-        jumps = stop.end is PathEnd.JUMPS
+        jumps = stop.end is WhyStopped.JUMPS
         if jumps:
             return PathStatus.JUMPS, f"stability is lost under {100 * stop.drive:.3g} % of the {what}"
         text = f"no equilibrium to start from: lost at {stop.drive:.3g} of the constant loads and displacements; "
         text += "or nothing holds the network, the drive cannot move it, or its springs are prestressed too far"
         return PathStatus.NO_START, text
     status = PathStatus[ending.end.name]
-    text = status.value if ending.end is PathEnd.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
+    text = (
+        status.value if ending.end is WhyStopped.COMPLETE else ending.message.format(place=f"{ending.drive * unit:.6g}")
+    )
     return status, text
 
 

@@ -13,7 +13,7 @@ from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.path import PathEnd, PathEnding, Point, Walk
+from cfmkit.numerics.continuation.path import PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
@@ -68,8 +68,8 @@ def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
         if steady >= STEADY_STEPS and count >= STEADY_STEPS and drive_step > STEADY_STEP * options.span:
             return _natural(walk)
         if count > LOCKED_STEPS and abs(move.new.drive - begin.drive) < LOCKED_SHARE * options.span:
-            return PathEnding(
-                PathEnd.LIMIT_POINT,
+            return PathStop(
+                WhyStopped.LIMIT_POINT,
                 move.new.drive,
                 TOO_SHARP,
             )
@@ -113,7 +113,7 @@ def _end_at_fold(
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
     if joined is None:
-        return PathEnding(PathEnd.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
+        return PathStop(WhyStopped.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined
     yield event
     walk = replace(walk, branch=None)
@@ -142,4 +142,4 @@ def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> I
         yield Point(at, number, walk.branch)
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
-    return PathEnding(PathEnd.LIMIT_POINT, fold.drive, LIMIT_POINT)
+    return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.numerics.continuation.arc import ArcMove, follow_arc
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold, locate_stability_change_on_arc
-from cfmkit.numerics.continuation.path import PathEnd, PathEnding, PathEvent, Point, Walk
+from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
             return walk.restart(point.at, walk.step)
         if not limits[0] <= step.new.drive <= limits[1]:
             yield Point(step.new, -1, walk.branch)
-            return PathEnding(PathEnd.OUTSIDE, step.new.drive, "the drive left its range at {place}")
+            return PathStop(WhyStopped.OUTSIDE, step.new.drive, "the drive left its range at {place}")
         yield Point(step.new, -1, walk.branch)
         change = abs(step.new.drive - step.old.drive)
         moved = largest_motion(problem, step.new.x - step.old.x)
@@ -73,7 +73,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located, after: int) -> Items:
         if steady >= STEADY_STEPS and step.new.unstable <= begin.unstable:
             ahead = next(number for number in run if (walk.targets[number] - step.new.drive) * sense > 0)
             return replace(walk, number=ahead).restart(step.new, change)
-    return PathEnding(PathEnd.LOST, walk.here.drive, "the path was lost along its arc at {place}")
+    return PathStop(WhyStopped.LOST, walk.here.drive, "the path was lost along its arc at {place}")
 
 
 def _run(walk: Walk) -> range:

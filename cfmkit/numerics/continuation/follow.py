@@ -11,7 +11,7 @@ from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
-from cfmkit.numerics.continuation.path import PathEnd, PathEnding, PathEvent, Point, Walk
+from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -45,7 +45,7 @@ def follow(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None = None,
-) -> Iterator[Point | PathEvent | PathEnding]:
+) -> Iterator[Point | PathEvent | PathStop]:
     """Yield the points and events of a path in order, and its ending at last.
 
     Parameters
@@ -64,15 +64,15 @@ def follow(
 
     Yields
     ------
-    Point, PathEvent or PathEnding
-        Points at requested values and between them. A path that ends early ends with an `PathEnding` that says why.
+    Point, PathEvent or PathStop
+        Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
     """
     between = 0
     for item in _items(problem, start, targets, options, branch):
         yield item
         between += isinstance(item, Point) and item.target < 0
         if between > options.most_points:
-            yield PathEnding(PathEnd.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
+            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
             return
 
 
@@ -82,7 +82,7 @@ def _items(
     targets: FloatArray,
     options: Options,
     branch: PathBranch | None,
-) -> Iterator[Point | PathEvent | PathEnding]:
+) -> Iterator[Point | PathEvent | PathStop]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     yield Point(start, at_first - 1, branch)
     walk = Walk(
@@ -95,7 +95,7 @@ def _items(
     elif start.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
-            yield PathEnding(PathEnd.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
+            yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
             return
         walk = moved
     march = getattr(problem, "march", None)
@@ -105,12 +105,12 @@ def _items(
             if walk.done:
                 break
         outcome = yield from _step(walk)
-        if isinstance(outcome, PathEnding):
+        if isinstance(outcome, PathStop):
             yield outcome
             return
         assert outcome is not None
         walk = outcome
-    yield PathEnding(PathEnd.COMPLETE, walk.here.drive)
+    yield PathStop(WhyStopped.COMPLETE, walk.here.drive)
 
 
 def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
@@ -126,7 +126,7 @@ def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
     here, sense = walk.here, walk.sense
     if _is_locked(walk):
-        return PathEnding(PathEnd.LIMIT_POINT, here.drive, LOCKED)
+        return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED)
     if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = replace(walk, before=None)
     target = float(walk.targets[walk.number])
@@ -215,5 +215,5 @@ def _reject(walk: Walk, goal: float) -> Items:
             if outcome is not None:
                 return outcome
     if walk.step < FINEST_STEP * options.span or walk.rejections > MAX_REJECTIONS:
-        return PathEnding(PathEnd.LOST, here.drive, "no step converged at {place}")
+        return PathStop(WhyStopped.LOST, here.drive, "no step converged at {place}")
     return walk

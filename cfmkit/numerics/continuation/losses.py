@@ -19,7 +19,7 @@ from cfmkit.numerics.continuation.branches import (
 )
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
-from cfmkit.numerics.continuation.path import PathBranch, PathEnd, PathEnding, PathEvent, Point, Walk
+from cfmkit.numerics.continuation.path import PathBranch, PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, arc_weights, largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.events import Located
 
-Items = Generator[Point | PathEvent, None, Walk | PathEnding | None]
+Items = Generator[Point | PathEvent, None, Walk | PathStop | None]
 """What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
 
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
@@ -68,7 +68,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
         yield Point(new, -1, walk.branch)
-        return PathEnding(PathEnd.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
+        return PathStop(WhyStopped.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
     onto, mode = None, problem.orient(modes)
     for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
         several = _pass_together(walk, new, found, slope, clusters)
@@ -82,8 +82,8 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     if onto is None and options.through_folds:
         return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
     if onto is None:
-        return PathEnding(
-            PathEnd.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
+        return PathStop(
+            WhyStopped.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
         )
     return (yield from _begin_branch(walk, found, onto, after))
 

@@ -57,7 +57,7 @@ class PathEvent:
     modes: Any = None  # (n, k) critical ones, if they were computed
 
 
-class PathEnd(Enum):
+class WhyStopped(Enum):
     """How a path ends."""
 
     COMPLETE = "all requested values were reached"
@@ -69,10 +69,10 @@ class PathEnd(Enum):
 
 
 @dataclass(frozen=True)
-class PathEnding:
+class PathStop:
     """The last item of a path."""
 
-    end: PathEnd
+    end: WhyStopped
     drive: float
     message: str = ""  # why, with {place} for the drive there
 
