@@ -115,10 +115,14 @@ def _items(
 
 def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
-    marched = march(walk)
+    marched, number = march(walk), walk.number
     for at, reached in marched.states:
-        yield Point(at, walk.number if reached else -1, walk.branch)
-        walk = walk.move(at, int(reached))
+        yield Point(at, number if reached else -1, walk.branch)
+        number += reached
+    if marched.states:
+        passed = (walk.here, *(at for at, _ in marched.states))
+        trail = (*walk.trail, *passed[1:])
+        walk = replace(walk, before=passed[-2], here=passed[-1], trail=trail, number=number)
     return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 
