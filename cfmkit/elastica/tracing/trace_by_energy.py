@@ -258,12 +258,13 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
 
 
 def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
-    """Return True if bifurcations far along the primary path lie where they do at another degree.
+    """Return True if limit points, and bifurcations of the primary path, lie where they do at another degree.
 
-    The path itself says nothing about their error: a straight column has none, while its high modes have waves.
+    The path itself says little about their error: a straight column has none, while its high modes have waves.
     """
     places = [event.drive for event in path.events]
-    if control.branch != "primary" or not places:
+    folds = any(event.kind == "limit point" for event in path.events)
+    if not places or not (folds or control.branch == "primary"):
         return True
     if before is None or len(before.events) != len(places):
         return False
