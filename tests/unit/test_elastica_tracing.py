@@ -12,6 +12,7 @@ from network_cases import differences, from_json, observe, read_cases
 
 from cfmkit.elastica import (
     CLAMPED,
+    PINNED,
     Beam,
     Control,
     Displacement,
@@ -93,3 +94,12 @@ def test_a_network_that_nothing_bears_has_no_start() -> None:
     path = trace(net, Displacement("b", np.pi / 2, np.array([1e-3])))
     assert path.status is PathStatus.NO_START
     assert len(path) == 0
+
+
+def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
+    """Bent by 3.5e-5 of its length a column that does not stretch buckles to that side, whatever the steps."""
+    net = Network({"a": Node(0, 0, PINNED), "b": Node(0.1, 0, guided(0.0, True))}, {"x": Beam("a", "b", STIFF)})
+    drive = Displacement("b", np.pi, np.array([1e-3, 0.015, 0.03]))
+    sides = [trace(net, drive, Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
+    assert sides[0] == pytest.approx(sides[1], rel=1e-2)
+    assert sides[0] == pytest.approx(-sides[2], rel=1e-7)

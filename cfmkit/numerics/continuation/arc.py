@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import Border, arc_weights, force_change, largest_motion
-from cfmkit.numerics.continuation.steps import FORCE_SHARE
+from cfmkit.numerics.continuation.steps import CHORD_COSINE, FORCE_SHARE, ROUNDING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,7 +76,7 @@ def follow_arc(
         step = step_along(problem, here, tangent, length, options.span)
         if (
             step is None
-            or not _accept(problem, here, step, length, options)
+            or not _accept(problem, here, step, tangent, length, options)
             or ((weights * step.tangent) @ tangent < TURN_COSINE)
         ):
             length *= 0.5
@@ -88,10 +88,25 @@ def follow_arc(
 
 
 def _accept(
-    problem: ContinuationProblem, here: PathEquilibrium, step: ArcStep, length: float, options: Options
+    problem: ContinuationProblem,
+    here: PathEquilibrium,
+    step: ArcStep,
+    before: FloatArray,
+    length: float,
+    options: Options,
 ) -> bool:
-    return (
-        step.missed <= MISSED_SHARE * length
-        and largest_motion(problem, step.new.x - here.x) <= options.largest_motion
-        and force_change(problem, here.x, step.new.x, options.largest_force, FORCE_SHARE) <= 1.5
-    )
+    """Return True if a step is short enough and its motions go the way that the tangents at both its ends say.
+
+    Forces may lead the arc length: where they do, a step over a sharp corner to the mirror image is told by motions.
+    """
+    chord, motions = step.new.x - here.x, problem.motions
+    moved = largest_motion(problem, chord)
+    if step.missed > MISSED_SHARE * length or moved > options.largest_motion:
+        return False
+    if force_change(problem, here.x, step.new.x, options.largest_force, FORCE_SHARE) > 1.5:
+        return False
+    if moved <= ROUNDING:
+        return True
+    size = float(np.linalg.norm(chord[motions]))
+    ends = (tangent[:-1][motions] for tangent in (before, step.tangent))
+    return all(chord[motions] @ end >= CHORD_COSINE * size * np.linalg.norm(end) for end in ends)
