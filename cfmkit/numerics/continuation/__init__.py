@@ -1,7 +1,7 @@
 """Equilibria of a structure under one growing quantity, the drive: followed, with bifurcations and limit points.
 
-It knows no beams and no solids: a structure is a `problem.Problem`, which gives its residual, tangent and the number
-of its unstable directions. `follow.follow` is an iterator of the points and events of a path.
+It knows no beams and no solids: a structure is a `problem.ContinuationProblem`, which gives its residual, its
+tangent and the number of its unstable directions. `follow.follow` is an iterator of the points and events of a path.
 
 References
 ----------
