@@ -1,4 +1,6 @@
-"""What pyproject.toml cannot say: two folders of the tree are packages of a wheel, and where the README's links lead.
+"""What pyproject.toml cannot say: compiled code, two folders of the tree that are packages, where the README links to.
+
+The beam engine has its inner loops in C. Without a compiler it is installed all the same and runs on numpy, slower.
 
 `configs` becomes `cfmkit.configs`, the pages of `docs` become `cfmkit.docs`: so examples and documentation stand once
 in the tree, where everybody looks for them, and come with every installation.
@@ -11,12 +13,38 @@ import os
 import re
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 
 HERE = Path(__file__).parent
 ROOMS = ("", ".studies", ".synthetic")
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:)([^)#\s]+)(#[^)\s]*)?\)")
+
+
+MECHANICS = "cfmkit/elastica/mechanics"
+MARCH = Extension(
+    "cfmkit.elastica.mechanics._march",
+    [f"{MECHANICS}/{name}.c" for name in ("module", "march", "terms", "factor")],
+    depends=[f"{MECHANICS}/march.h"],
+    libraries=[] if os.name == "nt" else ["m"],
+    extra_compile_args=[] if os.name == "nt" else ["-O3", "-std=c99"],
+    py_limited_api=True,  # one file for every Python from 3.11 on
+    optional=True,
+)
+
+
+class WheelForEveryPython(bdist_wheel):
+    """Build one wheel for every Python from 3.11 on; for any platform if there was no compiler."""
+
+    def run(self):
+        """Compile first: the wheel's name says what came of it."""
+        self.run_command("build_ext")
+        built = self.get_finalized_command("build_ext").get_outputs()
+        if not any(Path(file).exists() for file in built):
+            self.distribution.ext_modules = []
+            self.root_is_pure = True
+        super().run()
 
 
 class BuildPages(build_py):
@@ -55,7 +83,9 @@ setup(
         "cfmkit.families.beam.shapes",  # data of the family, no module: setuptools wants every folder of data named
     ],
     package_dir={"cfmkit.configs": "configs", "cfmkit.docs": "docs"},
-    cmdclass={"build_py": BuildPages},
+    ext_modules=[MARCH],
+    cmdclass={"build_py": BuildPages, "bdist_wheel": WheelForEveryPython},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
     long_description=described((HERE / "README.md").read_text(encoding="utf-8"), URL),
     long_description_content_type="text/markdown",
     project_urls={

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 NUMERICAL = ("numba", "numpy", "scipy")
 """The libraries whose versions can change a number."""
 
-_LEFT_BEHIND = (".pyc", ".pyo", ".nbi", ".nbc")
-"""Endings of what Python and numba put beside source files."""
+_LEFT_BEHIND = (".pyc", ".pyo", ".nbi", ".nbc", ".so", ".pyd")
+"""Endings of what Python, numba and a compiler put beside source files."""
 
 
 def file_hash(path: Path) -> str | None:
@@ -135,7 +135,7 @@ def tree_hash(root: Path) -> str:
 
 
 def _files_below(root: str, above: str = "") -> Iterator[str]:
-    """Yield the names of all files below a folder but hidden ones and those that Python and numba left there."""
+    """Yield the names of all files below a folder but hidden ones and compiled ones."""
     with os.scandir(os.path.join(root, above)) as entries:
         for entry in entries:
             name = f"{above}/{entry.name}" if above else entry.name

@@ -24,7 +24,8 @@ ROOT = Path(__file__).parents[2]
 
 def module_names() -> list[str]:
     found = (item.name for item in pkgutil.walk_packages(cfmkit.__path__, "cfmkit."))
-    return ["cfmkit", *(name for name in found if not name.endswith("__main__"))]
+    left_out = ("__main__", "._march")  # what is compiled of C has no text
+    return ["cfmkit", *(name for name in found if not name.endswith(left_out))]
 
 
 def source_of(name: str) -> str:

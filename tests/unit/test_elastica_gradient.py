@@ -6,54 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lan_2010 import SHAPES, half
+from varied_networks import LAN, arms, lan
 
 from cfmkit.elastica import (
-    CLAMPED,
-    Beam,
     Control,
     Displacement,
-    LineLoad,
-    Link,
-    Network,
-    Node,
-    Polynomial,
-    Section,
-    Taper,
     gradient,
-    guided,
     trace,
 )
 from cfmkit.elastica.kernels import compiled
 from cfmkit.errors import InputError
 
 FINE = Control(tolerance=1e-11)
-LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
-
-
-def lan(x: Any) -> Network:
-    """Node positions [cm], shape coefficients, thickness [mm] and modulus [GPa] of Lan's network, extensible."""
-    nodes = {"n3": (x[1] * 1e-2, x[0] * 1e-2), "n4": (x[2] * 1e-2, x[3] * 1e-2)}
-    varied = {name: (shape[0], x[4 + 2 * k], x[5 + 2 * k]) for k, (name, (_, _, shape)) in enumerate(SHAPES.items())}
-    return half(Section(x[13] * 1e9, 10e-3, x[12] * 1e-3), nodes=nodes, coefficients=varied)
-
-
-def arms(x: Any) -> Network:
-    """A tapered beam on a rigid arm, with its weight, and a linked node whose places vary."""
-    section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, x[0], 1.2e-3])), shear=True)
-    nodes = {
-        "a": Node(0, 0, CLAMPED),
-        "b": Node(0.05, 0.02),
-        "bb": Node(0.05 + x[1], 0.02 + x[2]),
-        "c": Node(0.1, 0.0, CLAMPED),
-        "d": Node(0.06, 0.08, guided(np.pi / 2)),
-    }
-    beams = {
-        "ab": Beam("a", "b", section, Polynomial((0.0, 0.7)), end_offset=(x[3], 0.001)),
-        "bc": Beam("bb", "c", section, end_joint="pin"),
-        "bd": Beam("b", "d", section),
-    }
-    return Network(nodes, beams, links=(Link("b", "bb"),), loads=(LineLoad("ab", 20.0, -60.0),))
 
 
 @pytest.mark.parametrize(

@@ -6,29 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from varied_networks import KINDS, X, loaded, pushed, turned
 
 from cfmkit.elastica import (
     CLAMPED,
     Beam,
     Control,
-    CosineArch,
     Displacement,
-    LineLoad,
-    LineSpring,
-    Link,
-    Loading,
     Network,
     Node,
-    PointLoad,
-    Polyline,
     Polynomial,
-    Rotation,
     Section,
-    SlideSpring,
-    Spline,
-    Support,
-    Taper,
-    TorsionSpring,
     gradient,
     guided,
     trace,
@@ -36,66 +24,6 @@ from cfmkit.elastica import (
 from cfmkit.errors import InputError
 
 FINE = Control(tolerance=1e-11)
-VALUES = {
-    "node x": 0.05,
-    "node y": 0.02,
-    "thickness": 1.1,
-    "linked node": 4e-3,
-    "offset x": 3e-3,
-    "offset y": 2e-3,
-    "line spring": 150.0,
-    "its free length": 0.045,
-    "torsion spring": 0.2,
-    "its angle": 0.05,
-    "slide spring": 60.0,
-    "its direction": 0.4,
-    "its place": 1e-3,
-    "dead load": -0.2,
-    "follower": 0.1,
-    "line load": -5.0,
-    "support displacement": 4e-4,
-    "support direction": 1.5,
-    "rise": 6e-3,
-    "corner": 0.012,
-    "spline point": 0.011,
-    "modulus": 1.0,
-    "Poisson's ratio": 0.3,
-    "coefficient": 0.7,
-    "width": 8.0,
-}
-X, KINDS = np.array(list(VALUES.values())), list(VALUES)
-
-
-def zoo(x: Any) -> Network:
-    """A network in which everything varies."""
-    section = Section(x[21] * 2e9, x[24] * 1e-3, Taper(np.array([0, 0.5, 1]), np.array([1.0, x[2], 1.2]) * 1e-3), True)
-    plain = Section(x[21] * 2e9, 8e-3, 1e-3, axial=True, shear=True, poisson_ratio=x[22])
-    steps = Taper(np.array([0, 0.3, 0.3, 0.8, 1]), np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3)
-    stepped = Section(x[21] * 2e9, 8e-3, steps, axial=True, shear=True, poisson_ratio=x[22])
-    nodes = {
-        "a": Node(0, 0, Support(True, True, True, displacement=(0.0, x[16], 0.0))),
-        "b": Node(x[0], x[1]),
-        "bb": Node(0.05 + x[3], 0.022),
-        "c": Node(0.1, 0.0, CLAMPED),
-        "d": Node(0.06, 0.08, guided(np.pi / 2)),
-        "e": Node(0.12, 0.05, guided(x[17], rotates=True)),
-        "f": Node(-0.02, 0.06, CLAMPED),
-    }
-    beams = {
-        "ab": Beam("a", "b", section, Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),
-        "bc": Beam("bb", "c", stepped, CosineArch(x[18]), end_joint="pin"),
-        "bd": Beam("b", "d", section),
-        "be": Beam("b", "e", plain, Polyline(np.array([[0.0, 0.0], [0.03, x[19]], [0.07, 0.03]]))),
-        "bf": Beam("bb", "f", stepped, Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))),
-    }
-    springs = (
-        LineSpring("b", "d", x[6], x[7]),
-        LineSpring("bb", None, 40.0, ground=(0.0, 0.05)),
-        TorsionSpring("b", "e", x[8], x[9]),
-        SlideSpring("e", x[11], x[10], x[12]),
-    )
-    loads = (PointLoad("b", fy=x[13], moment=1e-3), PointLoad("bb", fx=x[14], follows=True), LineLoad("ab", 2.0, x[15]))
-    return Network(nodes, beams, (Link("b", "bb"),), springs, loads)
 
 
 def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
@@ -137,23 +65,6 @@ def slopes(g: Any) -> dict[str, Any]:
         for axial in (True, False):
             found[f"extremes {beam} {axial}"] = g.stress_extremes(beam, axial)
     return found
-
-
-def pushed(x: Any) -> Any:
-    return zoo(x), Displacement("d", -np.pi / 2, np.array([1e-3, 3e-3]))
-
-
-def turned(x: Any) -> Any:
-    return zoo(x), Rotation("e", np.array([-0.1, -0.2]))
-
-
-def loaded(x: Any) -> Any:
-    loads = (
-        PointLoad("b", 0.2, 3 * x[13], 1e-3 * x[2]),
-        PointLoad("d", 0, x[13], follows=True),
-        LineLoad("bf", 1.0, x[15]),
-    )
-    return zoo(x), Loading(loads, np.array([0.5, 1.0]))
 
 
 @pytest.mark.parametrize("build", [pushed, turned, loaded])

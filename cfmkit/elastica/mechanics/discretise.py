@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.beam import Fit, fit
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
 from cfmkit.elastica.model.numbering import apart, driven
+from cfmkit.elastica.model.plain_beams_at_once import Bundle
+from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates 
 TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
 LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
+TABLE_COLUMNS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+"""Tables of every element."""
 FRAME_OF_DRIVE = 3
 """What `driven` says of a node that is held nowhere: its frame is that of the drive, of which it moves along x."""
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
@@ -72,6 +76,9 @@ class BeamElements(NamedTuple):
     unknowns: Any  # (e, degree + 9): those of both ends (x, y, body's and own rotation), bubbles, force
     beam: tuple[str, ...]  # the beam each one is a piece of
     cuts: FloatArray  # (e, 2) where it begins and ends, parameter of the beam's shape
+    rest: Any = None  # (e, q) curvature at rest by u; with curl and hindrance those of wide strips, None without any
+    curl: Any = None  # (e, q) th^4/K^2 by u
+    hindrance: Any = None  # (e, q) nu^2/(1 - nu^2), 0 unless it is wide
 
 
 class Attachments(NamedTuple):
@@ -108,6 +115,7 @@ class Discretisation:
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
     fits: Mapping[str, Fit]
+    floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
 
     @property
     def n_motions(self) -> int:
@@ -155,7 +163,9 @@ class _ArrayBuilder:
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = itertools.count()
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.fits = {name: self._fit(beam) for name, beam in network.beams.items()}
+        self.bundle = _bundle(network)
+        self.fits = _fits(network, self.bundle)
+        self.wide = any(beam.section.wide for beam in network.beams.values())
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -166,6 +176,7 @@ class _ArrayBuilder:
 
     def build(self) -> Discretisation:
         """Return the arrays."""
+        self.together = self._plain_tables()
         pieces = [piece for name, beam in self.network.beams.items() for piece in self._beam(name, beam)]
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
@@ -182,15 +193,10 @@ class _ArrayBuilder:
         free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits,
+            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]),
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
-    def _fit(self, beam: Beam) -> Fit:
-        start, end = self.network.nodes[beam.start], self.network.nodes[beam.end]
-        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
-        return fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
-
     def _scales(self) -> MechanicsUnits:
         length = float(np.mean([np.real(fitted.length) for fitted in self.fits.values()]))
         section = next(iter(self.network.beams.values())).section
@@ -246,21 +252,42 @@ class _ArrayBuilder:
         fitted = self.fits[name]
         start = self._attach(beam.start, beam.start_offset, beam.start_joint == "pin")
         end = self._attach(beam.end, beam.end_offset, beam.end_joint == "pin")
-        cuts = _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
+        known = self.together.get(name)
+        cuts = [0.0, 1.0] if known else _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
         floor = self._floor(beam, fitted)
         last = start
         for k, (left, right) in enumerate(itertools.pairwise(cuts)):
-            piece = self._piece(beam, fitted, left, right, floor)
+            piece = known or self._piece(beam, fitted, left, right)
+            piece["axial"] = piece["axial"] + floor
             piece["ends"] = last, (end if k == len(cuts) - 2 else self._inner_body(last, piece))
             yield piece | {
                 "beam": name,
                 "cuts": (left, right),
                 "raw": beam.closure == "raw",
                 "inner": k < len(cuts) - 2,
+                "floored": floor > 0,
             }
             last = piece["ends"][1]
 
-    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float, floor: float) -> dict[str, Any]:
+    def _plain_tables(self) -> dict[str, dict[str, Any]]:
+        """Return the tables of plain beams of one element, by name: in a few array operations for all of them."""
+        bundle, rule = self.bundle, basis(self.degree)
+        if not bundle.plain or self.pieces > 1 or self.wide:
+            return {}
+        length, force = self.scales.length, self.scales.force
+        speed = bundle.length[:, None] / length
+        powers = np.vander(rule.places, bundle.coefficients.shape[1], increasing=True)
+        angle, weight, ones = bundle.coefficients @ powers.T, speed * rule.weights, np.ones(len(rule.places))
+        rigidity = bundle.bending[:, None] / (force * length**2) / speed**2 * ones
+        axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
+        tables = zip(angle, weight, rigidity, axial, shear, speed * (1 - rule.places), speed[:, 0], strict=True)
+        return {
+            name: dict(zip(TABLE_COLUMNS, own, strict=True))
+            for name, own in zip((bundle.names[k] for k in bundle.plain), tables, strict=True)
+            if _turns_little(self.network.beams[name]) and self.tension.get(name, 0.0) <= TAUT
+        }
+
+    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float) -> dict[str, Any]:
         """Return the tables of an element between two parameters of a beam's shape."""
         length, force = self.scales.length, self.scales.force
         rule, inside = basis(self.degree), 0.5 * (left + right)
@@ -272,16 +299,26 @@ class _ArrayBuilder:
             "angle": fitted.angle(t, inside) + 0.0 * t,
             "weight": speed * rule.weights,
             "rigidity": rigidity / (force * length**2) / speed**2,
-            "axial": axial * force + floor + 0.0 * t,
+            "axial": axial * force + 0.0 * t,
             "shear": shear * force + 0.0 * t,
             "ahead": whole - integrals_to_points(self.degree) @ speed,
             "length": whole,
+        } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
+
+    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
+        """Return the tables of wide strips."""
+        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
+        curl, hindrance = beam.section.curling(thickness)
+        angle = fitted.angle(t, inside) + 0.0 * t
+        return {
+            "rest": slopes_at_points(self.degree) @ angle,
+            "curl": curl / (speed * self.scales.length) ** 2,
+            "hindrance": hindrance + 0.0 * speed,
         }
 
     def _floor(self, beam: Beam, fitted: Fit) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
-        angles = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5))
-        if beam.section.axial or len(fitted.course.breaks) > 2 or np.ptp(angles + np.zeros(9)) > 0:
+        if beam.section.axial or len(fitted.course.breaks) > 2 or not _is_straight(beam, fitted):
             return 0.0
         rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
@@ -301,7 +338,7 @@ class _ArrayBuilder:
         forces = [[next(self.count), next(self.count)] for _ in pieces]
         ends = np.array([piece["ends"] for piece in pieces])
         unknowns = np.hstack([attachments.unknowns[ends[:, 0]], attachments.unknowns[ends[:, 1]], bubbles, forces])
-        columns = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
+        columns = (*TABLE_COLUMNS, *(("rest", "curl", "hindrance") if self.wide else ()))
         tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
         beams = tuple(piece["beam"] for piece in pieces)
         line = self._line_loads()
@@ -336,7 +373,12 @@ class _ArrayBuilder:
         self, size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]
     ) -> tuple[Any, Any, Any]:
         """Return the free unknowns, the values of held ones and their change with the drive."""
-        held, base, rate = np.zeros(size, bool), np.zeros(size), np.zeros(size)
+        displaced = [value for node in self.network.nodes.values() for value in node.support.displacement]
+        held, base, rate = (
+            np.zeros(size, bool),
+            np.zeros(size, np.result_type(float, np.asarray(displaced))),
+            np.zeros(size),
+        )
         for name, body in self.bodies.items():
             support = self.network.nodes[name].support
             flags = support.along, support.across, support.rotation
@@ -350,6 +392,29 @@ class _ArrayBuilder:
             unknown = self.bodies[node][local % FRAME_OF_DRIVE]
             held[unknown], rate[unknown], base[unknown] = True, sense, 0.0
         return np.flatnonzero(~held), base, rate
+
+
+def _bundle(network: Network) -> Bundle:
+    """Return the beams of a network; plain ones are fitted together."""
+    ends = np.array(
+        [
+            (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
+            for beam in network.beams.values()
+            for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
+        ]
+    )
+    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
+
+
+def _fits(network: Network, bundle: Bundle) -> dict[str, Fit]:
+    """Return how each beam is fitted between its nodes."""
+    alone = {}
+    for name in (bundle.names[k] for k in bundle.others):
+        beam = network.beams[name]
+        start, end = network.nodes[beam.start], network.nodes[beam.end]
+        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
+        alone[name] = fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
+    return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
 
 
 def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
@@ -375,10 +440,22 @@ def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
     marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
     marks[0], marks[-1] = 0.0, 1.0
-    count = max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
+    count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
     cuts = [left + (right - left) * k / count for left, right in itertools.pairwise(marks) for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
+
+
+def _is_straight(beam: Beam, fitted: Fit) -> bool:
+    """Return True if a beam without corners is straight before it is loaded."""
+    if isinstance(beam.shape, Polynomial):
+        return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
+    return not np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0
+
+
+def _turns_little(beam: Beam) -> bool:
+    """Return True if the angle of an unloaded beam is a polynomial that cannot turn by more than an element may."""
+    return isinstance(beam.shape, Polynomial) and sum(abs(c) for c in beam.shape.coefficients[1:]) <= MAX_TURN
 
 
 def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
@@ -395,6 +472,6 @@ def _refine_ends(cuts: list[float], tautness: float) -> list[float]:
 
 def without_floor(discretisation: Discretisation, elements: Any) -> Discretisation:
     """Return the same arrays with elements that do not stretch at all."""
-    axial = discretisation.elements.axial.copy()
-    axial[elements] = 0.0
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial))
+    axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
+    axial[elements], floored[elements] = 0.0, False
+    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)

@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.terms import Contribution
 
 SINGULAR_SHIFT = 1e-13  # added to the stiffness of the motions where it is singular to rounding
+FLEXIBLE_SHARE = 1e-9  # of the largest flexibility, below which one is that of a constraint: rounding
 REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of its size
 
 
 class Fields(NamedTuple):
-    """What is known at the Gauss points of the elements, (e, q) each."""
+    """What is known at the Gauss points of the elements, (..., e, q) each."""
 
     curvature: Any  # phi' by the element's parameter
     cos: Any
@@ -38,11 +40,11 @@ class Fields(NamedTuple):
 
 
 def fields(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fields:
-    """Return rotations and section forces at the Gauss points."""
+    """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
     e, rule = network.elements, basis(network.degree)
-    own = z[e.unknowns]
-    rotation = own[:, rotation_columns(network.degree)]
-    force = own[:, None, -2:] + line_load(network, drive, share)[:, None, :] * e.ahead[:, :, None]
+    own = z[..., e.unknowns]
+    rotation = own[..., rotation_columns(network.degree)]
+    force = own[..., None, -2:] + line_load(network, drive, share)[..., None, :] * e.ahead[..., None]
     turn = e.angle + rotation @ rule.values.T
     cos, sin = np.cos(turn), np.sin(turn)
     normal = force[..., 0] * cos + force[..., 1] * sin
@@ -59,8 +61,8 @@ def rotation_columns(degree: int) -> Any:
 
 
 def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
-    """Return the line load on the elements, (e, 2)."""
-    return share * network.elements.line[:, 0] + drive * network.elements.line[:, 1]
+    """Return the line load on the elements, (..., e, 2), at one drive or several (n,)."""
+    return share * network.elements.line[:, 0] + np.asarray(drive)[..., None, None] * network.elements.line[:, 1]
 
 
 def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
@@ -89,7 +91,7 @@ def _element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) 
     start, end = _end_poses(network, z)
     last = z[e.unknowns[:, -2:]]
     first = last + line_load(network, drive, share) * e.length[:, None]
-    bend = e.weight * e.rigidity * at.curvature
+    bend = e.weight * bending(e, at.curvature).moment
     turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
     own = np.zeros(e.unknowns.shape, np.result_type(bend, turning, start.place, first))
     own[:, rotation_columns(network.degree)] = bend @ rule.slopes - turning @ rule.values
@@ -107,7 +109,7 @@ def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> An
     columns, softer = rotation_columns(network.degree), e.axial - e.shear
     f, g = 1 + softer * at.normal, softer * at.shear
     own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
-    bend, turn = e.weight * e.rigidity, e.weight * (at.normal * f - g * at.shear)
+    bend, turn = e.weight * bending(e, at.curvature).stiffness, e.weight * (at.normal * f - g * at.shear)
     slopes, values = rule.slopes, rule.values
     own[:, columns[:, None], columns] = (slopes.T * bend[:, None, :]) @ slopes + (values.T * turn[:, None, :]) @ values
     by_force = np.stack([g * at.cos - f * at.sin, g * at.sin + f * at.cos], axis=1) * e.weight[:, None, :]
@@ -141,7 +143,8 @@ def values(network: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> 
 def strain_energy(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the energy of beams and springs."""
     e, at = network.elements, fields(network, z, drive, share)
-    beams = e.weight * (e.rigidity * at.curvature**2 + e.axial * at.normal**2 + e.shear * at.shear**2)
+    strain = e.axial * at.normal**2 + e.shear * at.shear**2
+    beams = e.weight * (2 * bending(e, at.curvature).energy + strain)
     springs = (TERMS[type(spring.item)](network, spring, z, share, drive).energy for spring in network.springs)
     return beams.sum() / 2 + sum(springs)
 
@@ -157,6 +160,7 @@ def count_unstable(network: Discretisation, tangent: Any) -> int:
 
     if any(load.item.follows for load in network.loads):
         return int((motion_eigenvalues(network, tangent) < 0).sum())
+
     factors, pivots, _ = lapack.dsytrf(tangent, lower=1)
     single = pivots > 0
     negative = int((np.diag(factors)[single] < 0).sum()) + int((~single).sum()) // 2
@@ -170,5 +174,6 @@ def motion_eigenvalues(network: Discretisation, tangent: Any) -> Any:
     unit[moves, np.arange(len(moves))] = 1.0
     flexibility = np.linalg.solve(tangent, unit)[moves]
     inverse = np.linalg.eigvals(flexibility)
-    real = (np.abs(inverse.imag) < REAL_SHARE * np.abs(inverse)) & (np.abs(inverse) > 0)
+    size = np.abs(inverse)
+    real = (np.abs(inverse.imag) < REAL_SHARE * size) & (size > FLEXIBLE_SHARE * size.max(initial=0.0))
     return np.sort(1 / inverse[real].real)

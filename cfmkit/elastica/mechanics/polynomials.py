@@ -68,6 +68,15 @@ def integrals_to_points(degree: int) -> FloatArray:
     return integrals(basis(degree).places, basis(degree).places)
 
 
+@lru_cache(maxsize=64)
+def slopes_at_points(degree: int) -> FloatArray:
+    """Return the matrix (q, q) that takes values at the Gauss points to the slopes there by u."""
+    x = 2 * basis(degree).places - 1
+    count = len(x)
+    slopes = [legendre.legval(x, legendre.legder(unit)) for unit in np.eye(count)]
+    return read_only(2 * np.stack(slopes, axis=1) @ np.linalg.inv(legendre.legvander(x, count - 1)))
+
+
 def integrals(known: FloatArray, ends: FloatArray) -> FloatArray:
     """Return the matrix that takes values at n places to the integrals from 0 to ends, (m, n).
 

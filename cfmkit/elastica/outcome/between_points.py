@@ -85,24 +85,12 @@ def between_points(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BetweenPoints(ShortRepr):
-    """The effort and the stress of a path at every place (a `cfmkit.results.ClosedForm`).
+    """The effort and the stress of a path at every place (a `cfmkit.results.ClosedForm`)."""
 
-    Attributes
-    ----------
-    path : Path
-        Whose drive never turns back.
-    unit : float
-        What its effort is multiplied by.
-    axial : bool
-        Whether the stress has its axial part.
-    allowed : float or None
-        Stress [Pa] that is solved for where it is passed.
-    """
-
-    path: Path
-    unit: float
-    axial: bool
-    allowed: float | None
+    path: Path  # whose drive never turns back
+    unit: float  # what its effort is multiplied by
+    axial: bool  # whether the stress has its axial part
+    allowed: float | None  # stress that is solved for where it is passed [Pa]
 
     @cached_property
     def _order(self) -> Any:
@@ -276,7 +264,7 @@ class BetweenPoints(ShortRepr):
         left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
         near = self._nearest(wanted, left)
         y = self._guesses(wanted, near)
-        loads = self.path.points.drive[self._order][near]
+        loads = self._known_drives[self._order][near]
         known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
         y[known] = self._y[near[known]]
         for corner in self._corners.values():
@@ -290,18 +278,35 @@ class BetweenPoints(ShortRepr):
             moved = float(self._poses((spot.y - y[number])[None])[0])
             if moved <= max(LEAST, STRAY * float(changes[number])):
                 y[number], loads[number], found[number] = spot.y, spot.drive, True
-        info = self.path.points.info[self._order][near]
-        info[:, REQUESTED] = -1
-        branch = self.path.branch[self._order][near]
-        return replace(self.path, points=Points(y, loads, info), branch=branch, accurate=read_only(found, np.bool_))
+        return self._path_of(y, loads, near, read_only(found, np.bool_))
 
     def _spot(self, y: FloatArray, wanted: float, _near: float) -> Spot | None:
         """Return the equilibrium at a dimensionless place; `_near`: the drive at the nearest point."""
-        return self.path.solver.solve(y, wanted)
+        return self._solve(y, wanted)
 
-    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
-        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
-        return (int(self._unstable[near]),)
+    # -- what depends on how the path was solved ---------------------------------------------------------------------
+    @property
+    def _known_drives(self) -> FloatArray:
+        return self.path.points.drive
+
+    @property
+    def _known_unknowns(self) -> FloatArray:
+        return self.path.points.y
+
+    @property
+    def _known_unstable(self) -> Any:
+        return self.path.points.unstable
+
+    def _solve(self, y: FloatArray, drive: float, row: Any = None, goal: Any = None) -> Spot | None:
+        """Return the equilibrium at a drive near some unknowns, or where row . (unknowns, drive) is a goal."""
+        return self.path.solver.solve(y, drive) if row is None else self.path.solver.solve(y, drive, row, goal)
+
+    def _path_of(self, y: FloatArray, loads: FloatArray, near: Any, accurate: Any) -> Path:
+        """Return equilibria as a path; `near`: the points of the ordered path that they are next to."""
+        info = self.path.points.info[self._order][near]
+        info[:, REQUESTED] = -1
+        branch = self.path.branch[self._order][near]
+        return replace(self.path, points=Points(y, loads, info), branch=branch, accurate=accurate)
 
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of positions and rotations in each of some changes of the unknowns, (n,)."""
@@ -310,17 +315,21 @@ class BetweenPoints(ShortRepr):
         free = np.abs(changes[:, : solver.n_free])
         return np.asarray(np.maximum(inner.max(axis=(1, 2), initial=0.0), free.max(axis=1, initial=0.0)))
 
+    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
+        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
+        return (int(self._unstable[near]),)
+
     @cached_property
     def _drive(self) -> FloatArray:
-        return np.asarray(self.path.points.drive[self._order])
+        return np.asarray(self._known_drives[self._order])
 
     @cached_property
     def _y(self) -> FloatArray:
-        return np.asarray(self.path.points.y[self._order])
+        return np.asarray(self._known_unknowns[self._order])
 
     @cached_property
     def _unstable(self) -> FloatArray:
-        return np.asarray(self.path.points.unstable[self._order])
+        return np.asarray(self._known_unstable[self._order])
 
     @cached_property
     def _stretch(self) -> Any:
@@ -396,24 +405,16 @@ class BetweenPoints(ShortRepr):
 
 @dataclass(frozen=True, eq=False)
 class BetweenLoads(BetweenPoints):
-    """The same of a path under a load, over the motion of a node that the load goes along with.
+    """The same of a path under a load, over the motion of a node that the load goes along with."""
 
-    Attributes
-    ----------
-    row : (n + 1,) array
-        What the free unknowns and the drive count for in the dimensionless motion.
-    unit_of_motion, rest : float
-        [m or rad], and the motion [m or rad] where all unknowns are zero.
-    """
-
-    row: FloatArray
-    unit_of_motion: float
-    rest: float
+    row: FloatArray  # (n + 1,) what the free unknowns and the drive count for in the dimensionless motion
+    unit_of_motion: float  # [m or rad]
+    rest: float  # the motion where all unknowns are zero [m or rad]
 
     @property
     def _motion(self) -> FloatArray:
-        solver, points = self.path.solver, self.path.points
-        return np.asarray(self.unit_of_motion * (points.y[:, : solver.n] @ self.row[:-1]) + self.rest)
+        moved = self._known_unknowns[:, : len(self.row) - 1] @ self.row[:-1]
+        return np.asarray(self.unit_of_motion * moved + self.rest)
 
     @property
     def _scale(self) -> float:
@@ -423,10 +424,10 @@ class BetweenLoads(BetweenPoints):
         return path.drive
 
     def _spot(self, y: FloatArray, wanted: float, near: float) -> Spot | None:
-        solver, goal = self.path.solver, wanted - self.rest / self.unit_of_motion
-        first = solver.solve(y, near, self.row, goal)
+        goal = wanted - self.rest / self.unit_of_motion
+        first = self._solve(y, near, self.row, goal)
         # the solver watches poses and forces: once more, so that the load is as exact as they are
-        return None if first is None else solver.solve(first.y, first.drive, self.row, goal)
+        return None if first is None else self._solve(first.y, first.drive, self.row, goal)
 
     def _counts(self, near: int, left: int) -> tuple[int, ...]:
         return int(self._unstable[left]), int(self._unstable[left + 1])  # a largest load is between two of each kind

@@ -1,0 +1,218 @@
+"""Exact derivatives of equilibria by design variables: of the effort by the adjoint, of everything by the tangent.
+
+The functional P depends on a design through the arrays of a `Discretisation` alone. With w, the motion of all unknowns
+per unit of what the drive moves while its loads stay,
+
+    dE/dx = w . d(grad P)/dx = d/dx dP(z + s w)/ds   at s = 0,
+
+so that the derivatives of P by its arrays, evaluated at z + i s w, give those of the effort E: no system is solved, for
+the tangent is symmetric and w the slope of the path. Loads that grow with the drive, or follow, need one solution a
+point, other outputs one for every variable: dz/dx = -K^-1 d(grad P)/dx.
+
+References
+----------
+[TMM] D. A. Tortorelli, P. Michaleris, Inverse Problems in Engineering 1 (1994) 71: the adjoint.
+[SMW] W. Squire, G. Trapp, SIAM Review 40 (1998) 110: complex steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
+    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Points of a path: all unknowns (p, size) and the drive (p,), dimensionless; what is constant is all there."""
+
+    network: Discretisation
+    z: FloatArray
+    drive: FloatArray
+
+
+def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
+    """Return the derivatives of the functional by the arrays of the elements, (p, ...) each.
+
+    By name those of `Elements`, and `origin`, `arm` and `frame` of the attachments that elements end at.
+    """
+    e, at = network.elements, energy.fields(network, z, drive)
+    load = energy.line_load(network, drive)
+    last = z[..., e.unknowns[:, -2:]]
+    first = last + load * e.length[:, None]
+    w, f = e.weight, 1 + (e.axial - e.shear) * at.normal
+    bent = bending(e, at.curvature)
+    density = bent.energy - at.normal - (e.axial * at.normal**2 + e.shear * at.shear**2) / 2
+    start = poses(network.attachments, z, e.ends[:, 0])
+    found = {
+        "weight": density,
+        "rigidity": w * bent.energy / e.rigidity,
+        "rest": w * bent.by_rest,
+        "curl": w * bent.by_curl,
+        "hindrance": w * bent.by_hindrance,
+        "angle": -w * at.shear * f,
+        "axial": -w * at.normal**2 / 2,
+        "shear": -w * at.shear**2 / 2,
+        "ahead": -w * (at.slope_x * load[..., :1] + at.slope_y * load[..., 1:]),
+        "length": -(load * start.place).sum(axis=-1),
+    }
+    reach = np.stack([(w * e.ahead * slope).sum(axis=-1) for slope in (at.slope_x, at.slope_y)], axis=-1)
+    constant = -(start.place * e.length[:, None] + reach)
+    grows = np.asarray(drive)[..., None, None]
+    found["line"] = np.stack([constant + 0 * grows, constant * grows], axis=-2)
+    found["gap"] = np.zeros_like(last)
+    return found | _by_attachments(network, z, first, last)
+
+
+def _by_attachments(network: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
+    """Return the derivatives by origin, arm and frame, from the forces on both ends of every element."""
+    a, ends = network.attachments, network.elements.ends
+    force = np.zeros((*z.shape[:-1], *a.arm.shape), z.dtype)
+    by_place = np.moveaxis(force, -2, 0)  # a view
+    np.add.at(by_place, ends[:, 0], np.moveaxis(-first, -2, 0))
+    np.add.at(by_place, ends[:, 1], np.moveaxis(last, -2, 0))
+    x, y, turn = (z[..., a.unknowns[:, k]] for k in range(3))
+    cos, sin, fx, fy = np.cos(turn), np.sin(turn), force[..., 0], force[..., 1]
+    arm = np.stack([cos * fx + sin * fy, cos * fy - sin * fx], axis=-1)
+    return {"origin": force, "arm": arm, "frame": np.stack([fx * x + fy * y, fy * x - fx * y], axis=-1)}
+
+
+def effort_motions(at: Equilibria, rates: FloatArray | None = None) -> FloatArray:
+    """Return w, the motion of all unknowns that the effort is the work of, (p, size).
+
+    Parameters
+    ----------
+    at : Equilibria
+        Under a drive by a motion.
+    rates : (p, n) array, optional
+        Slopes of the free unknowns along the path: they are w unless loads grow with the drive, or follow.
+    """
+    network = at.network
+    loads = [load for load in network.loads if load.grows or load.item.follows]
+    found = np.tile(network.rate, (len(at.z), 1))
+    if rates is not None and not loads and not network.elements.line[:, 1].any():
+        found[:, network.free] = rates
+        return found
+    chosen = network.free
+    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
+        tangent = energy.hessian(network, z, drive)
+        right = network.rate @ tangent[:, chosen]
+        found[k, chosen] = -np.linalg.solve(tangent[np.ix_(chosen, chosen)].T, right)
+    return found
+
+
+def effort_slopes(at: Equilibria, designs: NetworkDesigns, rates: FloatArray | None = None) -> FloatArray:
+    """Return the derivatives of the effort by variables at points of a path, (p, k) [N or N m].
+
+    Parameters
+    ----------
+    at : Equilibria
+        Under a drive by a motion, of the designs' template.
+    designs : NetworkDesigns
+        A complex step of `COMPLEX_STEP` in each variable.
+    rates : (p, n) array, optional
+        Slopes of the free unknowns along the path, if they are known.
+    """
+    network, motions = at.network, effort_motions(at, rates)
+    stepped = at.z + 1j * COMPLEX_STEP * motions
+    known = {name: value.imag / COMPLEX_STEP for name, value in partials(network, stepped, at.drive).items()}
+    total = _contracted(known, designs)
+    for k, pair in enumerate(_changed_terms(designs)):
+        for own in pair:
+            total[:, k] += _term_slopes(own, at, motions)
+    if designs.base is not None:
+        total += _held_forces(at, motions) @ (np.imag(designs.base) / COMPLEX_STEP).T
+    return np.asarray(total * network.scales.moment / network.scales.drive)
+
+
+def _contracted(known: dict[str, Any], designs: NetworkDesigns) -> FloatArray:
+    total = 0.0
+    for name, table in (designs.tables | designs.places).items():
+        if np.iscomplexobj(table):
+            change = np.ascontiguousarray(table.imag).reshape(designs.count, -1) / COMPLEX_STEP
+            total = total + known[name].reshape(len(known[name]), -1) @ change.T
+    return np.asarray(total + np.zeros((len(known["length"]), designs.count)))
+
+
+def _changed_terms(designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
+    """Return the springs and loads of each design that have a complex step, with the arrays of that design."""
+    found: list[list[tuple[Discretisation, Attached]]] = []
+    if not (designs.template.springs or designs.template.loads):
+        return found
+    for d in range(designs.count):
+        network = design_of(designs, d)
+        own = []
+        for attached in (*network.springs, *network.loads):
+            places = list(attached.places)
+            arrays = [getattr(network.attachments, name)[places] for name in ("origin", "arm", "frame")]
+            if _is_stepped(attached.item) or any(np.imag(array).any() for array in arrays):
+                own.append((network, attached))
+        found.append(own)
+    return found
+
+
+def _is_stepped(item: Any) -> bool:
+    """Return True if a number of a record has a complex step."""
+    values = (getattr(item, each.name) for each in fields(item)) if is_dataclass(item) else (item,)
+    return any(
+        bool(np.imag(np.asarray(value)).any())
+        for value in values
+        if isinstance(value, complex | tuple | np.ndarray | np.number)
+    )
+
+
+def _term_slopes(own: tuple[Discretisation, Attached], at: Equilibria, motions: FloatArray) -> FloatArray:
+    """Return what a spring or load adds to the derivatives, (p,)."""
+    network, attached = own
+    term = TERMS[type(attached.item)]
+    found = np.empty(len(at.z))
+    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
+        part = term(network, attached, z, 1.0, drive)
+        found[k] = (np.imag(part.gradient) * motions[k][part.unknowns]).sum() / COMPLEX_STEP
+    return found
+
+
+def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
+    """Return the derivatives of the effort by the values of held unknowns, (p, size); zero at free ones."""
+    network, found = at.network, np.zeros(at.z.shape)
+    held = np.setdiff1d(np.arange(network.size), network.free)
+    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
+        tangent = energy.hessian(network, z, drive)
+        found[k, held] = motions[k] @ tangent[:, held]
+    return found
+
+
+def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
+    """Return the derivatives of all unknowns by variables, (p, k, size).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a tangent is singular.
+    """
+    network, chosen = at.network, at.network.free
+    each: Sequence[Discretisation] = [design_of(designs, d) for d in range(designs.count)]
+    found = np.zeros((len(at.z), designs.count, network.size))
+    if designs.base is not None:
+        found += np.imag(designs.base) / COMPLEX_STEP
+    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
+        forces = [energy.gradient(one, z + 1j * COMPLEX_STEP * found[k, d], drive).imag for d, one in enumerate(each)]
+        right = np.array(forces)[:, chosen] / COMPLEX_STEP
+        tangent = energy.hessian(network, z, drive)[np.ix_(chosen, chosen)]
+        found[k][:, chosen] = np.linalg.solve(tangent, -right.T).T
+    return found

@@ -1,0 +1,220 @@
+"""Many networks of one topology as arrays with a leading axis: designs of a batch, or complex steps of variables.
+
+Most networks have plain beams only (`cfmkit.elastica.model.plain_beams_at_once`: a polynomial angle, one thickness),
+and their designs differ in places of nodes, offsets, shapes and sections. Those are set up together, as arrays; others
+one by one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.beam import GAUSS
+from cfmkit.elastica.model.network import PointLoad, SlideSpring
+from cfmkit.elastica.model.plain_beams_at_once import is_plain, powers
+from cfmkit.elastica.model.shapes import direction
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network
+
+TABLES = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap")
+
+CURLING = ("rest", "curl", "hindrance")  # of wide strips
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkDesigns:
+    """Arrays of d networks of one topology; real, or with a complex step each.
+
+    `tables` are those of `Elements`, `places` origin, arm and frame of `Attachments`, all with the designs as first
+    axis; an array that no design changes is left out.
+    """
+
+    template: Discretisation
+    count: int
+    tables: dict[str, Any]  # (d, e, ...)
+    places: dict[str, Any]  # (d, k, 2)
+    base: Any  # (d, size), None if no design changes it
+    each: tuple[Discretisation, ...]  # where they were set up one by one; else empty
+    networks: tuple[tuple[Network, Drive], ...]
+
+
+def set_up(
+    template: Discretisation,
+    origin: tuple[Network, Drive],
+    networks: Sequence[tuple[Network, Drive]],
+    make: Callable[[Network, Drive], Discretisation] | None = None,
+) -> NetworkDesigns:
+    """Return the arrays of networks of one topology.
+
+    Parameters
+    ----------
+    template : Discretisation
+        Of one of them, or of the network that they differ from.
+    origin : (Network, Drive)
+        What the template was made of.
+    networks : sequence of (Network, Drive)
+        They may hold complex steps.
+    make : callable, optional
+        How one is set up by itself; as the template was, with one piece a beam, unless given.
+    """
+    pairs = tuple(networks)
+    if _all_plain(template, origin, pairs):
+        return _plain(template, origin, pairs)
+    alone = make or (lambda net, drive: discretise(net, drive, template.degree, scales=template.scales))
+    each = tuple(alone(*pair) for pair in pairs)
+    names = (*TABLES, *(CURLING if template.elements.curl is not None else ()))
+    stack = {name: np.array([getattr(one.elements, name) for one in each]) for name in names}
+    places = {name: np.array([getattr(one.attachments, name) for one in each]) for name in ("origin", "arm", "frame")}
+    return NetworkDesigns(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)
+
+
+def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
+    """Return True if all networks have plain beams of one element and differ in nothing but nodes, beams and sections.
+
+    Joints and links are those of one topology: they are not compared.
+    """
+    network, drive = origin
+    one_each = template.elements.beam == tuple(network.beams) and not template.elements.gap.any()
+    return one_each and all(
+        all(is_plain(beam) and beam.closure != "raw" for beam in net.beams.values())
+        and net.springs == network.springs
+        and net.loads == network.loads
+        and own.loads == drive.loads
+        for net, own in (origin, *pairs)
+    )
+
+
+def _plain(
+    template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
+) -> NetworkDesigns:
+    scales, rule = template.scales, basis(template.degree)
+    names = list(template.nodes)
+    spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
+    beams = [list(net.beams.values()) for net, _ in pairs]
+    offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
+    node, master = _whose(origin, names)
+    arm = spots[:, node] - spots[:, master]
+    ends = template.elements.ends
+    arm[:, ends] += offsets[:, np.arange(len(ends))]
+    place = spots[:, master]
+    reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
+    coefficients = _coefficients(beams)
+    shapes, sections = _fitted(coefficients, reach), _sections(beams, scales)
+    rotation, length = shapes
+    angle = coefficients @ np.vander(rule.places, coefficients.shape[-1], increasing=True).T + rotation[..., None]
+    speed, ones = length[..., None], np.ones(len(rule.places))
+    bending, axial, shear = (values[..., None] for values in sections)
+    floor = template.elements.axial - _own_axial(origin, scales)[:, None]
+    tables = {
+        "angle": angle,
+        "weight": speed * rule.weights,
+        "rigidity": bending / speed**2 * ones,
+        "axial": axial + floor,
+        "shear": shear * ones,
+        "ahead": speed * (1 - rule.places),
+        "length": length,
+    }
+    frames, base = _supports(template, origin, pairs, [names[k] for k in master])
+    places = {"origin": place, "arm": arm} | ({} if frames is None else {"frame": frames})
+    return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs))
+
+
+def _whose(origin: tuple[Network, Drive], names: list[str]) -> tuple[Any, Any]:
+    """Return which node each attachment is at and which moves it, in the order of `discretise`."""
+    network, drive = origin
+    at = [name for beam in network.beams.values() for name in (beam.start, beam.end)]
+    for spring in network.springs:
+        at += [spring.node] if isinstance(spring, SlideSpring) else [n for n in (spring.start, spring.end) if n]
+    at += [load.node for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]
+    at += names
+    number = {name: k for k, name in enumerate(names)}
+    node = np.array([number[name] for name in at])
+    return node, np.array([number[network.master_of(name)] for name in at])
+
+
+def _coefficients(beams: list[list[Any]]) -> Any:
+    """Return the coefficients of the angles, (d, b, m)."""
+    given = [[beam.shape.coefficients or (0.0,) for beam in each] for each in beams]
+    most = max(len(own) for each in given for own in each)
+    return np.array([[(*own, *(0.0,) * (most - len(own))) for own in each] for each in given])
+
+
+def _fitted(coefficients: Any, reach: Any) -> tuple[Any, Any]:
+    """Return rotations and lengths of shapes between their ends, as `Bundle` has them, (d, b)."""
+    angle = coefficients @ powers(coefficients.shape[-1])
+    cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
+    dx, dy = reach[..., 0], reach[..., 1]
+    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+    return rotation, np.sqrt((dx * dx + dy * dy) / (cx * cx + cy * cy))
+
+
+def _sections(beams: list[list[Any]], scales: Any) -> tuple[Any, Any, Any]:
+    """Return EI, 1/EA and 1/GA, dimensionless, (d, b)."""
+    values = [
+        [
+            (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
+            for s in (beam.section for beam in each)
+        ]
+        for each in beams
+    ]
+    modulus, width, thickness, axial, shear, poisson, factor = np.moveaxis(np.array(values), -1, 0)
+    pull = modulus * width * thickness
+    slip = shear * 2 * (1 + poisson) / (factor * pull)
+    rigidity = scales.force * scales.length**2
+    return pull * thickness**2 / 12 / rigidity, axial / pull * scales.force, slip * scales.force
+
+
+def _own_axial(origin: tuple[Network, Drive], scales: Any) -> Any:
+    return np.real(_sections([list(origin[0].beams.values())], scales)[1][0])
+
+
+def _supports(
+    template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]], masters: list[str]
+) -> tuple[Any, Any]:
+    """Return the frames of attachments (d, k, 2) and values of held unknowns (d, size); None if no design has others.
+
+    A node that is driven, but held nowhere, has the frame of the drive.
+    """
+    names, base = list(dict.fromkeys(masters)), None
+    known = [origin[0].nodes[name].support for name in names]
+    drives = {getattr(drive, "direction", None) for _, drive in (origin, *pairs)}
+    supports = [[net.nodes[name].support for name in names] for net, _ in pairs]
+    if len(drives) == 1 and all(own == known for own in supports):
+        return None, None
+    angle = np.empty((len(pairs), len(names)), complex)
+    base = np.zeros((len(pairs), template.size), complex)
+    at = {name: template.attachments.frame[masters.index(name)] for name in names}
+    for d, ((_, drive), own) in enumerate(zip(pairs, supports, strict=True)):
+        for k, (name, support) in enumerate(zip(names, own, strict=True)):
+            angle[d, k] = support.direction
+            driven = getattr(drive, "node", None) == name and hasattr(drive, "direction")
+            if driven and not np.allclose(at[name], (np.cos(support.direction), np.sin(support.direction))):
+                angle[d, k] = drive.direction  # type: ignore[union-attr]
+            flags = support.along, support.across, support.rotation
+            for flag, unknown, value in zip(flags, template.bodies[name], support.displacement, strict=True):
+                if flag and template.rate[unknown] == 0.0:
+                    base[d, unknown] = value / (1.0 if unknown == template.bodies[name][2] else template.scales.length)
+    turn = angle[:, [names.index(name) for name in masters]]
+    frames = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    real = not (frames.imag.any() or base.imag.any())
+    return (frames.real, base.real) if real else (frames, base)
+
+
+def design_of(designs: NetworkDesigns, number: int) -> Discretisation:
+    """Return the arrays of one design as a `Discretisation`."""
+    if designs.each:
+        return designs.each[number]
+    template = designs.template
+    elements = template.elements._replace(**{name: table[number] for name, table in designs.tables.items()})
+    attachments = template.attachments._replace(**{name: place[number] for name, place in designs.places.items()})
+    base = template.base if designs.base is None else designs.base[number]
+    return replace(template, elements=elements, attachments=attachments, base=base)

@@ -1,0 +1,322 @@
+"""Equilibrium of a network as equations for its free unknowns: Newton's method and the natural march, in numpy.
+
+This is the specification of `march.c`; `cfmkit.elastica.mechanics.march.equations` returns whichever is there. The way
+that is followed is the drive, or, of a network under constant loads, the share of what is constant while the drive
+rests.
+
+References
+----------
+[De] P. Deuflhard, Newton Methods for Nonlinear Problems (2004), ch. 5: step control by what a prediction missed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+
+COMPLEX_STEP = 1e-30  # nothing is subtracted, so that its square may vanish beside one
+MAX_ROUNDS = 14  # of Newton's method
+LARGEST_CORRECTION = 50.0  # of a motion: beyond that Newton's method has left the path
+SAME_EQUILIBRIUM = 1e-7  # motions that differ by less are one
+FORCE_CHANGE = 8.0  # of a section force in one step, in EI/L^2 of its element, besides half of what it was
+LAND_FROM = 1.3  # steps to a target from which on it is hit by one
+SHORTEST_STEP = 1e-13  # share of the range
+MAX_REJECTED = 7  # two for each rejected step, one less for each accepted one
+
+
+class MarchCode(IntEnum):
+    """How a march ended."""
+
+    DONE = 0  # all targets were reached
+    STABILITY_CHANGES = 1  # the next step is less stable, or more
+    STEPS_FAIL = 2  # too many steps in a row are rejected
+    FULL = 3  # there is no room for more states
+    BRANCH_ENDS = 4  # going back from the next state leads elsewhere
+    NO_START = 5  # no equilibrium at the start
+
+
+class LinearEquations(NamedTuple):
+    """The equations at some unknowns: residual (n,), tangent (n, n), change of the residual along the way (n,)."""
+
+    residual: FloatArray
+    tangent: FloatArray
+    change: FloatArray
+
+
+@dataclass(frozen=True)
+class MarchState:
+    """An equilibrium: free unknowns (n,) and their slopes along the way, all dimensionless."""
+
+    free: Any
+    way: float
+    rate: Any
+    unstable: int  # directions while the way is held
+    effort: float  # gradient of the functional by what the way moves, at held loads
+    target: int = -1  # number of the target it lies at, -1 if at none
+
+
+@dataclass(frozen=True)
+class MarchPlan:
+    """How a march goes on from a state."""
+
+    step: float  # first one, along the way
+    span: float  # range of the way
+    before: MarchState | None = None  # the state before the first, for a cubic prediction
+    largest_turn: float = 0.35  # change of a motion in one step
+    tolerance: float = 1e-10
+    on_branch: bool = False  # check that every state leads back: a branch may end
+    room: int = 2000  # states
+
+
+@dataclass(frozen=True)
+class NaturalMarch:
+    """States that were reached, why the march ended, and the step it would go on with."""
+
+    states: tuple[MarchState, ...]
+    code: MarchCode
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class NumpyEquations:
+    """Equations of a network for its free unknowns, along a drive or, with `ramp`, the share of what is constant."""
+
+    network: Discretisation
+    ramp: bool = False
+    unit: Any = field(init=False)  # (n,) unit of a section force; infinite for motions
+
+    def __post_init__(self) -> None:
+        """Set the units."""
+        object.__setattr__(self, "unit", force_units(self.network))
+
+    @property
+    def n(self) -> int:
+        """Number of free unknowns."""
+        return len(self.network.free)
+
+    @property
+    def effort_unit(self) -> float:
+        """Unit of the efforts of a drive by a motion [N or N m]."""
+        return self.network.scales.moment / self.network.scales.drive
+
+    @property
+    def follows(self) -> bool:
+        """Whether some load turns with its node: the tangent is unsymmetric."""
+        return any(load.item.follows for load in self.network.loads)
+
+    def factors(self, way: Any) -> tuple[Any, Any]:
+        """Return drive and share at a place of the way."""
+        return (0.0, way) if self.ramp else (way, 1.0)
+
+    def values(self, free: Any, way: Any) -> Any:
+        """Return all unknowns, (size,)."""
+        return energy.values(self.network, free, *self.factors(way))
+
+    def gradient(self, free: Any, way: Any) -> Any:
+        """Return the gradient by all unknowns, (size,)."""
+        drive, share = self.factors(way)
+        return energy.gradient(self.network, energy.values(self.network, free, drive, share), drive, share)
+
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        return energy.gradient(self.network, z, drive, share), energy.hessian(self.network, z, drive, share)
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size); what is constant is all there."""
+        each = [energy.gradient(self.network, *pair) for pair in zip(z, drive, strict=True)]
+        return np.array(each).reshape(z.shape)
+
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+        """Return the equations linearised at some unknowns."""
+        drive, share = self.factors(way)
+        z, chosen = energy.values(self.network, free, drive, share), self.network.free
+        tangent = energy.hessian(self.network, z, drive, share)[np.ix_(chosen, chosen)]
+        stepped = self.gradient(free, way + 1j * COMPLEX_STEP)[chosen]
+        return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
+
+    def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
+        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the tangent is singular.
+        """
+        tangent = self.linearise(free, way).tangent
+        return np.asarray(np.linalg.solve(tangent, right.T).T, float), energy.count_unstable(self.network, tangent)
+
+    def solve(
+        self,
+        free: FloatArray,
+        way: float,
+        border: FloatArray | None = None,
+        level: float = 0.0,
+        push: FloatArray | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
+    ) -> MarchState | None:
+        """Return the equilibrium at a place of the way, or where border . (free, way) = level; None if there is none.
+
+        Parameters
+        ----------
+        free, way : (n,) array, float
+            First guess.
+        border, level : (n + 1,) array, float, optional
+            What is held instead of the way, and where.
+        push : (n,) array, optional
+            Added force.
+        tolerance : float
+            Of corrections, relative to the largest motion and force.
+        quick : bool
+            Accept when the next correction would be below the tolerance.
+        """
+        free, last = np.array(free, float), np.inf
+        moves, size = np.isinf(self.unit), np.zeros(len(free))
+        for _ in range(MAX_ROUNDS):
+            at = self.linearise(free, way)
+            residual = at.residual if push is None else at.residual - push
+            try:
+                step, rate = np.linalg.solve(at.tangent, -np.stack([residual, at.change], axis=1)).T
+            except np.linalg.LinAlgError:
+                return None
+            along = 0.0
+            if border is not None:
+                left = level - border[:-1] @ (free + step) - border[-1] * way
+                along = float(left / (border[-1] + border[:-1] @ rate))
+            change = step + along * rate
+            if not (np.isfinite(change).all() and np.abs(change[moves]).max(initial=0.0) <= LARGEST_CORRECTION):
+                return None
+            size[moves], forces = np.abs(change[moves]), ~moves
+            size[forces] = np.abs(change[forces]) / np.maximum(10 * self.unit[forces], np.abs(free[forces]))
+            largest, moved = float(size.max(initial=0.0)), float(size[moves].max(initial=0.0))
+            old, old_way, free, way = free, way, free + change, way + along
+            if quick and largest**2 < tolerance:
+                effort = self._effort(old, old_way) + float(at.change @ step)
+                return MarchState(free, way, rate, energy.count_unstable(self.network, at.tangent), effort)
+            # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
+            stands = moved < SAME_EQUILIBRIUM and largest < 2e-5 and largest > 0.3 * last
+            if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
+                unstable = energy.count_unstable(self.network, at.tangent)
+                return MarchState(free, way, rate, unstable, self._effort(free, way))
+            last = largest
+        return None
+
+    def _effort(self, free: FloatArray, way: float) -> float:
+        moved = self.network.base if self.ramp else self.network.rate
+        return float(self.gradient(free, way) @ moved)
+
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+        """Return the states on the way to targets, as far as nothing happens.
+
+        A step is accepted if motions and forces change little, the prediction was good, and the chord agrees with the
+        slopes at both of its ends; it ends before one at which the number of unstable directions changes.
+        """
+        return _march(self, start, np.asarray(targets, float), plan)
+
+
+def force_units(network: Discretisation) -> FloatArray:
+    """Return the unit of each free unknown that is a section force, EI/L^2 of its element; infinite for motions."""
+    e = network.elements
+    bending = (np.real(e.rigidity) * np.real(e.weight)).sum(axis=1) * np.real(e.length)
+    unit = np.full(network.size, np.inf)
+    unit[e.unknowns[:, -2:]] = (bending / np.real(e.length) ** 2)[:, None]
+    return np.asarray(unit[network.free])
+
+
+# -- natural march -----------------------------------------------------------------------------------------------------
+class _Judgement(NamedTuple):
+    moved: float  # largest change of a motion
+    missed: float  # what the prediction missed of it
+    force: float  # change of section forces over the allowed one
+    agrees: bool  # the chord with the slopes at its ends: else it is another path
+
+
+def predict(here: MarchState, before: MarchState | None, goal: float) -> FloatArray:
+    """Return the cubic through two states and their slopes at a place of the way, or the tangent of one."""
+    if before is None or before.way == here.way:
+        return np.asarray(here.free + (goal - here.way) * here.rate)
+    d = here.way - before.way
+    s = (goal - before.way) / d
+    ends = (1 + 2 * s) * (1 - s) ** 2 * before.free + s * s * (3 - 2 * s) * here.free
+    return np.asarray(ends + d * (s * (1 - s) ** 2 * before.rate + s * s * (s - 1) * here.rate))
+
+
+def _judge(equations: NumpyEquations, here: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
+    moves = np.isinf(equations.unit)
+    chord = new.free - here.free
+    forces, ahead = ~moves, new.way - here.way
+    allowed = FORCE_CHANGE * equations.unit[forces] + 0.5 * np.abs(here.free[forces])
+    force = float((np.abs(chord[forces]) / allowed).max(initial=0.0))
+    chord, old, rate = chord[moves], here.rate[moves], new.rate[moves]
+    moved = float(np.abs(chord).max(initial=0.0))
+    missed = float(np.abs(new.free - guess)[moves].max(initial=0.0))
+    bend = float(np.abs(chord - 0.5 * ahead * (old + rate)).max(initial=0.0))
+    sense, size = np.sign(ahead), np.linalg.norm(chord)
+    along = all(sense * (chord @ t) >= 0.5 * size * np.linalg.norm(t) for t in (old, rate))
+    return _Judgement(moved, missed, force, bool(along and bend <= 0.25 * moved + SAME_EQUILIBRIUM))
+
+
+def _leads_back(equations: NumpyEquations, here: MarchState, new: MarchState, moved: float, tolerance: float) -> bool:
+    """Return True if going back from a new state along its slope leads to the last one: else the branch has ended."""
+    guess = new.free - (new.way - here.way) * new.rate
+    back = equations.solve(guess, here.way, tolerance=tolerance, quick=True)
+    if back is None:
+        return False
+    apart = np.abs(back.free - here.free)[np.isinf(equations.unit)].max(initial=0.0)
+    return bool(apart < SAME_EQUILIBRIUM + 1e-3 * moved)
+
+
+def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+    here, before, step = start, plan.before, plan.step
+    states: list[MarchState] = []
+    passed = rejected = 0
+    while passed < len(targets) and len(states) < plan.room:
+        left = float(targets[passed] - here.way)
+        sense, lands = np.sign(left), abs(left) <= LAND_FROM * step
+        goal = float(targets[passed]) if lands else here.way + sense * step
+        ahead = goal - here.way
+        if before is not None and (here.way - before.way) * sense < 0:
+            before = None
+        guess = predict(here, before, goal)
+        new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
+        seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, here, new, guess)
+        same = new is not None and new.unstable == start.unstable
+        wide = seen.moved > plan.largest_turn or seen.missed > 0.4 * seen.moved + SAME_EQUILIBRIUM
+        if new is not None and seen.force > 1 and seen.moved <= plan.largest_turn:
+            step = abs(ahead) * max(0.7 / seen.force, 1e-4)  # too long for the forces: no sign of trouble
+        elif new is None or wide or (same and seen.moved > SAME_EQUILIBRIUM and not seen.agrees):
+            step, rejected = 0.5 * abs(ahead), rejected + 2
+        else:
+            rejected = max(0, rejected - 1)
+            if not same:
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, step)
+            if plan.on_branch and not _leads_back(equations, here, new, seen.moved, plan.tolerance):
+                return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
+            before, here = here, replace(new, target=passed if lands else -1)
+            states.append(here)
+            passed += lands
+            quality = seen.missed / (seen.moved + 1e-8)
+            if quality < 0.1:
+                step = min(plan.span, 1.6 * (step if lands else max(step, abs(ahead))))
+            elif quality > 0.25:
+                step = 0.8 * abs(ahead)
+            continue
+        if before is not None and step < 0.25 * abs(here.way - before.way):
+            before = None
+        if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
+            return NaturalMarch(tuple(states), MarchCode.STEPS_FAIL, step)
+    return NaturalMarch(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)
+
+
+def begin(equations: NumpyEquations, free: FloatArray | None = None, way: float = 0.0) -> MarchState | None:
+    """Return the equilibrium at the start of a way: at rest, unless near some free unknowns."""
+    return equations.solve(np.zeros(equations.n) if free is None else free, way)

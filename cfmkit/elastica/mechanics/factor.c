@@ -1,0 +1,273 @@
+/* Factors of the tangent, with its inertia.
+ *
+ * Symmetric: L D L^T by a front [DR]. Terms are added one by one; the front holds the unknowns that were met and are not
+ * eliminated yet. After each element those that no later one holds are eliminated, one or two together, if the pivot is
+ * large enough beside what it is coupled with; else they wait in the front. So an element that buckles between its ends
+ * needs no rule, and a chain of elements costs in proportion to its length. Small networks are one front.
+ * Unsymmetric (loads that follow): dense L U with row pivots.
+ *
+ * [DR] I. S. Duff, J. K. Reid, ACM Trans. Math. Softw. 9 (1983) 302: delayed pivots of order one and two; they have the
+ * stability of J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977) 163. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "march.h"
+
+#define THRESHOLD 0.1 /* least pivot beside its column; up to 0.5 a full front always has one */
+
+static size_t row_start(Int i) { return (size_t)(i * (i + 1) / 2); }
+
+int factors_open(Factors *f, Int n, int unsymmetric) {
+    const size_t count = (size_t)(n + 1);
+    memset(f, 0, sizeof *f);
+    f->n = n;
+    f->first = malloc(count * sizeof(Int));
+    f->unknown = malloc(count * sizeof(Int));
+    f->index = malloc(count * sizeof(Int));
+    f->position = malloc(count * sizeof(Int));
+    f->pair = malloc(count);
+    f->inverse = malloc(2 * count * sizeof(double));
+    if (unsymmetric) f->dense = malloc(count * count * sizeof(double));
+    return f->first && f->unknown && f->index && f->position && f->pair && f->inverse && (f->dense || !unsymmetric);
+}
+
+void factors_close(Factors *f) {
+    free(f->first); free(f->unknown); free(f->index); free(f->position); free(f->pair);
+    free(f->inverse); free(f->row); free(f->factor); free(f->front); free(f->dense);
+}
+
+void factors_begin(Factors *f) {
+    f->pivots = f->used = f->fronts = f->negative = 0;
+    for (Int i = 0; i < f->n; i++) f->position[i] = -1;
+    if (f->dense) memset(f->dense, 0, (size_t)(f->n * f->n) * sizeof(double));
+}
+
+static int enter(Factors *f, Int unknown) {
+    const Int last = f->fronts;
+    const size_t need = row_start(last + 1);
+    if ((Int)need > f->front_room) {
+        double *larger = realloc(f->front, 2 * need * sizeof(double));
+        if (!larger) return 0;
+        f->front = larger;
+        f->front_room = (Int)(2 * need);
+    }
+    memset(f->front + row_start(last), 0, (size_t)(last + 1) * sizeof(double));
+    f->index[last] = unknown;
+    f->position[unknown] = last;
+    f->fronts++;
+    return 1;
+}
+
+/* Add a full matrix of a term by free unknowns, -1 for held ones; return 0 if there is no memory. */
+int factors_add(Factors *f, const Int *at, Int count, const double *matrix) {
+    Int where[MAX_LOCAL];
+    if (f->dense) {
+        for (Int i = 0; i < count; i++)
+            for (Int j = 0; j < count; j++)
+                if (at[i] >= 0 && at[j] >= 0) f->dense[at[i] * f->n + at[j]] += matrix[i * count + j];
+        return 1;
+    }
+    for (Int i = 0; i < count; i++) {
+        if (at[i] >= 0 && f->position[at[i]] < 0 && !enter(f, at[i])) return 0;
+        where[i] = at[i] < 0 ? -1 : f->position[at[i]];
+    }
+    for (Int i = 0; i < count; i++) {
+        if (where[i] < 0) continue;
+        double *row = f->front + row_start(where[i]);
+        for (Int j = 0; j < count; j++)
+            if (where[j] >= 0 && where[j] <= where[i]) row[where[j]] += matrix[i * count + j];
+    }
+    return 1;
+}
+
+static void exchange(Factors *f, Int a, Int b) { /* two rows and columns of the front */
+    if (a == b) return;
+    if (a > b) { const Int c = a; a = b; b = c; }
+    double *front = f->front, *one = front + row_start(a), *other = front + row_start(b), t;
+    for (Int k = 0; k < a; k++) { t = one[k]; one[k] = other[k]; other[k] = t; }
+    for (Int k = a + 1; k < b; k++) {
+        double *cell = front + row_start(k) + a;
+        t = *cell; *cell = other[k]; other[k] = t;
+    }
+    for (Int k = b + 1; k < f->fronts; k++) {
+        double *row = front + row_start(k);
+        t = row[a]; row[a] = row[b]; row[b] = t;
+    }
+    t = one[a]; one[a] = other[b]; other[b] = t;
+    const Int unknown = f->index[a];
+    f->index[a] = f->index[b]; f->index[b] = unknown;
+    f->position[f->index[a]] = a; f->position[f->index[b]] = b;
+}
+
+/* Return the largest number beside the diagonal of a column; own: and of rows that may be eliminated, with the row. */
+static double largest_beside(const Factors *f, const Int *leaves, Int element, Int column, Int skip, Int *partner) {
+    double largest = 0.0, own = 0.0;
+    const double *row = f->front + row_start(column);
+    for (Int k = 0; k < f->fronts; k++) {
+        if (k == column || k == skip) continue;
+        const double size = fabs(k < column ? row[k] : f->front[row_start(k) + (size_t)column]);
+        if (size > largest) largest = size;
+        if (partner && size > own && leaves[f->index[k]] <= element) { own = size; *partner = k; }
+    }
+    return largest;
+}
+
+static int reserve(Factors *f, Int more) {
+    if (f->used + more <= f->room) return 1;
+    const size_t room = (size_t)(2 * f->room + more + 64 * f->n);
+    double *factor = realloc(f->factor, room * sizeof(double));
+    if (factor) f->factor = factor;
+    Int *row = realloc(f->row, room * sizeof(Int));
+    if (row) f->row = row;
+    if (!factor || !row) return 0;
+    f->room = (Int)room;
+    return 1;
+}
+
+/* Begin the rows of the last unknown of the front as a pivot; they are those before `rows`. */
+static double *begin_pivot(Factors *f, Int unknown, Int rows, int pair, double inverse, double beside) {
+    const Int p = f->pivots++;
+    f->first[p] = f->used;
+    f->unknown[p] = unknown;
+    f->pair[p] = (char)pair;
+    f->inverse[2 * p] = inverse;
+    f->inverse[2 * p + 1] = beside;
+    memcpy(f->row + f->used, f->index, (size_t)rows * sizeof(Int));
+    f->used += rows;
+    f->first[p + 1] = f->used;
+    f->position[unknown] = -1;
+    return f->factor + f->first[p];
+}
+
+static int eliminate_one(Factors *f, Int at) {
+    exchange(f, at, f->fronts - 1);
+    const Int rows = --f->fronts;
+    const double *pivot = f->front + row_start(rows), d = pivot[rows];
+    if (!reserve(f, rows)) return 0;
+    double *factor = begin_pivot(f, f->index[rows], rows, 0, 1.0 / d, 0.0);
+    f->negative += d < 0.0;
+    for (Int i = 0; i < rows; i++) {
+        const double share = factor[i] = pivot[i] / d;
+        if (share == 0.0) continue;
+        double *row = f->front + row_start(i);
+        for (Int j = 0; j <= i; j++) row[j] -= share * pivot[j];
+    }
+    return 1;
+}
+
+static int eliminate_two(Factors *f, Int one, Int other) {
+    exchange(f, one > other ? one : other, f->fronts - 1);
+    exchange(f, one > other ? other : one, f->fronts - 2);
+    f->fronts -= 2;
+    const Int rows = f->fronts;
+    const double *p = f->front + row_start(rows), *q = f->front + row_start(rows + 1);
+    const double a = p[rows], b = q[rows], c = q[rows + 1], det = a * c - b * b;
+    if (!reserve(f, 2 * rows)) return 0;
+    const Int last = f->index[rows + 1];
+    double *first = begin_pivot(f, f->index[rows], rows, 1, c / det, -b / det);
+    double *second = begin_pivot(f, last, rows, 0, a / det, -b / det);
+    first = f->factor + f->first[f->pivots - 2];
+    f->negative += det < 0.0 ? 1 : a < 0.0 ? 2 : 0;
+    for (Int i = 0; i < rows; i++) {
+        const double x = first[i] = (c * p[i] - b * q[i]) / det, y = second[i] = (a * q[i] - b * p[i]) / det;
+        if (x == 0.0 && y == 0.0) continue;
+        double *row = f->front + row_start(i);
+        for (Int j = 0; j <= i; j++) row[j] -= x * p[j] + y * q[j];
+    }
+    return 1;
+}
+
+static double entry(const Factors *f, Int i, Int j) {
+    return i > j ? f->front[row_start(i) + (size_t)j] : f->front[row_start(j) + (size_t)i];
+}
+
+/* Eliminate what no later element holds; return 0 if there is no memory, or at the end if the matrix is singular. */
+int factors_eliminate(Factors *f, const Int *leaves, Int element) {
+    Int at = f->fronts - 1;
+    while (at >= 0) {
+        if (leaves[f->index[at]] > element) { at--; continue; }
+        Int partner = -1;
+        const double d = entry(f, at, at), beside = largest_beside(f, leaves, element, at, -1, &partner);
+        int done = 0;
+        if (d != 0.0 && fabs(d) >= THRESHOLD * beside) {
+            if (!eliminate_one(f, at)) return 0;
+            done = 1;
+        } else if (partner >= 0) {
+            const double c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
+            const double mine = largest_beside(f, leaves, element, at, partner, NULL);
+            const double its = largest_beside(f, leaves, element, partner, at, NULL);
+            const double most = fabs(det) / THRESHOLD;
+            if (det != 0.0 && fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most) {
+                if (!eliminate_two(f, at, partner)) return 0;
+                done = 1;
+            }
+        }
+        at = done ? f->fronts - 1 : at - 1;
+    }
+    return 1;
+}
+
+static int dense_factors(Factors *f) {
+    const Int n = f->n;
+    int odd = 0;
+    for (Int k = 0; k < n; k++) {
+        Int best = k;
+        for (Int i = k + 1; i < n; i++) if (fabs(f->dense[i * n + k]) > fabs(f->dense[best * n + k])) best = i;
+        double *row = f->dense + k * n;
+        f->index[k] = best;
+        if (best != k) {
+            double *other = f->dense + best * n;
+            for (Int j = 0; j < n; j++) { const double t = row[j]; row[j] = other[j]; other[j] = t; }
+            odd = !odd;
+        }
+        if (row[k] == 0.0 || row[k] != row[k]) return 0;
+        if (row[k] < 0.0) odd = !odd;
+        for (Int i = k + 1; i < n; i++) {
+            double *below = f->dense + i * n;
+            const double share = below[k] /= row[k];
+            if (share != 0.0) for (Int j = k + 1; j < n; j++) below[j] -= share * row[j];
+        }
+    }
+    f->negative = odd;
+    return 1;
+}
+
+int factors_finish(Factors *f, int unsymmetric) { return unsymmetric ? dense_factors(f) : f->fronts == 0; }
+
+/* Put the solution in the place of the right side, (n). */
+void factors_solve(const Factors *f, int unsymmetric, double *x) {
+    if (unsymmetric) {
+        const Int n = f->n;
+        for (Int k = 0; k < n; k++) {
+            const double t = x[f->index[k]];
+            x[f->index[k]] = x[k];
+            x[k] = t;
+        }
+        for (Int i = 1; i < n; i++) for (Int j = 0; j < i; j++) x[i] -= f->dense[i * n + j] * x[j];
+        for (Int i = n - 1; i >= 0; i--) {
+            for (Int j = i + 1; j < n; j++) x[i] -= f->dense[i * n + j] * x[j];
+            x[i] /= f->dense[i * n + i];
+        }
+        return;
+    }
+    for (Int p = 0; p < f->pivots; p++) {
+        const double own = x[f->unknown[p]];
+        if (own != 0.0)
+            for (Int k = f->first[p]; k < f->first[p + 1]; k++) x[f->row[k]] -= f->factor[k] * own;
+    }
+    for (Int p = 0; p < f->pivots; p++) {
+        const Int own = f->unknown[p];
+        if (!f->pair[p]) { x[own] *= f->inverse[2 * p]; continue; }
+        const Int other = f->unknown[p + 1];
+        const double a = x[own], b = x[other];
+        x[own] = f->inverse[2 * p] * a + f->inverse[2 * p + 1] * b;
+        x[other] = f->inverse[2 * p + 3] * a + f->inverse[2 * p + 2] * b;
+        p++;
+    }
+    for (Int p = f->pivots - 1; p >= 0; p--) {
+        double own = x[f->unknown[p]];
+        for (Int k = f->first[p]; k < f->first[p + 1]; k++) own -= f->factor[k] * x[f->row[k]];
+        x[f->unknown[p]] = own;
+    }
+}

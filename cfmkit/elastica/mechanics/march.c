@@ -1,0 +1,428 @@
+/* Newton's method on the functional and the natural march along a drive; many designs in a loop.
+ *
+ * numpy is the specification: energy.py and `NumpyEquations` of march.py. Codes are those of march.py. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "march.h"
+
+#define LARGEST_CORRECTION 50.0 /* of a motion: beyond that Newton's method has left the path */
+#define SAME_EQUILIBRIUM 1e-7   /* motions that differ by less are one */
+#define MAX_ROUNDS 14
+#define LAND_FROM 1.3           /* steps to a target from which on it is hit by one */
+#define SHORTEST_STEP 1e-13     /* share of the range */
+
+enum { CONVERGED, DIVERGED, SINGULAR_OR_FAR };
+enum { DONE, STABILITY_CHANGES, STEPS_FAIL, FULL, BRANCH_ENDS, NO_START };
+
+struct Work {
+    double *z, *gradient, *step, *slope, *change; /* (size), (size), (free) each */
+    Factors factors;
+    Factors symmetric; /* under loads that follow: of the symmetric part of the tangent */
+    int definite;      /* whether that part, forces condensed, is positive: then nothing diverges */
+    Term term;
+};
+
+Work *work_open(const Model *m) {
+    Work *w = calloc(1, sizeof(Work));
+    const size_t size = (size_t)m->size, n = (size_t)m->free;
+    if (!w) return NULL;
+    w->z = calloc(2 * size + 3 * n + 1, sizeof(double));
+    int opened = w->z && factors_open(&w->factors, m->free, m->follows != 0);
+    if (opened && m->follows) opened = factors_open(&w->symmetric, m->free, 0);
+    if (!opened) { work_close(w); return NULL; }
+    w->gradient = w->z + size;
+    w->step = w->gradient + size;
+    w->slope = w->step + n;
+    w->change = w->slope + n;
+    return w;
+}
+
+void work_close(Work *w) {
+    if (!w) return;
+    factors_close(&w->factors);
+    factors_close(&w->symmetric);
+    free(w->z);
+    free(w);
+}
+
+static void place(const Model *m, Work *w, const double *x, Stage at) {
+    for (Int i = 0; i < m->size; i++)
+        w->z[i] = m->slot[i] >= 0 ? x[m->slot[i]] : at.share * m->base[i] + at.drive * m->rate[i];
+}
+
+static void add_to_gradient(Work *w, const Term *t) {
+    for (Int i = 0; i < t->count; i++) w->gradient[t->at[i]] += t->gradient[i];
+}
+
+/* Gradient of all unknowns at w->z; with factors also those of the tangent and the change of the residual on the way. */
+static int assemble(const Model *m, Work *w, Stage at, int with_factors) {
+    Term *t = &w->term;
+    Int slots[MAX_LOCAL];
+    memset(w->gradient, 0, (size_t)m->size * sizeof(double));
+    if (with_factors) {
+        memset(w->change, 0, (size_t)m->free * sizeof(double));
+        factors_begin(&w->factors);
+        if (m->follows) factors_begin(&w->symmetric);
+        w->definite = m->follows != 0;
+    }
+    for (Int k = 0; k < terms(m); k++) {
+        term(m, k, w->z, at, with_factors, t);
+        add_to_gradient(w, t);
+        if (!with_factors) continue;
+        for (Int i = 0; i < t->count; i++) {
+            slots[i] = m->slot[t->at[i]];
+            if (slots[i] >= 0) w->change[slots[i]] += t->change[i];
+        }
+        for (Int j = 0; j < t->count; j++) {
+            const double moves = at.by_share * m->base[t->at[j]] + at.by_drive * m->rate[t->at[j]];
+            if (slots[j] >= 0 || moves == 0.0) continue;
+            for (Int i = 0; i < t->count; i++)
+                if (slots[i] >= 0) w->change[slots[i]] += t->hessian[i * t->count + j] * moves;
+        }
+        if (!factors_add(&w->factors, slots, t->count, t->hessian)) return 0;
+        const Int element = k - m->springs - m->loads;
+        if (!m->follows) {
+            if (element >= 0 && !factors_eliminate(&w->factors, m->leaves, element)) return 0;
+            continue;
+        }
+        for (Int i = 0; i < t->count; i++)
+            for (Int j = 0; j < i; j++) {
+                double *one = t->hessian + i * t->count + j, *other = t->hessian + j * t->count + i;
+                *one = *other = 0.5 * (*one + *other);
+            }
+        if (!factors_add(&w->symmetric, slots, t->count, t->hessian)) return 0;
+        if (element >= 0 && !factors_eliminate(&w->symmetric, m->leaves, element)) w->definite = 0;
+    }
+    if (with_factors && m->follows)
+        w->definite = w->definite && factors_finish(&w->symmetric, 0) && w->symmetric.negative == 2 * m->elements;
+    return !with_factors || factors_finish(&w->factors, m->follows != 0);
+}
+
+/* Unstable directions. Under loads that follow: their parity, all that a march compares. */
+static Int unstable_of(const Model *m, const Work *w) {
+    if (!m->follows) return w->factors.negative - 2 * m->elements;
+    return w->definite ? 0 : w->factors.negative;
+}
+
+/* The same to hand out: negative, -1 or -2, where only the parity is known. */
+static Int told_unstable(const Model *m, const Work *w) {
+    return m->follows && !w->definite ? -1 - w->factors.negative : unstable_of(m, w);
+}
+
+/* Gradients (count, size) at states (count, size), with Hessians (count, size, size) unless that is NULL. */
+int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian) {
+    Term *t = malloc(sizeof(Term));
+    if (!t) return DIVERGED;
+    memset(gradient, 0, (size_t)(count * m->size) * sizeof(double));
+    if (hessian) memset(hessian, 0, (size_t)(count * m->size * m->size) * sizeof(double));
+    for (Int p = 0; p < count; p++, z += m->size, gradient += m->size) {
+        const Stage at = {drive[p], share, 0.0, 0.0};
+        for (Int k = 0; k < terms(m); k++) {
+            term(m, k, z, at, hessian != NULL, t);
+            for (Int i = 0; i < t->count; i++) {
+                gradient[t->at[i]] += t->gradient[i];
+                if (!hessian) continue;
+                double *row = hessian + (p * m->size + t->at[i]) * m->size;
+                for (Int j = 0; j < t->count; j++) row[t->at[j]] += t->hessian[i * t->count + j];
+            }
+        }
+    }
+    free(t);
+    return CONVERGED;
+}
+
+/* Residual, tangent (n, n) and change of the residual on the way, of the free unknowns. */
+int linearise(const Model *m, const double *x, double way, double *residual, double *tangent, double *change) {
+    Work *w = work_open(m);
+    const Stage at = stage(m, way);
+    if (!w) return DIVERGED;
+    place(m, w, x, at);
+    assemble(m, w, at, 1);
+    memcpy(change, w->change, (size_t)m->free * sizeof(double));
+    memset(tangent, 0, (size_t)(m->free * m->free) * sizeof(double));
+    for (Int i = 0; i < m->size; i++) if (m->slot[i] >= 0) residual[m->slot[i]] = w->gradient[i];
+    for (Int k = 0; k < terms(m); k++) {
+        Term *t = &w->term;
+        term(m, k, w->z, at, 1, t);
+        for (Int i = 0; i < t->count; i++)
+            for (Int j = 0; j < t->count; j++) {
+                const Int a = m->slot[t->at[i]], b = m->slot[t->at[j]];
+                if (a >= 0 && b >= 0) tangent[a * m->free + b] += t->hessian[i * t->count + j];
+            }
+    }
+    work_close(w);
+    return CONVERGED;
+}
+
+/* Solve with the tangent at x for right sides (count, n), in their place. */
+int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable) {
+    Work *w = work_open(m);
+    const Stage at = stage(m, way);
+    int code = DIVERGED;
+    if (w) {
+        place(m, w, x, at);
+        if (assemble(m, w, at, 1)) {
+            for (Int k = 0; k < count; k++) factors_solve(&w->factors, m->follows != 0, right + k * m->free);
+            *unstable = told_unstable(m, w);
+            code = CONVERGED;
+        }
+    }
+    work_close(w);
+    return code;
+}
+
+/* What Newton's method looks for, and what it found. */
+typedef struct {
+    const double *border; /* (n + 1): border . (x, way) = level instead of a given way; NULL if none */
+    double level;
+    const double *push;   /* (n): added force; NULL if none */
+    double tolerance;
+    int quick; /* accept when the next correction would be below the tolerance */
+} Goal;
+
+typedef struct { Int unstable, told; double effort; } Found; /* effort: gradient of what the drive moves */
+
+static double effort_of(const Model *m, const Work *w, Stage at) {
+    double sum = 0.0;
+    for (Int i = 0; i < m->size; i++) sum += w->gradient[i] * (at.by_share * m->base[i] + at.by_drive * m->rate[i]);
+    return sum;
+}
+
+/* Take the step; return its largest part, of motions alone and the largest motion too, or a negative number if too far. */
+static double correct(const Model *m, Work *w, double along, double *x, double *moved, double *largest) {
+    double step = 0.0;
+    *moved = *largest = 0.0;
+    for (Int i = 0; i < m->free; i++) {
+        const double d = w->step[i] + along * w->slope[i], unit = m->unit[i];
+        double size = fabs(d);
+        if (!(size <= 1e300)) return -1.0;
+        if (unit < HUGE_VAL) size /= fmax(10.0 * unit, fabs(x[i]));
+        else if (size > LARGEST_CORRECTION) return -1.0;
+        else *moved = fmax(*moved, size);
+        step = fmax(step, size);
+        x[i] += d;
+        if (unit == HUGE_VAL) *largest = fmax(*largest, fabs(x[i]));
+    }
+    return step;
+}
+
+static int newton(const Model *m, Work *w, double *x, double *way, const Goal *goal, Found *found) {
+    const Int n = m->free;
+    const double *border = goal->border;
+    double last = HUGE_VAL;
+    for (Int round = 0; round < MAX_ROUNDS; round++) {
+        Stage at = stage(m, *way);
+        place(m, w, x, at);
+        if (!assemble(m, w, at, 1)) return SINGULAR_OR_FAR;
+        for (Int i = 0; i < m->size; i++)
+            if (m->slot[i] >= 0) {
+                const Int a = m->slot[i];
+                w->step[a] = (goal->push ? goal->push[a] : 0.0) - w->gradient[i];
+                w->slope[a] = -w->change[a];
+            }
+        found->unstable = unstable_of(m, w);
+        found->told = told_unstable(m, w);
+        factors_solve(&w->factors, m->follows != 0, w->step);
+        factors_solve(&w->factors, m->follows != 0, w->slope);
+        double along = 0.0;
+        if (border) {
+            double left = goal->level - border[n] * *way, below = border[n];
+            for (Int i = 0; i < n; i++) {
+                left -= border[i] * (x[i] + w->step[i]);
+                below += border[i] * w->slope[i];
+            }
+            along = left / below;
+        }
+        double moved, largest, change_work = 0.0;
+        for (Int i = 0; i < n; i++) change_work += w->change[i] * w->step[i];
+        const double step = correct(m, w, along, x, &moved, &largest);
+        if (step < 0.0 || !(fabs(along) <= 1e300)) return SINGULAR_OR_FAR;
+        *way += along;
+        if (goal->quick && step * step < goal->tolerance) { /* the next correction is of the order of its square */
+            found->effort = effort_of(m, w, at) + change_work;
+            return CONVERGED;
+        }
+        /* a large force multiplies rounding: accept where motions stand and forces no longer come nearer */
+        const int stands = moved < SAME_EQUILIBRIUM && step < 2e-5 && step > 0.3 * last;
+        if (step < goal->tolerance * (1.0 + largest) || stands) {
+            at = stage(m, *way);
+            place(m, w, x, at);
+            assemble(m, w, at, 0);
+            found->effort = effort_of(m, w, at);
+            return CONVERGED;
+        }
+        last = step;
+    }
+    return DIVERGED;
+}
+
+int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
+          int quick, double *rate, double *found) {
+    const Goal goal = {border, level, push, tolerance, quick};
+    Found end = {0, 0, 0.0};
+    Work *w = work_open(m);
+    if (!w) return DIVERGED;
+    const int code = newton(m, w, x, way, &goal, &end);
+    memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
+    found[0] = (double)end.told;
+    found[1] = end.effort;
+    work_close(w);
+    return code;
+}
+
+/* ---- natural march ----------------------------------------------------------------------------------------------- */
+typedef struct { const double *x, *rate; double way; } Known;
+
+/* The cubic through two equilibria and their slopes, or the tangent. */
+static void predict(Int n, const Known *here, const Known *before, double goal, double *guess) {
+    const double ahead = goal - here->way;
+    if (!before || before->way == here->way) {
+        for (Int i = 0; i < n; i++) guess[i] = here->x[i] + ahead * here->rate[i];
+        return;
+    }
+    const double d = here->way - before->way, s = (goal - before->way) / d, r = 1.0 - s;
+    const double x0 = (1.0 + 2.0 * s) * r * r, x1 = s * s * (3.0 - 2.0 * s), t0 = d * s * r * r, t1 = d * s * s * (s - 1.0);
+    for (Int i = 0; i < n; i++) guess[i] = x0 * before->x[i] + x1 * here->x[i] + t0 * before->rate[i] + t1 * here->rate[i];
+}
+
+/* How a step went: largest motion, what the prediction missed of it, change of forces over the allowed one, and whether
+ * the chord agrees with the slopes at both ends: else it is another path. */
+typedef struct { double moved, missed, force; int agrees; } Judgement;
+
+static Judgement judge(const Model *m, const Known *here, const double *x, const double *rate, const double *guess,
+                       double ahead, double allowed_force) {
+    Judgement j = {0.0, 0.0, 0.0, 1};
+    double bend = 0.0, chord = 0.0, by_old = 0.0, by_new = 0.0, old = 0.0, new = 0.0;
+    for (Int i = 0; i < m->free; i++) {
+        const double d = x[i] - here->x[i];
+        if (m->unit[i] < HUGE_VAL) {
+            j.force = fmax(j.force, fabs(d) / (allowed_force * m->unit[i] + 0.5 * fabs(here->x[i])));
+            continue;
+        }
+        j.moved = fmax(j.moved, fabs(d));
+        j.missed = fmax(j.missed, fabs(x[i] - guess[i]));
+        bend = fmax(bend, fabs(d - 0.5 * ahead * (here->rate[i] + rate[i])));
+        chord += d * d; by_old += d * here->rate[i]; by_new += d * rate[i];
+        old += here->rate[i] * here->rate[i]; new += rate[i] * rate[i];
+    }
+    const double sense = ahead > 0.0 ? 1.0 : -1.0;
+    j.agrees = sense * by_old >= 0.5 * sqrt(chord * old) && sense * by_new >= 0.5 * sqrt(chord * new)
+               && bend <= 0.25 * j.moved + SAME_EQUILIBRIUM;
+    return j;
+}
+
+/* On a branch: go back from the new point along its own slope; unless the branch has ended that leads to `here`. */
+static int leads_back(const Model *m, Work *w, const Known *here, const double *x, double ahead, double moved, double tolerance,
+                      double *scratch) {
+    const Goal goal = {NULL, 0.0, NULL, tolerance, 1};
+    double *back = scratch, *slope = scratch + m->free, way = here->way, apart = 0.0;
+    Found found;
+    memcpy(slope, w->slope, (size_t)m->free * sizeof(double));
+    for (Int i = 0; i < m->free; i++) back[i] = x[i] - ahead * slope[i];
+    const int code = newton(m, w, back, &way, &goal, &found);
+    for (Int i = 0; i < m->free && code == CONVERGED; i++)
+        if (m->unit[i] == HUGE_VAL) apart = fmax(apart, fabs(back[i] - here->x[i]));
+    memcpy(w->slope, slope, (size_t)m->free * sizeof(double));
+    return code == CONVERGED && apart < SAME_EQUILIBRIUM + 1e-3 * moved;
+}
+
+static void store(Int n, double *row, const double *x, const double *rate, double way, const Found *found, double target) {
+    memcpy(row, x, (size_t)n * sizeof(double));
+    memcpy(row + n, rate, (size_t)n * sizeof(double));
+    row[2 * n] = way;
+    row[2 * n + 1] = found->effort;
+    row[2 * n + 2] = (double)found->told;
+    row[2 * n + 3] = target;
+}
+
+int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
+          Int count, double *rows, Int room, Int *stored) {
+    const Int n = m->free, wide = 2 * n + 4;
+    const size_t bytes = (size_t)n * sizeof(double);
+    const Goal goal = {NULL, 0.0, NULL, plan->tolerance, 1};
+    int code = DONE, known = before != NULL, rejected = 0;
+    Int kept = 0, passed = 0;
+    Found found = {(Int)plan->unstable, (Int)plan->unstable, 0.0};
+    double *memory = calloc((size_t)(6 * n + 1), sizeof(double)), *old_x = memory, *old_rate = memory + n;
+    double *guess = memory + 2 * n, *next = memory + 3 * n, *scratch = memory + 4 * n;
+    Known here = {x, rate, *way}, old = {old_x, old_rate, 0.0};
+    Work *w = work_open(m);
+    if (!w || !memory) { code = NO_START; goto end; }
+    if (before) { memcpy(old_x, before, bytes); memcpy(old_rate, before + n, bytes); old.way = before[2 * n]; }
+    if (plan->start != 0.0) {
+        const Goal first = {NULL, 0.0, NULL, plan->tolerance, 0};
+        if (newton(m, w, x, way, &first, &found)) { code = NO_START; goto end; }
+        memcpy(rate, w->slope, bytes);
+        plan->unstable = (double)found.unstable;
+        if (count && targets[0] == *way) store(n, rows + wide * kept++, x, rate, *way, &found, (double)passed++);
+    }
+    while (passed < count && kept < room) {
+        const double left = targets[passed] - *way, sense = left > 0.0 ? 1.0 : -1.0;
+        const int lands = fabs(left) <= LAND_FROM * plan->step;
+        double to = lands ? targets[passed] : *way + sense * plan->step;
+        const double ahead = to - *way;
+        here.way = *way;
+        if (known && (*way - old.way) * sense < 0.0) known = 0;
+        predict(n, &here, known ? &old : NULL, to, guess);
+        memcpy(next, guess, bytes);
+        const int bad = newton(m, w, next, &to, &goal, &found);
+        Judgement j = {0.0, 0.0, 0.0, 1};
+        if (!bad) j = judge(m, &here, next, w->slope, guess, ahead, plan->largest_force);
+        const int same = found.unstable == (Int)plan->unstable;
+        const int too_far = bad || j.moved > plan->largest_turn || j.missed > 0.4 * j.moved + SAME_EQUILIBRIUM;
+        if (!bad && j.force > 1.0 && j.moved <= plan->largest_turn) /* too long for the forces: no sign of trouble */
+            plan->step = fabs(ahead) * fmax(0.7 / j.force, 1e-4);
+        else if (too_far || (same && j.moved > SAME_EQUILIBRIUM && !j.agrees)) {
+            plan->step = 0.5 * fabs(ahead);
+            rejected += 2;
+        } else {
+            rejected = rejected ? rejected - 1 : 0;
+            if (!same) { code = STABILITY_CHANGES; break; }
+            if (plan->on_branch != 0.0 && !leads_back(m, w, &here, next, ahead, j.moved, plan->tolerance, scratch)) {
+                code = BRANCH_ENDS;
+                break;
+            }
+            memcpy(old_x, x, bytes); memcpy(old_rate, rate, bytes); old.way = *way; known = 1;
+            memcpy(x, next, bytes); memcpy(rate, w->slope, bytes); *way = to;
+            store(n, rows + wide * kept++, x, rate, to, &found, lands ? (double)passed : -1.0);
+            passed += lands;
+            const double quality = j.missed / (j.moved + 1e-8), size = fabs(ahead);
+            if (quality < 0.1) plan->step = fmin(plan->range, 1.6 * (lands ? plan->step : fmax(plan->step, size)));
+            else if (quality > 0.25) plan->step = 0.8 * size;
+            continue;
+        }
+        if (known && plan->step < 0.25 * fabs(*way - old.way)) known = 0;
+        if (rejected > 7 || plan->step < SHORTEST_STEP * plan->range) { code = STEPS_FAIL; break; }
+    }
+    if (code == DONE && passed < count) code = FULL;
+end:
+    stored[0] = kept;
+    stored[1] = passed;
+    work_close(w);
+    free(memory);
+    return code;
+}
+
+/* One path a design: efforts at the targets (designs, count), not a number from where a path does not simply go on. */
+int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts, Int room,
+               Int *codes) {
+    for (Int d = 0; d < designs; d++) {
+        const Model *m = models + d;
+        const Int wide = 2 * m->free + 4;
+        Plan own = *plan;
+        Int stored[2];
+        double way = 0.0, *x = calloc((size_t)(2 * m->free), sizeof(double)), *rows = malloc((size_t)(room * wide) * sizeof(double));
+        for (Int k = 0; k < count; k++) efforts[d * count + k] = NAN;
+        if (!x || !rows) { free(x); free(rows); return 0; }
+        codes[d] = march(m, &own, x, x + m->free, &way, NULL, targets, count, rows, room, stored);
+        for (Int k = 0; k < stored[0]; k++) {
+            const double *row = rows + k * wide, target = row[wide - 1];
+            if (target >= 0.0) efforts[d * count + (Int)target] = row[wide - 3];
+        }
+        free(x);
+        free(rows);
+    }
+    return 1;
+}

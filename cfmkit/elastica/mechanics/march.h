@@ -1,0 +1,88 @@
+/* Networks of mixed spectral elements as C takes them: arrays of a `Discretisation`, all dimensionless. */
+#ifndef CFMKIT_MARCH_H
+#define CFMKIT_MARCH_H
+
+#include <stdint.h>
+
+#define MAX_DEGREE 40
+#define MAX_SHAPES (MAX_DEGREE + 1)
+#define MAX_LOCAL (MAX_DEGREE + 9) /* unknowns of an element */
+
+typedef int64_t Int;
+
+/* Fields of 8 bytes: `march.py` fills a row of int64 with counts and addresses. e elements, q points, k attachments. */
+typedef struct {
+    Int elements, points, degree, size, free, springs, loads;
+    Int ramp;    /* the drive is the share of what is constant; the drive proper rests */
+    Int follows; /* some load turns with its node: the tangent is unsymmetric */
+    const double *angle, *weight, *rigidity, *axial, *shear, *ahead; /* (e, q) */
+    const double *length, *line, *gap, *bend; /* (e), (e, 2, 2), (e, 2), (e, shapes, shapes): int EI N_i' N_j' */
+    const Int *unknowns, *ends;               /* (e, degree + 9), (e, 2) */
+    const Int *places;                        /* (k, 4) */
+    const double *arm, *origin, *frame;       /* (k, 2) */
+    const double *values, *slopes;            /* (q, shapes) */
+    const Int *slot;                          /* (size): number among the free unknowns, -1 if held */
+    const Int *leaves;                        /* (free): the last element that holds an unknown, -1 if none does */
+    const double *base, *rate;                /* (size) */
+    const double *unit;                       /* (free): unit of a section force, infinite for motions */
+    const Int *spring_at;                     /* (springs, 3): kind, first and second place, -1 if none */
+    const double *spring;                     /* (springs, 6) */
+    const Int *load_at;                       /* (loads, 3): place, grows, follows */
+    const double *load;                       /* (loads, 3): force x, y, moment */
+    const double *rest, *curl, *hindrance;    /* (e, q): of wide strips; NULL without any */
+} Model;
+
+/* Where on the way: both factors and their change with what is followed. */
+typedef struct { double drive, share, by_drive, by_share; } Stage;
+
+/* One term of the functional by the unknowns it acts on: gradient, Hessian, change of the gradient along the way. */
+typedef struct {
+    Int count;
+    Int at[MAX_LOCAL];
+    double gradient[MAX_LOCAL], change[MAX_LOCAL], hessian[MAX_LOCAL * MAX_LOCAL];
+} Term;
+
+/* L D L^T in the order of elimination, or L U. */
+typedef struct {
+    Int n, pivots, room, used;  /* room: numbers that fit, used: that are stored */
+    Int *first, *unknown, *row; /* (n): where a pivot's rows begin; (n): its unknown; (room): rows it is coupled with */
+    char *pair;                 /* (n): 1 for the first of two that are eliminated together */
+    double *inverse, *factor;   /* (n, 2): of the pivot, beside it; (room) */
+    double *front, *dense;      /* lower triangle by rows; (n, n) if unsymmetric */
+    Int front_room, fronts;     /* numbers that fit; unknowns in it */
+    Int *index, *position;      /* (n): unknown of a row of the front; row of an unknown, -1 if none */
+    Int negative;               /* pivots; of L U the parity of negative eigenvalues */
+} Factors;
+
+Stage stage(const Model *m, double way);
+Int terms(const Model *m);
+void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out);
+
+int factors_open(Factors *f, Int n, int unsymmetric);
+void factors_close(Factors *f);
+void factors_begin(Factors *f);
+int factors_add(Factors *f, const Int *at, Int count, const double *matrix);
+int factors_eliminate(Factors *f, const Int *leaves, Int element);
+int factors_finish(Factors *f, int unsymmetric);
+void factors_solve(const Factors *f, int unsymmetric, double *x);
+
+typedef struct Work Work;
+Work *work_open(const Model *m);
+void work_close(Work *w);
+int evaluate(const Model *m, const double *z, const double *drive, double share, Int count, double *gradient, double *hessian);
+int linearise(const Model *m, const double *x, double way, double *residual, double *tangent, double *change);
+int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
+int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
+          int quick, double *rate, double *found);
+
+/* Of a march: numbers of 8 bytes, too. */
+typedef struct {
+    double step, range, largest_turn, largest_force, tolerance, unstable, on_branch, start;
+} Plan;
+
+int march(const Model *m, Plan *plan, double *x, double *rate, double *way, const double *before, const double *targets,
+          Int count, double *rows, Int room, Int *stored);
+int march_many(const Model *models, Int designs, const Plan *plan, const double *targets, Int count, double *efforts,
+               Int room, Int *codes);
+
+#endif

@@ -1,0 +1,333 @@
+"""The compiled equations of a network, `march.c`, or numpy where there is no compiler.
+
+Both give the same to rounding (tests/unit/test_elastica_march.py). C takes a model as a row of 8-byte counts and
+addresses, so that an array of rows is many designs; what the addresses point to is kept with the row.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.equations import (
+    FORCE_CHANGE,
+    LinearEquations,
+    MarchCode,
+    MarchPlan,
+    MarchState,
+    NaturalMarch,
+    NumpyEquations,
+    begin,
+)
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.network import LineSpring, PointLoad, SlideSpring, TorsionSpring
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
+    from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+
+MAX_DEGREE = 40
+"""As in march.h: arrays of one element are on the stack."""
+SWITCH = "CFMKIT_WITHOUT_C"
+"""Environment variable that keeps everything in numpy, whatever its value."""
+KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
+"""Springs and loads that march.c has; networks with others run on numpy."""
+
+COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
+ADDRESSES = (
+    "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
+    "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
+    "spring", "load_at", "load", "rest", "curl", "hindrance",
+)  # fmt: skip
+"""Fields of `Model` in march.h, in its order."""
+
+
+@cache
+def _module() -> Any:
+    try:
+        from cfmkit.elastica.mechanics import _march  # type: ignore[attr-defined]
+    except ImportError:
+        return None
+    return _march
+
+
+def compiled() -> Any:
+    """Return the compiled module, None if it was not built, or is switched off by `SWITCH`."""
+    return None if SWITCH in os.environ else _module()
+
+
+def engine() -> str:
+    """Return what the beam engine runs on: "C" or "numpy"."""
+    return "numpy" if compiled() is None else "C"
+
+
+def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
+    """Return the equations of a network, compiled if they can be.
+
+    Parameters
+    ----------
+    network : Discretisation
+        With real arrays.
+    ramp : bool
+        Whether the way is the share of what is constant instead of the drive.
+    """
+    kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
+    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
+    return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledEquations(NumpyEquations):
+    """The same equations in compiled code."""
+
+    arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
+    row: Any = field(init=False)  # counts and addresses
+
+    def __post_init__(self) -> None:
+        """Collect the arrays."""
+        super().__post_init__()
+        arrays = model_arrays(self)
+        counts = model_counts(self.network, self.ramp)
+        addresses = (arrays[name].ctypes.data if name in arrays else 0 for name in ADDRESSES)
+        row = np.array([*counts.values(), *addresses], np.int64)
+        object.__setattr__(self, "arrays", arrays)
+        object.__setattr__(self, "row", row)
+
+    def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (size,) and Hessian (size, size) by all unknowns."""
+        gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
+        compiled().evaluate(
+            self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share
+        )
+        return gradient, hessian
+
+    def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
+        """Return the gradients by all unknowns of states (p, size), (p, size)."""
+        found = np.empty(z.shape)
+        given = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
+        compiled().evaluate(self.row, *given, found, np.empty(0), 1.0)
+        return found
+
+    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+        """Return the equations linearised at some unknowns."""
+        out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
+        compiled().linearise(self.row, np.ascontiguousarray(free, float), *out, way)
+        return out
+
+    def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
+        """Return the solutions (k, n) with the tangent for right sides (k, n), and the number of unstable directions.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the tangent is singular.
+        """
+        found, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
+        if compiled().resolve(self.row, np.ascontiguousarray(free, float), found, count, way):
+            raise np.linalg.LinAlgError("the tangent is singular")
+        return found, self._unstable(free, way, int(count[0]))
+
+    def _unstable(self, free: FloatArray, way: float, told: int) -> int:
+        """Return the count of C; where loads follow and it knows only the parity, told < 0, eigenvalues are counted."""
+        return told if told >= 0 else energy.count_unstable(self.network, self.linearise(free, way).tangent)
+
+    def solve(
+        self,
+        free: FloatArray,
+        way: float,
+        border: FloatArray | None = None,
+        level: float = 0.0,
+        push: FloatArray | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
+    ) -> MarchState | None:
+        """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
+        x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
+        nothing = np.empty(0)
+        given = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
+        if compiled().solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
+            return None
+        way = float(at[0])
+        return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+
+    def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+        """Return the states on the way to targets, as far as nothing happens."""
+        n, goals = self.n, np.ascontiguousarray(targets, float)
+        rows, stored = np.empty((plan.room, 2 * n + 4)), np.zeros(2, np.int64)
+        parity = start.unstable % 2 if self.follows else start.unstable
+        given = _plan_row(plan, parity, False)
+        before = plan.before
+        known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
+        here = np.concatenate([start.free, start.rate, [start.way]])
+        code = compiled().march(self.row, given, here, known, goals, rows, stored)
+        states = tuple(
+            MarchState(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
+            for row in rows[: stored[0]].copy()
+        )
+        march = NaturalMarch(states, MarchCode(code), float(given[0]))
+        return self._counted(march, start.unstable) if self.follows else march
+
+    def _counted(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
+        """Return a march with its unstable directions counted, as far as their number stays the same."""
+        states: list[MarchState] = []
+        for state in march.states:
+            if self._unstable(state.free, state.way, state.unstable) != unstable:
+                return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
+            states.append(replace(state, unstable=unstable))
+        return replace(march, states=tuple(states))
+
+
+def _plan_row(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
+    """Return a `Plan` of march.h."""
+    return np.array(
+        [plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, plan.on_branch, start], float
+    )
+
+
+def march_many(
+    designs: NetworkDesigns, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+) -> tuple[FloatArray, Any]:
+    """Return the efforts of many designs under a drive by a motion, each followed from rest.
+
+    Parameters
+    ----------
+    designs : NetworkDesigns
+        Real ones, without constant loads or displaced supports.
+    targets : (k,) array
+        Values of the drive [m or rad].
+    first_step : float
+        Share of the range of the drive.
+    tolerance : float
+        Of corrections, relative to the largest motion and force.
+
+    Returns
+    -------
+    efforts : (d, k) array
+        [N or N m]; not a number from where a path does not simply go on.
+    codes : (d,) int array
+        `MarchCode` of each.
+    """
+    own = equations(designs.template)
+    goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
+    span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
+    plan = MarchPlan(first_step * span, span, tolerance=tolerance)
+    efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
+    if isinstance(own, CompiledEquations) and not own.follows:
+        kept = design_arrays(own, designs)
+        given = _plan_row(plan, 0, True)
+        if not compiled().march_many(_rows(own, kept, designs.count), given, goals, efforts, codes, plan.room):
+            raise MemoryError
+    else:
+        for number in range(designs.count):
+            march_one(equations(design_of(designs, number)), goals, plan, efforts[number], codes[number : number + 1])
+    return efforts * own.effort_unit, codes
+
+
+def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: FloatArray, code: Any) -> None:
+    """Follow one network from rest; put its efforts at the goals and how it ended into the arrays given."""
+    start = begin(own)
+    march = NaturalMarch((), MarchCode.NO_START, 0.0) if start is None else own.march(start, goals, plan)
+    code[0] = march.code
+    for state in march.states:
+        if state.target >= 0:
+            efforts[state.target] = state.effort
+
+
+def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
+    """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
+    rule, tables = basis(own.network.degree), designs.tables
+    found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
+    bend = tables["weight"] * tables["rigidity"]
+    if designs.each:
+        found["bend"] = (rule.slopes.T * bend[:, :, None, :]) @ rule.slopes
+        found["spring"] = np.array([[_spring(one, spring)[1] for spring in one.springs] for one in designs.each])
+        found["load"] = np.array([[_load(one, load)[1] for load in one.loads] for one in designs.each])
+    else:  # the same along an element, but for the weights
+        whole = (rule.slopes.T * rule.weights) @ rule.slopes
+        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None, None] * whole
+    if designs.base is not None:
+        found["base"] = np.ascontiguousarray(designs.base, float)
+    return found
+
+
+def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:
+    """Return a `Model` for each design: the template's, with addresses of its own."""
+    rows = np.tile(own.row, (count, 1))
+    for name, array in kept.items():
+        rows[:, len(COUNTS) + ADDRESSES.index(name)] = array.ctypes.data + array.strides[0] * np.arange(count)
+    return rows
+
+
+# -- arrays ------------------------------------------------------------------------------------------------------------
+def model_counts(network: Discretisation, ramp: bool) -> dict[str, int]:
+    """Return the counts of a `Model`."""
+    elements, points = network.elements.weight.shape
+    follows = any(load.item.follows for load in network.loads)
+    values = (elements, points, network.degree, network.size, len(network.free), len(network.springs))
+    return dict(zip(COUNTS, (*values, len(network.loads), int(ramp), int(follows)), strict=True))
+
+
+def model_arrays(of: NumpyEquations) -> dict[str, Any]:
+    """Return the arrays of a `Model` in C order."""
+    network, rule = of.network, basis(of.network.degree)
+    e, a = network.elements, network.attachments
+    slot = np.full(network.size, -1, np.int64)
+    slot[network.free] = np.arange(len(network.free))
+    bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
+    springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
+    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name in ADDRESSES}
+    given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
+    given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
+    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}
+    given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
+    given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
+    whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
+    return {
+        name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64)
+        for name in ADDRESSES
+        if given[name] is not None
+    }
+
+
+def _leaves(network: Discretisation, slot: Any) -> Any:
+    """Return the last element that holds each free unknown, -1 if none does."""
+    last = np.full(network.size, -1, np.int64)
+    for number, unknowns in enumerate(network.elements.unknowns):
+        last[unknowns] = number
+    return last[slot >= 0]
+
+
+def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return kind and places of a spring, and its stiffness and what else it needs."""
+    item, scales, attachments = attached.item, network.scales, network.attachments
+    rest = attachments.origin[list(attached.places)] + attachments.arm[list(attached.places)]
+    stiffness = item.stiffness * scales.length / scales.force
+    if isinstance(item, SlideSpring):
+        free = item.free_displacement / scales.length
+        values = (stiffness, free, np.cos(item.direction), np.sin(item.direction), *rest[0])
+        return (1, attached.places[0], -1), values
+    if isinstance(item, LineSpring):
+        ground = np.array(item.ground) / scales.length
+        length = float(np.hypot(*((rest[1] if item.end else ground) - rest[0])))
+        free = length if item.free_length is None else item.free_length / scales.length
+        end = attached.places[1] if item.end else -1
+        return (0, attached.places[0], end), (stiffness, length, free - length, *ground, 0.0)
+    start, end = attached.places if item.start is not None else (-1, attached.places[0])
+    return (2, start, end), (item.stiffness / scales.moment, item.free_angle, 0.0, 0.0, 0.0, 0.0)
+
+
+def _load(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:
+    """Return place of a load, whether it grows and follows, and force and moment."""
+    item, scales = attached.item, network.scales
+    unit = scales.drive if attached.grows else 1.0
+    values = (item.fx * unit / scales.force, item.fy * unit / scales.force, item.moment * unit / scales.moment)
+    return (attached.places[0], int(attached.grows), int(item.follows)), values

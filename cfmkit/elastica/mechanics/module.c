@@ -1,0 +1,140 @@
+/* The module `_march`: buffers in, codes out; every call releases the interpreter's lock. */
+#define PY_SSIZE_T_CLEAN
+#define Py_LIMITED_API 0x030B0000
+#include <Python.h>
+
+#include "march.h"
+
+#define MAX_BUFFERS 8
+
+typedef struct { Py_buffer view[MAX_BUFFERS]; int count; } Buffers;
+
+static void release(Buffers *b) {
+    while (b->count > 0) PyBuffer_Release(&b->view[--b->count]);
+}
+
+/* Take the buffers of arguments `first` to `last` - 1; every one is an array in C order. */
+static int take(PyObject *arguments, Py_ssize_t first, Py_ssize_t last, Buffers *b) {
+    b->count = 0;
+    for (Py_ssize_t k = first; k < last; k++) {
+        PyObject *array = PyTuple_GetItem(arguments, k);
+        if (!array || PyObject_GetBuffer(array, &b->view[b->count], PyBUF_C_CONTIGUOUS) != 0) {
+            release(b);
+            return 0;
+        }
+        b->count++;
+    }
+    return 1;
+}
+
+static void *at(Buffers *b, int k) { return b->view[k].len ? b->view[k].buf : NULL; } /* NULL of an empty array */
+
+static int number(PyObject *arguments, Py_ssize_t k, double *value) {
+    PyObject *item = PyTuple_GetItem(arguments, k);
+    if (!item) return 0;
+    *value = PyFloat_AsDouble(item);
+    return !(*value == -1.0 && PyErr_Occurred());
+}
+
+/* evaluate(model, z, drives, gradients, hessians, share) -> code */
+static PyObject *py_evaluate(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double share;
+    int code;
+    (void)self;
+    if (!number(arguments, 5, &share) || !take(arguments, 0, 5, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Int count = b.view[2].len / (Int)sizeof(double);
+    code = evaluate(at(&b, 0), at(&b, 1), at(&b, 2), share, count, at(&b, 3), at(&b, 4));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* linearise(model, x, residual, tangent, change, way) -> code */
+static PyObject *py_linearise(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double way;
+    int code;
+    (void)self;
+    if (!number(arguments, 5, &way) || !take(arguments, 0, 5, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    code = linearise(at(&b, 0), at(&b, 1), way, at(&b, 2), at(&b, 3), at(&b, 4));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* resolve(model, x, right, unstable, way) -> code */
+static PyObject *py_resolve(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double way;
+    int code;
+    (void)self;
+    if (!number(arguments, 4, &way) || !take(arguments, 0, 4, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    const Int count = b.view[2].len / ((Int)sizeof(double) * m->free);
+    code = resolve(m, at(&b, 1), way, at(&b, 2), count, at(&b, 3));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* solve(model, x, way, border, push, rate, found, level, tolerance, quick) -> code */
+static PyObject *py_solve(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double level, tolerance, quick;
+    int code;
+    (void)self;
+    if (!number(arguments, 7, &level) || !number(arguments, 8, &tolerance) || !number(arguments, 9, &quick)) return NULL;
+    if (!take(arguments, 0, 7, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    code = solve(at(&b, 0), at(&b, 1), at(&b, 2), at(&b, 3), level, at(&b, 4), tolerance, quick != 0.0, at(&b, 5), at(&b, 6));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* march(model, plan, x_rate_way, before, targets, rows, stored) -> code */
+static PyObject *py_march(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    int code;
+    (void)self;
+    if (!take(arguments, 0, 7, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Model *m = at(&b, 0);
+    double *x = at(&b, 2);
+    const Int count = b.view[4].len / (Int)sizeof(double), wide = (2 * m->free + 4) * (Int)sizeof(double);
+    code = march(m, at(&b, 1), x, x + m->free, x + 2 * m->free, at(&b, 3), at(&b, 4), count, at(&b, 5), b.view[5].len / wide,
+                 at(&b, 6));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* march_many(models, plan, targets, efforts, codes, room) -> whether there was memory */
+static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double room;
+    int code;
+    (void)self;
+    if (!number(arguments, 5, &room) || !take(arguments, 0, 5, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    code = march_many(at(&b, 0), b.view[4].len / (Int)sizeof(Int), at(&b, 1), at(&b, 2), b.view[2].len / (Int)sizeof(double),
+                      at(&b, 3), (Int)room, at(&b, 4));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+static PyMethodDef methods[] = {
+    {"evaluate", py_evaluate, METH_VARARGS, NULL}, {"linearise", py_linearise, METH_VARARGS, NULL},
+    {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
+    {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
+    {NULL, NULL, 0, NULL},
+};
+
+static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_march", NULL, -1, methods, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit__march(void) { return PyModule_Create(&definition); }

@@ -1,0 +1,187 @@
+"""A network of beams as a problem to be followed: along its drive, or along a share of what is constant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.equations import MarchCode, MarchPlan, MarchState
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.polynomials import shape_functions
+from cfmkit.elastica.model.network import PointLoad
+from cfmkit.numerics.continuation.path import MarchedSteps
+from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.equations import NumpyEquations
+    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.problem import Border
+
+SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
+ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
+NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkProblem:
+    """Equilibria of a network: its free unknowns over the drive.
+
+    With `ramp` the drive rests, and what is followed is the share of everything constant: loads, displaced supports,
+    free lengths of springs, the gap of beams that are forced into place.
+    """
+
+    network: Discretisation
+    ramp: bool = False
+    next_correction: float = 1e-10
+    """Size of the next of Newton's corrections, as the square of the last, at which a march accepts an equilibrium."""
+
+    @cached_property
+    def motions(self) -> Any:
+        """Which free unknowns are motions."""
+        return self.network.free < self.network.n_motions
+
+    @cached_property
+    def equations(self) -> NumpyEquations:
+        """Residual, tangent and Newton's method, compiled where they can be."""
+        return equations(self.network, self.ramp)
+
+    @cached_property
+    def unit(self) -> FloatArray:
+        """Sizes of the free unknowns: 1 for motions, EI/L^2 of its element for a section force."""
+        return np.where(self.motions, 1.0, self.equations.unit)
+
+    def values(self, x: FloatArray, drive: float) -> FloatArray:
+        """Return all unknowns, held ones included."""
+        return np.asarray(self.equations.values(x, drive))
+
+    def linearise(self, x: FloatArray, drive: float) -> Tangent:
+        """Return residual, tangent and the residual's change with the drive."""
+        at = self.equations.linearise(x, drive)
+        return Tangent(self.network, at.residual, at.change, at.tangent)
+
+    def solve(
+        self, x: FloatArray, drive: float, border: Border | None = None, push: FloatArray | None = None
+    ) -> PathEquilibrium | None:
+        """Return the equilibrium near a guess: Newton's method of the protocol, in compiled code."""
+        row, level = (None, 0.0) if border is None else border
+        state = self.equations.solve(x, drive, row, level, push)
+        if state is None or not np.isfinite(state.rate).all():
+            return None
+        return _equilibrium(state)
+
+    def march(self, walk: Walk) -> MarchedSteps:
+        """Return the equilibria on the way to the next requested values, as far as nothing happens."""
+        here, before, left = _state(walk.here), walk.before, walk.targets[walk.number :]
+        plan = MarchPlan(
+            walk.step, walk.options.span, _state(before) if before is not None else None, walk.options.largest_motion,
+            self.next_correction, on_branch=walk.branch is not None, room=2 * len(left) + ROOM,
+        )  # fmt: skip
+        marched = self.equations.march(here, left, plan)
+        states = tuple((_equilibrium(state), state.target >= 0) for state in marched.states)
+        return MarchedSteps(states, marched.step, marched.code is MarchCode.STEPS_FAIL)
+
+    # -- modes -----------------------------------------------------------------------------------------------------
+    def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return the eigenvalues of the motions' stiffness nearest to zero, and the modes with their section forces.
+
+        Directions that constraints or stiff beams hold are none: their flexibility is rounding.
+        """
+        tangent, moves = self.linearise(at.x, at.drive).tangent, np.flatnonzero(self.motions)
+        unit = np.zeros((len(tangent), len(moves)))
+        unit[moves, np.arange(len(moves))] = 1.0
+        try:
+            flexibility = np.linalg.solve(tangent, unit)
+        except np.linalg.LinAlgError:
+            shift = energy.SINGULAR_SHIFT * np.diag(self.motions.astype(float))
+            flexibility = np.linalg.solve(tangent + shift, unit)
+        inner = flexibility[moves]
+        if self.follows:
+            inverse, vectors = np.linalg.eig(inner)
+            real = np.abs(inverse.imag) <= energy.REAL_SHARE * np.abs(inverse)
+            inverse, vectors = inverse[real].real, vectors[:, real].real
+        else:
+            inverse, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        inverse = np.where(inverse == 0, np.finfo(float).tiny, inverse)
+        flexible = int((np.abs(inverse) > energy.FLEXIBLE_SHARE * np.abs(inverse).max()).sum())
+        order = np.argsort(-np.abs(inverse))[: min(count, flexible)]
+        return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
+
+    @cached_property
+    def follows(self) -> bool:
+        """Whether a load turns with its node: then the tangent is unsymmetric."""
+        return any(load.item.follows for load in self.network.loads if isinstance(load.item, PointLoad))
+
+    def orient(self, modes: FloatArray) -> FloatArray:
+        """Return one combination of modes, its largest motion one, on the side that `Control.sign` 1 names.
+
+        The motion of a node that changes most goes to the negative side; modes that move no node are told by the
+        moments at the beams' ends. With several modes that is repeated on the rest, whatever spans them.
+        """
+        nodes, ends = modes[self._node_rows], self._end_moments(modes)
+        size = np.abs(modes[self.motions]).max()
+        rest, amounts = np.eye(modes.shape[1]), np.zeros(modes.shape[1])
+        for _ in range(modes.shape[1]):
+            parts = nodes @ rest
+            if not np.abs(parts).max(initial=0.0) > NO_MOTION * size:
+                parts = ends @ rest
+            sizes = np.linalg.norm(parts, axis=1)
+            if not sizes.max(initial=0.0) > 0:
+                break
+            row = parts[np.flatnonzero(sizes >= SAME_SIZE * sizes.max())[0]]
+            row = row / np.linalg.norm(row)
+            amounts -= row
+            rest -= np.outer(rest @ row, row)
+        mode = modes @ amounts
+        return np.asarray(mode / np.abs(mode[self.motions]).max())
+
+    @cached_property
+    def _node_rows(self) -> Any:
+        """Which free unknowns move nodes."""
+        named = [unknown for body in self.network.bodies.values() for unknown in body]
+        return np.flatnonzero(np.isin(self.network.free, named))
+
+    def _end_moments(self, modes: FloatArray) -> FloatArray:
+        """Return the moments at the ends of the beams in modes, (beams, k)."""
+        z = np.zeros((self.network.size, modes.shape[1]))
+        z[self.network.free] = modes
+        e = self.network.elements
+        last = np.array([number for number, (_, right) in enumerate(e.cuts) if right == 1.0])
+        unknowns = e.unknowns[last][:, energy.rotation_columns(self.network.degree)]
+        _, slopes = shape_functions(self.network.degree, np.ones(1))
+        return np.asarray(np.einsum("e,c,eck->ek", e.rigidity[last, -1], slopes[0], z[unknowns]))
+
+
+def _state(at: PathEquilibrium) -> MarchState:
+    return MarchState(at.x, at.drive, at.rate, at.unstable, at.effort)
+
+
+def _equilibrium(state: MarchState) -> PathEquilibrium:
+    return PathEquilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Residual and tangent of a network at one place."""
+
+    network: Discretisation
+    residual: FloatArray  # (n,)
+    rate: FloatArray  # (n,) change of the residual with the drive
+    tangent: FloatArray  # (n, n)
+
+    @cached_property
+    def unstable(self) -> int:
+        """Number of unstable directions at a held drive."""
+        return energy.count_unstable(self.network, self.tangent)
+
+    def solve(self, right: FloatArray) -> FloatArray | None:
+        """Return the tangent's inverse times columns."""
+        try:
+            return np.asarray(np.linalg.solve(self.tangent, right))
+        except np.linalg.LinAlgError:
+            return None

@@ -1,0 +1,283 @@
+/* Terms of the functional: elements, springs, point loads; each its gradient, Hessian and change along the way.
+ *
+ * The formulas are those of energy.py and terms.py, which a test holds equal to these. */
+#include <math.h>
+#include <string.h>
+
+#include "march.h"
+
+enum { LINE_SPRING, SLIDE_SPRING, TORSION_SPRING };
+
+typedef struct { double place[2], arm[2], by[2][3]; const Int *at; } Pose;
+
+static Pose pose(const Model *m, const double *z, Int k) {
+    Pose p;
+    p.at = m->places + 4 * k;
+    const double c = m->frame[2 * k], s = m->frame[2 * k + 1], x = z[p.at[0]], y = z[p.at[1]];
+    const double cos_r = cos(z[p.at[2]]), sin_r = sin(z[p.at[2]]), ax = m->arm[2 * k], ay = m->arm[2 * k + 1];
+    p.arm[0] = cos_r * ax - sin_r * ay;
+    p.arm[1] = sin_r * ax + cos_r * ay;
+    p.place[0] = m->origin[2 * k] + c * x - s * y + p.arm[0];
+    p.place[1] = m->origin[2 * k + 1] + s * x + c * y + p.arm[1];
+    p.by[0][0] = c; p.by[0][1] = -s; p.by[0][2] = -p.arm[1];
+    p.by[1][0] = s; p.by[1][1] = c; p.by[1][2] = p.arm[0];
+    return p;
+}
+
+/* The share of its curling that a wide strip can do, g, and two derivatives by z = th^4: see wide_strip.py. */
+static void curling_share(double z, double *g, double *first, double *second) {
+    static const double series[] = {  /* SERIES of wide_strip.py */
+        1.0, -0.005555555555555555, 4.4091710758377414e-05, -3.522589501425479e-07,
+        2.8148759863668038e-09, -2.2493633758277303e-11, 1.7974634993836147e-13,
+        -1.4363508775581866e-15, 1.1477862247352577e-17};
+    *g = *first = *second = 0.0;
+    if (z < 1.0) {
+        for (int k = (int)(sizeof series / sizeof *series) - 1; k >= 0; k--) {
+            *second = *second * z + 2.0 * *first;
+            *first = *first * z + *g;
+            *g = *g * z + series[k];
+        }
+        return;
+    }
+    const double th = sqrt(sqrt(z)), e = exp(-th), c = cos(th), s = sin(th), below = 1.0 + 2.0 * e * s - e * e;
+    const double f = 2.0 * e * (1.0 - e * e) * s / (below * below);
+    const double grows = 2.0 * e * ((1.0 + e * e) * s + (1.0 - e * e) * c) / (below * below)
+                         - 2.0 * f * (1.0 + 2.0 * e * c + e * e) / below;
+    *g = 2.0 / th * (1.0 - 2.0 * e * c + e * e) / below;
+    const double once = (4.0 * f - *g) / th, twice = (4.0 * grows - 2.0 * once) / th, cube = th * th * th;
+    *first = once / (4.0 * cube);
+    *second = (twice - 3.0 * once / th) / (16.0 * cube * cube);
+}
+
+/* Moment and stiffness of bending at a point. */
+static void bending(const Model *m, Int o, double curvature, double *moment, double *stiffness) {
+    const double rigidity = m->rigidity[o];
+    *moment = rigidity * curvature;
+    *stiffness = rigidity;
+    if (!m->curl || m->hindrance[o] == 0.0) return;
+    const double n = m->hindrance[o], whole = curvature + m->rest[o], by = 2.0 * m->curl[o] * whole;
+    double g, first, second;
+    curling_share(m->curl[o] * whole * whole, &g, &first, &second);
+    const double stiff = 1.0 + n * (1.0 - g), rising = -n * first * by;
+    const double curved = -n * (second * by * by + 2.0 * m->curl[o] * first);
+    *moment = rigidity * (curvature * stiff + 0.5 * curvature * curvature * rising);
+    *stiffness = rigidity * (stiff + 2.0 * curvature * rising + 0.5 * curvature * curvature * curved);
+}
+
+/* Sums over the Gauss points of an element. */
+typedef struct {
+    double rotation[MAX_SHAPES], change[MAX_SHAPES], by_x[MAX_SHAPES], by_y[MAX_SHAPES];
+    double reach[2], reach_change[2], xx, yy, xy;
+} Sums;
+
+/* Add one point: rotations and section forces there, and what they give. h: lower triangle of the rotations' Hessian. */
+static void gauss_point(const Model *m, Int o, const double *N, const double *S, const double *phi, const double *n1,
+                        const double *load, const double *growth, Sums *sum, double *h, int ld) {
+    const Int shapes = m->degree + 1;
+    double turn = m->angle[o], curvature = 0.0;
+    for (Int k = 0; k < shapes; k++) { turn += N[k] * phi[k]; curvature += S[k] * phi[k]; }
+    const double c = cos(turn), s = sin(turn), w = m->weight[o], a = m->axial[o], b = m->shear[o], ahead = m->ahead[o];
+    const double nx = n1[0] + load[0] * ahead, ny = n1[1] + load[1] * ahead;
+    const double normal = nx * c + ny * s, shear = ny * c - nx * s;
+    const double f = 1.0 + (a - b) * normal, g = (a - b) * shear;
+    sum->reach[0] += w * ((1.0 + a * normal) * c - b * shear * s);
+    sum->reach[1] += w * ((1.0 + a * normal) * s + b * shear * c);
+    double moment, stiffness;
+    bending(m, o, curvature, &moment, &stiffness);
+    const double bent = w * moment, turned = w * shear * f;
+    for (Int k = 0; k < shapes; k++) sum->rotation[k] += bent * S[k] - turned * N[k];
+    const double gx = growth[0] * ahead, gy = growth[1] * ahead;
+    if (gx != 0.0 || gy != 0.0) {
+        const double more_normal = gx * c + gy * s, more_shear = gy * c - gx * s;
+        const double more = w * (more_shear * f + g * more_normal);
+        for (Int k = 0; k < shapes; k++) sum->change[k] -= more * N[k];
+        sum->reach_change[0] += w * (a * more_normal * c - b * more_shear * s);
+        sum->reach_change[1] += w * (a * more_normal * s + b * more_shear * c);
+    }
+    if (!h) return;
+    const double stiff = w * (normal * f - g * shear), stiffer = w * (stiffness - m->rigidity[o]);
+    const double ux = w * (g * c - f * s), uy = w * (g * s + f * c);
+    for (Int i = 0; i < shapes; i++) {
+        const double own = stiff * N[i];
+        double *row = h + i * ld;
+        for (Int j = 0; j <= i; j++) row[j] += own * N[j];
+        if (stiffer != 0.0) for (Int j = 0; j <= i; j++) row[j] += stiffer * S[i] * S[j];
+        sum->by_x[i] -= ux * N[i];
+        sum->by_y[i] -= uy * N[i];
+    }
+    sum->xx -= w * (a * c * c + b * s * s);
+    sum->yy -= w * (a * s * s + b * c * c);
+    sum->xy -= w * (a - b) * c * s;
+}
+
+static Int local(Int shape) { return shape < 2 ? 3 + 4 * shape : 6 + shape; } /* unknown of an element's shape function */
+
+static void element_hessian(const Model *m, const Pose *ends, const double *first, const double *last,
+                            const Sums *sum, const double *rotations, Term *t) {
+    const Int shapes = m->degree + 1, count = t->count, fx = count - 2, fy = count - 1;
+    double *h = t->hessian;
+    memset(h, 0, (size_t)(count * count) * sizeof(double));
+    for (Int i = 0; i < shapes; i++) {
+        const Int a = local(i);
+        for (Int j = 0; j <= i; j++) {
+            const Int b = local(j);
+            h[a * count + b] = h[b * count + a] = rotations[i * MAX_SHAPES + j];
+        }
+        h[a * count + fx] = h[fx * count + a] = sum->by_x[i];
+        h[a * count + fy] = h[fy * count + a] = sum->by_y[i];
+    }
+    for (int side = 0; side < 2; side++)
+        for (Int k = 0; k < 3; k++) {
+            const Int a = 4 * side + k;
+            const double sign = side ? 1.0 : -1.0;
+            h[a * count + fx] = h[fx * count + a] = sign * ends[side].by[0][k];
+            h[a * count + fy] = h[fy * count + a] = sign * ends[side].by[1][k];
+        }
+    h[fx * count + fx] = sum->xx;
+    h[fy * count + fy] = sum->yy;
+    h[fx * count + fy] = h[fy * count + fx] = sum->xy;
+    h[2 * count + 2] += first[0] * ends[0].arm[0] + first[1] * ends[0].arm[1];
+    h[6 * count + 6] -= last[0] * ends[1].arm[0] + last[1] * ends[1].arm[1];
+}
+
+static void element(const Model *m, Int e, const double *z, Stage at, int with_hessian, Term *t) {
+    const Int shapes = m->degree + 1, count = m->degree + 9, *own = m->unknowns + e * count;
+    const double *line = m->line + 4 * e, length = m->length[e];
+    const double load[2] = {at.share * line[0] + at.drive * line[2], at.share * line[1] + at.drive * line[3]};
+    const double growth[2] = {at.by_share * line[0] + at.by_drive * line[2], at.by_share * line[1] + at.by_drive * line[3]};
+    const Pose ends[2] = {pose(m, z, m->ends[2 * e]), pose(m, z, m->ends[2 * e + 1])};
+    const double last[2] = {z[own[count - 2]], z[own[count - 1]]};
+    const double first[2] = {last[0] + load[0] * length, last[1] + load[1] * length};
+    double phi[MAX_SHAPES], rotations[MAX_SHAPES * MAX_SHAPES];
+    Sums sum;
+    memset(&sum, 0, sizeof sum);
+    for (Int k = 0; k < shapes; k++) phi[k] = z[own[local(k)]];
+    if (with_hessian)
+        for (Int i = 0; i < shapes; i++)
+            memcpy(rotations + i * MAX_SHAPES, m->bend + (e * shapes + i) * shapes, (size_t)(i + 1) * sizeof(double));
+    for (Int q = 0; q < m->points; q++)
+        gauss_point(m, e * m->points + q, m->values + q * shapes, m->slopes + q * shapes, phi, last, load, growth, &sum,
+                    with_hessian ? rotations : NULL, MAX_SHAPES);
+    t->count = count;
+    memcpy(t->at, own, (size_t)count * sizeof(Int));
+    memset(t->gradient, 0, (size_t)count * sizeof(double));
+    memset(t->change, 0, (size_t)count * sizeof(double));
+    for (Int k = 0; k < shapes; k++) { t->gradient[local(k)] = sum.rotation[k]; t->change[local(k)] = sum.change[k]; }
+    for (Int k = 0; k < 3; k++) {
+        t->gradient[k] = -(first[0] * ends[0].by[0][k] + first[1] * ends[0].by[1][k]);
+        t->gradient[4 + k] = last[0] * ends[1].by[0][k] + last[1] * ends[1].by[1][k];
+        t->change[k] = -length * (growth[0] * ends[0].by[0][k] + growth[1] * ends[0].by[1][k]);
+    }
+    for (int k = 0; k < 2; k++) {
+        const double gap = m->gap[2 * e + k];
+        t->gradient[count - 2 + k] = ends[1].place[k] - ends[0].place[k] - sum.reach[k] - (1.0 - at.share) * gap;
+        t->change[count - 2 + k] = at.by_share * gap - sum.reach_change[k];
+    }
+    if (with_hessian) element_hessian(m, ends, first, last, &sum, rotations, t);
+}
+
+static void line_spring(const double *value, const Pose *ends, int both, Stage at, Term *t) {
+    const Int n = both ? 6 : 3;
+    const double dx = (both ? ends[1].place[0] : value[3]) - ends[0].place[0];
+    const double dy = (both ? ends[1].place[1] : value[4]) - ends[0].place[1];
+    const double length = hypot(dx, dy), ex = dx / length, ey = dy / length;
+    const double force = value[0] * (length - value[1] - at.share * value[2]), change = -value[0] * at.by_share * value[2];
+    double stretch[6], turn[6];
+    t->count = n;
+    for (Int i = 0; i < n; i++) {
+        const Pose *p = ends + i / 3;
+        const double sign = i < 3 ? -1.0 : 1.0;
+        t->at[i] = p->at[i % 3];
+        stretch[i] = sign * (ex * p->by[0][i % 3] + ey * p->by[1][i % 3]);
+        turn[i] = sign * (ex * p->by[1][i % 3] - ey * p->by[0][i % 3]);
+        t->gradient[i] = force * stretch[i];
+        t->change[i] = change * stretch[i];
+    }
+    for (Int i = 0; i < n; i++)
+        for (Int j = 0; j < n; j++)
+            t->hessian[i * n + j] = value[0] * stretch[i] * stretch[j] + force / length * turn[i] * turn[j];
+    t->hessian[2 * n + 2] += force * (ex * ends[0].arm[0] + ey * ends[0].arm[1]);
+    if (both) t->hessian[5 * n + 5] -= force * (ex * ends[1].arm[0] + ey * ends[1].arm[1]);
+}
+
+static void slide_spring(const double *value, const Pose *p, Stage at, Term *t) {
+    const double gap = (p->place[0] - value[4]) * value[2] + (p->place[1] - value[5]) * value[3] - at.share * value[1];
+    double reach[3];
+    t->count = 3;
+    for (Int i = 0; i < 3; i++) {
+        t->at[i] = p->at[i];
+        reach[i] = value[2] * p->by[0][i] + value[3] * p->by[1][i];
+        t->gradient[i] = value[0] * gap * reach[i];
+        t->change[i] = -value[0] * at.by_share * value[1] * reach[i];
+    }
+    for (Int i = 0; i < 3; i++)
+        for (Int j = 0; j < 3; j++) t->hessian[i * 3 + j] = value[0] * reach[i] * reach[j];
+    t->hessian[8] -= value[0] * gap * (value[2] * p->arm[0] + value[3] * p->arm[1]);
+}
+
+static void torsion_spring(const Model *m, const double *value, const Int *places, const double *z, Stage at, Term *t) {
+    double sign[2], gap = -at.share * value[1];
+    t->count = 0;
+    for (int side = 0; side < 2; side++)
+        if (places[side] >= 0) {
+            sign[t->count] = side ? 1.0 : -1.0;
+            t->at[t->count] = m->places[4 * places[side] + 3];
+            gap += sign[t->count] * z[t->at[t->count]];
+            t->count++;
+        }
+    for (Int i = 0; i < t->count; i++) {
+        t->gradient[i] = value[0] * gap * sign[i];
+        t->change[i] = -value[0] * at.by_share * value[1] * sign[i];
+        for (Int j = 0; j < t->count; j++) t->hessian[i * t->count + j] = value[0] * sign[i] * sign[j];
+    }
+}
+
+static void spring(const Model *m, Int number, const double *z, Stage at, Term *t) {
+    const Int *given = m->spring_at + 3 * number;
+    const double *value = m->spring + 6 * number;
+    Pose ends[2];
+    if (given[0] == TORSION_SPRING) { torsion_spring(m, value, given + 1, z, at, t); return; }
+    ends[0] = pose(m, z, given[1]);
+    if (given[0] == SLIDE_SPRING) { slide_spring(value, ends, at, t); return; }
+    if (given[2] >= 0) ends[1] = pose(m, z, given[2]);
+    line_spring(value, ends, given[2] >= 0, at, t);
+}
+
+static void point_load(const Model *m, Int number, const double *z, Stage at, Term *t) {
+    const Int *given = m->load_at + 3 * number;
+    const double *value = m->load + 3 * number, factor = given[1] ? at.drive : at.share;
+    const double grows = given[1] ? at.by_drive : at.by_share;
+    const Pose p = pose(m, z, given[0]);
+    double fx = value[0], fy = value[1];
+    if (given[2]) {
+        const double c = cos(z[p.at[3]]), s = sin(z[p.at[3]]);
+        fx = c * value[0] - s * value[1];
+        fy = s * value[0] + c * value[1];
+    }
+    t->count = 4;
+    memcpy(t->at, p.at, 4 * sizeof(Int));
+    memset(t->hessian, 0, 16 * sizeof(double));
+    for (int k = 0; k < 3; k++) {
+        const double moves = fx * p.by[0][k] + fy * p.by[1][k];
+        t->gradient[k] = -factor * moves;
+        t->change[k] = -grows * moves;
+        if (given[2]) t->hessian[4 * k + 3] = factor * (fy * p.by[0][k] - fx * p.by[1][k]);
+    }
+    t->gradient[3] = -factor * value[2];
+    t->change[3] = -grows * value[2];
+    t->hessian[10] = factor * (fx * p.arm[0] + fy * p.arm[1]);
+}
+
+Stage stage(const Model *m, double way) {
+    const Stage at = {m->ramp ? 0.0 : way, m->ramp ? way : 1.0, m->ramp ? 0.0 : 1.0, m->ramp ? 1.0 : 0.0};
+    return at;
+}
+
+Int terms(const Model *m) { return m->springs + m->loads + m->elements; }
+
+/* Springs and loads come first: their unknowns leave the front with the last element that holds them. */
+void term(const Model *m, Int number, const double *z, Stage at, int with_hessian, Term *out) {
+    if (number < m->springs) spring(m, number, z, at, out);
+    else if (number < m->springs + m->loads) point_load(m, number - m->springs, z, at, out);
+    else element(m, number - m->springs - m->loads, z, at, with_hessian, out);
+}

@@ -1,0 +1,102 @@
+"""Stiffness of the driven node across its drive, along a path: what resists when it is pushed off its axis.
+
+With the node's motions along the drive, across it and its rotation, the tangent of the network is condensed to them
+(Schur complement); along the drive the node is held, its rotation is left as its support leaves it. What guides the
+node across is taken away: the stiffness is that of beams and springs, not of the guide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.march import equations
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.results.path import EquilibriumPath
+
+OPEN_FORCE = 1e-9  # dimensionless force that may be left where a force is open: rounding leaves 1e-14
+
+
+def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: Any = None) -> FloatArray:
+    """Return the force across a direction per displacement across it at a node, at points of a path, (p,) [N/m].
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        The equilibria, driven by a displacement of the node along the direction, or by loads.
+    node : str
+        A node that no link moves.
+    direction : float
+        [rad]; along it the node is held.
+    points : (p,) int array, optional
+        Indices of points of the path; all unless given.
+
+    Returns
+    -------
+    (p,) array
+        Negative where the node would leave sideways; nan where nothing gives way.
+    """
+    chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
+    scales = path.network.scales
+    found = [_condensed(*blocks) for blocks in _blocks(path, node, direction, chosen)]
+    return read_only(np.array(found) * scales.force / scales.length)
+
+
+def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool_]:
+    """Return between which neighbouring points of a path `cross_stiffness` is unbounded, (p - 1,).
+
+    It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
+    sign, one mode of the part with its node held across passes neutral stability, and the stiffness has a pole.
+    """
+    blocks = list(_blocks(path, node, direction, np.arange(len(path))))
+    held = np.array([np.linalg.slogdet(kept)[0] for _, _, kept in blocks])
+    value = np.array([_condensed(*each) for each in blocks])
+    return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
+
+
+def _blocks(
+    path: EquilibriumPath, node: str, direction: float, chosen: Any
+) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    """Yield the stiffness across, its coupling (2, k) to what follows, by row and by column, and that of those (k, k).
+
+    The network is the same but for the node, whose axes are turned along the direction and which nothing guides.
+    """
+    network = path.network
+    x, y, _ = network.bodies[node]
+    frame = network.attachments.frame.copy()
+    place = network.attachments.unknowns[:, 0] == x
+    old = network.attachments.frame[network.nodes[node]]
+    frame[place] = np.cos(direction), np.sin(direction)
+    loose = replace(network, attachments=network.attachments._replace(frame=frame))
+    cos, sin = frame[place][0] @ old, old[0] * frame[place][0][1] - old[1] * frame[place][0][0]
+    kept = np.setdiff1d(network.free, [x, y])
+    own = equations(loose)
+    for k in chosen.tolist():
+        z = path.at.z[k].copy()
+        z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
+        _, hessian = own.evaluate(z, float(path.at.drive[k]))
+        yield hessian[y, y], np.stack([hessian[y, kept], hessian[kept, y]]), hessian[np.ix_(kept, kept)]
+
+
+def _condensed(across: float, coupled: FloatArray, kept: FloatArray) -> float:
+    """Return the stiffness of one unknown while others follow it; nan where a force is open.
+
+    So is that along a straight beam that cannot stretch and is held at both ends.
+    """
+    row, column = coupled
+    try:
+        return float(across - row @ np.linalg.solve(kept, column))
+    except np.linalg.LinAlgError:
+        follow, _, _, _ = np.linalg.lstsq(kept, column)
+    left = np.abs(kept @ follow - column).max(initial=0.0)
+    is_open = left > OPEN_FORCE * max(1.0, float(np.abs(column).max(initial=0.0)))
+    return float("nan") if is_open else float(across - row @ follow)

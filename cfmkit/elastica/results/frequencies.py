@@ -1,0 +1,287 @@
+"""Natural frequencies about equilibria of the functional, with the drive held and with it free, and flutter.
+
+To what the functional has, each element gets positions and section forces that vary along it: with bubbles b_k of the
+positions and Legendre polynomials P_j of the force beside its mean,
+
+    X(u) = (1 - u) X0 + u X1 + sum b_k N_k(u),    n(u) = n + sum a_j P_j(2u - 1),    int n . X' du = n . (X1 - X0)
+    + sum a_j . b_(j+1) / sqrt(j + 1/2):
+
+in equilibrium, without inertia, they stay what they are. Positions and rotations have mass, forces none. With
+M = R R^T the frequencies are 1 / (omega^2 + s) = eig(R^T (K + s M)^-1 R) for any s: forces drop out, an inextensible
+beam needs no rule, and with s > 0 nor does what moves freely.
+
+Assumes: small motions, no damping, what is held does not move.
+
+References
+----------
+[Me] L. Meirovitch, Principles and Techniques of Vibrations (1997): the eigenvalue problem.
+[Re] E. Reissner, J. Math. Phys. 29 (1950) 90: the mixed functional.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.vibration.natural_frequencies import Frequencies
+from cfmkit.errors import InputError
+from cfmkit.numerics.one_blas_thread import one_blas_thread
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.results.path import EquilibriumPath
+    from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
+
+DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
+"""Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
+LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
+"""Elements a beam from which on it is a chain, and the order of forces in one: coils of many turns."""
+MAX_DEGREE = 36
+MAX_UNKNOWNS = 4000  # dense matrices of this size take 130 MB each
+NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is zero
+ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
+COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
+N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
+
+
+@one_blas_thread
+def frequencies(
+    path: EquilibriumPath,
+    masses: NetworkMasses,
+    count: int,
+    points: Any = None,
+    hold: tuple[str, float | None] | None = None,
+) -> Frequencies:
+    """Return the lowest `count` natural frequencies of a network about equilibria of its path.
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        The equilibria.
+    masses : NetworkMasses
+        Density of every beam, masses of nodes. BeamSections rotate with inertia where they shear, too.
+    count : int
+        How many frequencies, at least 1.
+    points : (p,) int array, optional
+        Indices of the points of the path; all unless given.
+    hold : (str, float or None), optional
+        Of a drive by loads: which node stands still while the drive is held, along which direction [rad]; None: it
+        does not rotate. Without it, held and free are the same.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If a beam has no density, a mass is at no node, the count is not positive, or the unknowns are too many.
+    """
+    _check(path, masses, count)
+    chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
+    fine = raise_degree(path.network, _degree(path.network, count))
+    system = _VibratingNetwork(path, fine, masses)
+    by_load = isinstance(path.given, Loading)
+    held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
+    grows = np.zeros((2, len(chosen)), dtype=bool)
+    unit = np.sqrt(fine.scales.force / fine.scales.length) / (2 * np.pi)
+    for k, point in enumerate(chosen.tolist()):
+        z = embed(path.network, fine, path.at.z[point])
+        matrices = system.at(z, float(path.at.drive[point]))
+        row = system.row_of(z, *hold) if hold is not None and by_load else None
+        (squares, *still), (others, *loose) = (
+            _squares(*_chosen(fine, matrices, is_held, row), count) for is_held in (True, False)
+        )
+        held[k], free[k] = unit * np.sqrt(squares), unit * np.sqrt(others)
+        grows[:, k] = loose if by_load else still
+    flutters, diverges = (read_only(row, np.bool_) for row in grows)
+    return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
+
+
+def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
+    if count < 1:
+        raise InputError(f"at least one frequency must be requested, got {count}")
+    if missing := [name for name in path.net.beams if name not in masses.density]:
+        raise InputError(f"no density is given for the beams {', '.join(missing)}")
+    for name in masses.nodes:
+        if name not in path.net.nodes:
+            raise InputError(f"a mass is given for {name!r}, which is not a node")
+    elements, degree = len(path.network.elements.length), _degree(path.network, count)
+    size = path.network.size + elements * (degree - path.network.degree + 4 * _order(path.network, degree))
+    if size > MAX_UNKNOWNS:
+        raise InputError(
+            f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
+            "or too much tension"
+        )
+
+
+def _degree(network: Discretisation, count: int) -> int:
+    """Return the degree of the rotations: modes of a beam are spread over its elements."""
+    wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(network))
+    return max(network.degree, min(MAX_DEGREE, wanted))
+
+
+def _order(network: Discretisation, degree: int) -> int:
+    """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
+    return degree - 1 if _elements_a_beam(network) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
+
+
+def _elements_a_beam(network: Discretisation) -> float:
+    return len(network.elements.beam) / len(set(network.elements.beam))
+
+
+@dataclass(frozen=True)
+class _Matrices:
+    """Stiffness and the root of the mass, M = R R^T, of all unknowns: elements' insides behind the others; kg."""
+
+    stiffness: FloatArray  # (n, n)
+    root: FloatArray  # (n, m): what the unknowns move a point by, times the root of its mass
+
+
+class _VibratingNetwork:
+    """Stiffness and mass about one pose after another."""
+
+    def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
+        self.net, self.fine, self.masses = path.net, fine, masses
+        self.order = _order(fine, fine.degree)
+        rule = basis(fine.degree)
+        self.rule = rule
+        self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
+        self.forces = legendre.legvander(2 * rule.places - 1, self.order)[:, 1:]
+        elements, own = len(fine.elements.length), 4 * self.order
+        self.size = fine.size + elements * own
+        inner = fine.size + np.arange(elements * own).reshape(elements, 2, 2, self.order)
+        self.positions, self.varying = inner[:, 0], inner[:, 1]  # (e, axis, order) unknowns: bubbles; forces
+
+    def at(self, z: FloatArray, drive: float) -> _Matrices:
+        """Return the matrices about a pose."""
+        stiffness = np.zeros((self.size, self.size))
+        stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
+        self._vary(stiffness, z, drive)
+        columns = [self._spread(*given) for given in self._weighed(z)]
+        for name, (weight, inertia) in self.masses.nodes.items():
+            moves, unknowns = self._node(z, name)
+            size = np.array([weight, weight, inertia / self.fine.scales.length**2])
+            columns.append(self._spread(unknowns, moves, size))
+        return _Matrices(stiffness, np.hstack(columns))
+
+    def _spread(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
+        """Return columns of the root, (size, m), of points that some unknowns move by moves (m, unknowns)."""
+        column = np.zeros((self.size, len(moves)))
+        np.add.at(column, unknowns, moves.T * np.sqrt(masses))
+        return column
+
+    def _vary(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
+        """Add what forces that vary along elements do, and what positions inside do to them."""
+        e, at = self.fine.elements, energy.fields(self.fine, z, drive)
+        softer, order = e.axial - e.shear, self.order
+        f, g = 1 + softer * at.normal, softer * at.shear
+        by_force = (g * at.cos - f * at.sin, g * at.sin + f * at.cos)
+        rotations = e.unknowns[:, energy.rotation_columns(self.fine.degree)]
+        soft = (
+            (e.axial * at.cos**2 + e.shear * at.sin**2, softer * at.cos * at.sin),
+            (softer * at.cos * at.sin, e.axial * at.sin**2 + e.shear * at.cos**2),
+        )
+        couple = 1 / np.sqrt(np.arange(order) + 1.5)
+        for k in range(len(e.length)):
+            for axis in (0, 1):
+                rows, weight = self.varying[k, axis], e.weight[k]
+                turning = -(self.forces.T * (weight * by_force[axis][k])) @ self.rule.values
+                np.add.at(stiffness, (rows[:, None], rotations[k]), turning)
+                np.add.at(stiffness, (rotations[k][:, None], rows), turning.T)
+                inside = self.positions[k, axis]
+                stiffness[rows, inside] = stiffness[inside, rows] = couple
+                for other in (0, 1):
+                    mean, share = e.unknowns[k, other - 2], weight * soft[axis][other][k]
+                    stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
+                    stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
+
+    def _weighed(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
+        """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
+        fine, e, u = self.fine, self.fine.elements, self.rule.places
+        ends = [poses(fine.attachments, z, e.ends[:, side]).jacobian for side in (0, 1)]
+        rotations = e.unknowns[:, energy.rotation_columns(fine.degree)]
+        for k, name in enumerate(e.beam):
+            section, fitted = self.net.beams[name].section, fine.fits[name]
+            left, right = e.cuts[k]
+            inside = float(np.real(fitted.arc(0.5 * (left + right))))
+            thickness = section.thickness_at(fitted.arc(left + (right - left) * u), inside) + 0.0 * u
+            density = self.masses.density[name] * section.width * thickness * e.weight[k] * fine.scales.length
+            for axis in (0, 1):
+                moves = np.hstack([np.outer(1 - u, ends[0][k, axis]), np.outer(u, ends[1][k, axis]), self.bubbles])
+                unknowns = np.concatenate([e.unknowns[k, [0, 1, 2, 4, 5, 6]], self.positions[k, axis]])
+                yield unknowns, moves, density
+            if section.shear:  # slenderness at which inertia of sections counts is that at which shear does
+                yield rotations[k], self.rule.values, density * (thickness / fine.scales.length) ** 2 / 12
+
+    def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
+        """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
+        here = poses(self.fine.attachments, z, [self.fine.nodes[name]])
+        moves = np.zeros((3, 4))
+        moves[:2, :3], moves[2, 3] = here.jacobian[0], 1.0
+        return moves, here.unknowns[0]
+
+    def row_of(self, z: FloatArray, name: str, direction: float | None) -> FloatArray:
+        """Return what the unknowns count for in a node's motion along a direction, or in its rotation, (size,)."""
+        moves, unknowns = self._node(z, name)
+        row = moves[2] if direction is None else np.cos(direction) * moves[0] + np.sin(direction) * moves[1]
+        found = np.zeros(self.size)
+        np.add.at(found, unknowns, row)
+        return found
+
+
+def _chosen(
+    fine: Discretisation, matrices: _Matrices, is_held: bool, row: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""
+    driven = np.empty(0, int) if is_held else np.flatnonzero(fine.rate)
+    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
+    stiffness, root = matrices.stiffness[np.ix_(own, own)], matrices.root[own]
+    if row is None or not is_held:
+        return stiffness, root
+    tied = np.append(row[own], 0.0)
+    stiffness, root = np.pad(stiffness, (0, 1)), np.pad(root, ((0, 1), (0, 0)))
+    stiffness[-1], stiffness[:, -1] = tied, tied
+    return stiffness, root
+
+
+def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
+    found = np.full(count, np.nan)
+    shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
+    symmetric = np.abs(stiffness - stiffness.T).max() <= np.finfo(float).eps * np.abs(stiffness).max()
+    try:
+        flexible = root.T @ np.linalg.solve(stiffness + shift * root @ root.T, root)
+    except np.linalg.LinAlgError:
+        return found, False, not symmetric
+    if symmetric:
+        inverse = np.linalg.eigvalsh(0.5 * (flexible + flexible.T))
+        largest = float(np.abs(inverse).max(initial=0.0))
+        lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
+        squares = 1 / lowest - shift
+        if inverse[0] < -ROUNDING * largest or (squares < -NEUTRAL * shift).any():
+            return found, False, False
+        found[: len(squares)] = np.where(squares < NEUTRAL * shift, 0.0, squares)
+        return found, False, False
+    return _with_turning(np.linalg.eigvals(flexible), shift, count)
+
+
+def _with_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return the same under loads that turn with their node."""
+    found = np.full(count, np.nan)
+    lowest = inverse[np.argsort(-np.abs(inverse))][: N_RESOLVED * (count + 1)]
+    squares = 1.0 / lowest[np.abs(lowest) > np.finfo(float).eps * np.abs(lowest[0])] - shift
+    complex_ones = np.abs(squares.imag) > COMPLEX_SHARE * np.abs(squares)
+    swings, falls = bool(complex_ones.any()), bool((squares.real[~complex_ones] <= 0.0).any())
+    if not (swings or falls):
+        real = np.sort(squares.real)[:count]
+        found[: len(real)] = real
+    return found, swings, falls

@@ -1,0 +1,252 @@
+"""The path of a network under a drive: equilibria of the functional in order, and what can be requested about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import ShortRepr, read_only
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.poses import poses
+from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.model.network import PointLoad
+from cfmkit.elastica.outcome.path import PathStatus, StressPeak, most_stressed
+from cfmkit.elastica.results import beam_states, stress_extremes
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.beam import Fit
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.model.network_under_drive import Layout
+    from cfmkit.elastica.outcome.path import Event
+
+N_PLACES = 17
+"""Even places of every element at which states along a beam are handed out; neighbours share their ends."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumPath(ShortRepr):
+    """Equilibria of a network under a drive, n points in the order of the path; SI."""
+
+    net: Network  # the model
+    given: Drive  # what was done to it
+    at: Equilibria  # the equilibria, dimensionless
+    unstable: Any  # (n,) number of unstable directions while the drive is held
+    requested: Any  # (n,) index of the requested point, -1 for points in between
+    branch: Any  # (n,) which branch each point is on
+    status: PathStatus
+    message: str  # if not all requested points were reached: why, and where
+    events: tuple[Event, ...]  # limit points and bifurcations, in path order
+    error: float  # estimated error of forces and positions, relative to the largest of the path
+    accurate: Any  # (n,) False at points whose own error is above the tolerance, or not known
+    imperfection: str = ""  # what was added to the shapes: size and mode; empty for the network as given
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.at.z)
+
+    @property
+    def network(self) -> Discretisation:
+        """The arrays of the network."""
+        return self.at.network
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The network's nodes, scales and what is driven, as the families read them."""
+        from cfmkit.elastica.model.network_under_drive import Layout
+
+        return Layout(self.net, self.given)
+
+    @cached_property
+    def drive(self) -> FloatArray:
+        """Value of the drive at every point [m, rad or 1]."""
+        return read_only(self.at.drive * self.network.scales.drive)
+
+    @property
+    def stable(self) -> Any:
+        """Whether the equilibrium is stable while the drive is held; under loads that follow: does not diverge."""
+        return read_only(self.unstable == 0, np.bool_)
+
+    @cached_property
+    def at_requested(self) -> Any:
+        """Indices of the points that were requested, in path order."""
+        return read_only(np.flatnonzero(self.requested >= 0), np.int64)
+
+    @property
+    def fits(self) -> Any:
+        """How each beam was fitted between its nodes, by its name."""
+        fits: dict[str, Fit] = dict(self.network.fits)
+        return fits
+
+    # -- nodes -------------------------------------------------------------------------------------------------------
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Gradient of the functional by all unknowns at every point, (n, size): zero at free ones; dimensionless."""
+        return read_only(equations(self.network).gradients(self.at.z, self.at.drive))
+
+    def motion(self, node: str) -> FloatArray:
+        """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
+        return read_only(node_motion(self.at, node))
+
+    def reaction(self, node: str) -> FloatArray:
+        """Return force and moment that hold a node, (n, 3) [N, N, N m]: of its support and of a drive by a motion.
+
+        Loads are not among them, those of a drive neither.
+
+        Raises
+        ------
+        cfmkit.errors.InputError
+            If a link moves the node.
+        """
+        return read_only(node_reaction(self.at, node, self.residual))
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """What the drive works with: the force along it [N], the moment [N m], or for loads the displacement [J]."""
+        scales = self.network.scales
+        if isinstance(self.given, Loading):
+            return read_only(load_displacement(self.at, self.given))
+        return read_only(self.residual @ self.network.rate * scales.moment / scales.drive)
+
+    # -- along beams -------------------------------------------------------------------------------------------------
+    @property
+    def _fractions(self) -> FloatArray:
+        return np.linspace(0.0, 1.0, N_PLACES)
+
+    def states(self, beam: str) -> beam_states.BeamStates:
+        """Return states at the sampled places of a beam at every point."""
+        if beam not in self._states:
+            self._states[beam] = beam_states.states(self.net, self.at, beam, self._fractions)
+        return self._states[beam]
+
+    @cached_property
+    def _states(self) -> dict[str, beam_states.BeamStates]:
+        return {}
+
+    def end_force(self, beam: str, end: int) -> FloatArray:
+        """Return (h, v, m) on the first (0) or last (1) section of a beam, (n, 3) [N, N, N m].
+
+        It is what the part after the section exerts on the part before it, in global axes.
+        """
+        found, k = self.states(beam), -1 if end else 0
+        return read_only(np.stack([found.h[:, k], found.v[:, k], found.moment[:, k]], axis=-1))
+
+    def line_motion(self, beam: str) -> FloatArray:
+        """Return the displacements of the sampled places of a beam, (n, k, 2) [m]."""
+        found = self.states(beam)
+        rest = beam_states.unloaded(self.net, self.at, beam, self._fractions)
+        return read_only(np.stack([found.x, found.y], axis=-1) - rest)
+
+    def shape(self, beam: str, point: int) -> FloatArray:
+        """Return the deformed centre line of a beam at one point, (k, 2) [m]."""
+        found = self.states(beam)
+        return read_only(np.stack([found.x[point], found.y[point]], axis=-1))
+
+    def places(self, beam: str) -> FloatArray:
+        """Return where the sampled places of a beam lie, (k,) [fraction of the arc length]."""
+        return read_only(self.states(beam).place)
+
+    def sections(self, beam: str) -> beam_states.BeamSections:
+        """Return section forces and stresses along a beam at all points; arrays (n, k)."""
+        return beam_states.sections(self.net, beam, self.states(beam))
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Strain energy of beams and springs at every point [J]."""
+        return read_only(strain_energy(self.at) * self.network.scales.moment)
+
+    # -- stresses ----------------------------------------------------------------------------------------------------
+    def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
+        known = self._beam_stresses.get((beam, axial))
+        if known is None:
+            value, place = stress_extremes.largest_stress(self.net, self.at, beam, axial)
+            known = self._beam_stresses[beam, axial] = read_only(value), read_only(place)
+        return known
+
+    @cached_property
+    def _beam_stresses(self) -> dict[tuple[str, bool], tuple[FloatArray, FloatArray]]:
+        """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
+        return {}
+
+    def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:
+        """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""
+        return stress_extremes.signed_extremes(self.net, self.at, beam, axial)
+
+    def peak_stress(self, axial: bool = True) -> StressPeak:
+        """Return the largest stress of the network at every point, with its place; see `most_stressed`."""
+        names = list(self.net.beams)
+        found = [self.beam_stress(name, axial) for name in names]
+        values, places = (np.array(column) for column in zip(*found, strict=True))
+        best, pick = most_stressed(values, places), np.arange(len(self))
+        return StressPeak(
+            read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])
+        )
+
+
+Path = EquilibriumPath
+"""Its name once the shooting engine, which has a class of that name, is gone."""
+
+
+def node_motion(at: Equilibria, node: str) -> Any:
+    """Return displacement and rotation of a node, (p, 3) [m, m, rad]."""
+    network = at.network
+    here = poses(network.attachments, at.z, [network.nodes[node]])
+    rest = (network.attachments.origin + network.attachments.arm)[network.nodes[node]]
+    moved = (here.place[:, 0] - rest) * network.scales.length
+    return np.concatenate([moved, at.z[:, here.unknowns[0, 3:]]], axis=1)
+
+
+def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
+    """Return force and moment on a node from the gradient at all unknowns, (p, 3) [N, N, N m]."""
+    network, scales = at.network, at.network.scales
+    if node not in network.bodies:
+        raise InputError(f"{node!r} is moved by a link: it has no support of its own")
+    cos, sin = network.attachments.frame[network.nodes[node]]
+    along, across, moment = (residual[:, unknown] for unknown in network.bodies[node])
+    force = np.stack([cos * along - sin * across, sin * along + cos * across], axis=-1) * scales.force
+    return np.concatenate([force, moment[:, None] * scales.moment], axis=1)
+
+
+def load_displacement(at: Equilibria, drive: Loading) -> Any:
+    """Return the work-conjugate displacement of a drive by loads, (p,) [J]."""
+    network, scales = at.network, at.network.scales
+    total: Any = 0.0
+    for load in drive.loads:
+        if not isinstance(load, PointLoad):
+            continue
+        moved = node_motion(at, load.node)
+        fx, fy = load.fx, load.fy
+        if load.follows:
+            cos, sin = np.cos(moved[:, 2]), np.sin(moved[:, 2])
+            fx, fy = cos * load.fx - sin * load.fy, sin * load.fx + cos * load.fy
+        total = total + fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
+    line = network.elements.line[:, 1]
+    if line.any():
+        rest = partials(network, np.zeros((1, network.size)), np.zeros(1))["line"]
+        moved = rest[:, :, 0] - partials(network, at.z, at.drive)["line"][:, :, 0]
+        total = total + (moved * line).sum(axis=(1, 2)) * scales.moment / scales.drive
+    return total + np.zeros(len(at.z))
+
+
+def strain_energy(at: Equilibria) -> Any:
+    """Return the strain energy of beams and springs, (p,), dimensionless."""
+    e, fields = at.network.elements, energy.fields(at.network, at.z, at.drive)
+    density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
+    total = (e.weight * density).sum(axis=(1, 2)) / 2
+    for spring in at.network.springs:
+        term = TERMS[type(spring.item)]
+        total = total + np.array(
+            [term(at.network, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
+        )
+    return total

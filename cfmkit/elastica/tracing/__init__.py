@@ -1,0 +1,1 @@
+"""Tracing a network on its functional: start, path, accuracy, imperfection."""

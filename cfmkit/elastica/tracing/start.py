@@ -1,0 +1,140 @@
+"""The equilibrium that a drive begins at: at rest, or under what is constant, which is applied by shares of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.discretise import without_floor
+from cfmkit.elastica.mechanics.problem import NetworkProblem
+from cfmkit.elastica.outcome.path import Event
+from cfmkit.elastica.tracing.imperfection import Buckling
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.follow import follow
+from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.drive import Control
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
+
+FIRST_SHARE = 0.5  # of what is constant, in the first step
+LOOSEST_CORRECTION, CORRECTION_SHARE = 1e-10, 1e-6
+"""Next correction at which a march accepts an equilibrium: at most, and as a share of the path's tolerance."""
+FREE = "free_length", "free_angle", "free_displacement"
+FLOOR_SHARE = 0.01
+"""Part of the flexibility along a straight beam that its floor may bear: where it bears less, it is taken away."""
+FLOOR_STRAIN = 1e-7  # of a beam that does not stretch, from which on the drive stretches it
+
+
+class DriveStart(NamedTuple):
+    """Where a path begins."""
+
+    problem: NetworkProblem  # along the drive
+    at: PathEquilibrium | None  # None: nothing to begin at
+    events: tuple[Event, ...]  # on the way; drives are shares of what is applied
+    branch: PathBranch | None  # on which that is
+    first: Buckling | None  # on the way
+    stopped: tuple[str, PathStop] | None  # what could not be applied, and how the way to it ended
+
+
+def find_start(network: Discretisation, control: Control) -> DriveStart:
+    """Return the equilibrium under what is constant, on a stable branch if there is one.
+
+    Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
+    applied: of several stable states it is the one to which this way leads.
+    """
+    problem = NetworkProblem(network, next_correction=min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance))
+    events: list[Event] = []
+    branch: PathBranch | None = None
+    first: Buckling | None = None
+    at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
+    if at is None:
+        return DriveStart(problem, None, (), None, None, None)
+    for what, ramp in _ramps(network):
+        options = Options(
+            1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
+        )
+        begin = correct(ramp, at.x, 0.0)
+        if begin is None:
+            return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
+        for item in follow(ramp, begin, np.ones(1), options, branch):
+            if isinstance(item, PathEvent):
+                events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
+                if first is None and item.modes is not None:
+                    first = Buckling(ramp, item, what)
+            elif isinstance(item, Point):
+                at, branch = item.at, item.branch
+            elif item.end is not WhyStopped.COMPLETE:
+                return DriveStart(problem, None, tuple(events), branch, first, (what, item))
+        if branch is not None and not branch.label:
+            branch = branch._replace(label=what)
+    # just at a bifurcation Newton's method fails where the way there has led
+    at = correct(problem, at.x, 0.0) or replace(at, drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
+    return DriveStart(*_remove_floors(problem, at), tuple(events), branch, first, None)
+
+
+def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
+    """Yield what is constant, in the order in which it is applied, with the problem along the share of it."""
+    springs = [spring.item for spring in network.springs]
+    tight = any(getattr(item, name, None) for item in springs for name in FREE)
+    if tight or network.elements.gap.any():
+        yield "prestress", NetworkProblem(_without_loads(network), ramp=True)
+    if any(not load.grows for load in network.loads) or network.elements.line[:, 0].any() or network.base.any():
+        yield "constant loads", NetworkProblem(_loads_as_drive(network))
+
+
+def _without_loads(network: Discretisation) -> Discretisation:
+    """Return the network with its supports at rest and no loads."""
+    elements = network.elements._replace(line=np.zeros_like(network.elements.line))
+    return replace(network, loads=(), elements=elements, base=np.zeros(network.size), rate=np.zeros(network.size))
+
+
+def _loads_as_drive(network: Discretisation) -> Discretisation:
+    """Return the network with constant loads and displacements of supports as what grows with the drive."""
+    line = network.elements.line
+    grown = np.stack([np.zeros_like(line[:, 0]), line[:, 0]], axis=1)
+    loads = tuple(load._replace(grows=True) for load in network.loads if not load.grows)
+    return replace(
+        network, loads=loads, elements=network.elements._replace(line=grown), scales=network.scales._replace(drive=1.0),
+        rate=network.base, base=np.zeros(network.size),
+    )  # fmt: skip
+
+
+def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[NetworkProblem, PathEquilibrium]:
+    """Return the problem without the floors of flexibility that bear nothing, and its equilibrium.
+
+    Left in, nearly rigid networks of thin straight beams have errors of 1e-5 and more.
+    """
+    network = problem.network
+    elements = np.flatnonzero(network.floored)
+    if not elements.size:
+        return problem, at
+    slot = np.full(network.size, -1)
+    slot[network.free] = np.arange(len(network.free))
+    rows = slot[network.elements.unknowns[elements, -2:]]
+    unit = np.zeros((len(network.free), rows.size))
+    unit[rows.ravel(), np.arange(rows.size)] = 1.0
+    inverse = problem.linearise(at.x, at.drive).solve(unit)
+    if inverse is None:
+        return problem, at
+    share = np.abs(inverse[rows.ravel(), np.arange(rows.size)]).reshape(rows.shape).max(axis=1)
+    share *= network.elements.axial[elements].max(axis=1) * network.elements.length[elements]
+    needless = elements[share < FLOOR_SHARE]
+    if not needless.size:
+        return problem, at
+    stiff = replace(problem, network=without_floor(network, needless))
+    return stiff, correct(stiff, at.x, at.drive) or at
+
+
+def is_stretched(network: Discretisation, z: np.ndarray) -> bool:
+    """Return True if a beam that does not stretch was stretched through its floor at any of k states, (k, size)."""
+    elements = np.flatnonzero(network.floored)
+    if not elements.size or not len(z):
+        return False
+    force = np.abs(z[:, network.elements.unknowns[elements][:, -2:]]).max(axis=(0, 2))
+    return bool((force * network.elements.axial[elements].max(axis=1) > FLOOR_STRAIN).any())

@@ -1,0 +1,145 @@
+"""A stretch followed by the arc length, where steps by the drive fail: until it leads again, or the path ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.continuation.arc import ArcMove, follow_arc, unit_tangent
+from cfmkit.numerics.continuation.branch_ends import find_joined_path
+from cfmkit.numerics.continuation.branches import find_beside
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.events import locate_fold
+from cfmkit.numerics.continuation.folds import pass_fold
+from cfmkit.numerics.continuation.path import PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from cfmkit.numerics.continuation.events import Located
+    from cfmkit.numerics.continuation.losses import Items
+
+LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
+TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
+FIRST_LENGTH = 0.02  # where no step before says better
+LENGTHS = 1e-6, 0.05  # shortest and longest first step
+STEADY_STEPS = 3  # in which the drive leads, until it does so again
+STEADY_SHARE = 2.0  # motion by the slope over that of the step, up to which the drive leads
+STEADY_STEP = 1e-3  # share of the range that such a step must bring
+LOCKED_STEPS, LOCKED_SHARE = 60, 0.03
+"""A drive that so many steps bring on by less than that share of the range is locked."""
+MAX_STEPS = 300
+FINEST_RETRY = 1e-4  # of the first step, where a fold is none
+
+
+def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
+    """Follow a path by its arc length from here; None if that leads nowhere."""
+    problem, options, begin = walk.problem, walk.options, walk.here
+    if not np.isfinite(begin.rate).all():
+        return None
+    along = np.append(begin.rate, 1.0) * walk.sense
+    moved = walk.moved(walk.before) if walk.before is not None else FIRST_LENGTH
+    length = float(np.clip(fineness * moved, *LENGTHS))
+    tangent = unit_tangent(problem, begin, along, options.span)
+    steady = 0
+    for count, move in enumerate(follow_arc(problem, begin, tangent, length, options), 1):
+        if move.folds:
+            fold = locate_fold(problem, move, options.span)
+            if fold is not None:
+                return (yield from _end_at_fold(walk, begin, move, *fold, fineness))
+        if move.new.unstable > move.old.unstable:  # a bifurcation: by the drive it is located
+            step = 0.5 * abs(move.new.drive - move.old.drive)
+            return walk.restart(move.old, step, same_piece=True) if count > 1 else None
+        passed = yield from _pass_targets(walk, move)
+        if passed is None:
+            return None
+        yield Point(move.new, -1, walk.branch)
+        sense, drive_step = walk.sense, abs(move.new.drive - move.old.drive)
+        walk = replace(passed.move(move.new), step=drive_step)
+        leads = largest_motion(problem, move.new.rate) * drive_step < STEADY_SHARE * largest_motion(
+            problem, move.new.x - move.old.x
+        )
+        steady = steady + 1 if leads else 0
+        if walk.done or (walk.targets[walk.number] - move.new.drive) * sense < 0:
+            return _natural(walk)
+        if steady >= STEADY_STEPS and count >= STEADY_STEPS and drive_step > STEADY_STEP * options.span:
+            return _natural(walk)
+        if count > LOCKED_STEPS and abs(move.new.drive - begin.drive) < LOCKED_SHARE * options.span:
+            return PathStop(
+                WhyStopped.LIMIT_POINT,
+                move.new.drive,
+                TOO_SHARP,
+            )
+        if count > MAX_STEPS:
+            return None
+    return None
+
+
+def _natural(walk: Walk) -> Walk:
+    return replace(walk, rejections=0)
+
+
+def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | None]:
+    """Yield the requested values within a step; return the walk with the next one, or None if one is not found."""
+    for number in walk.targets_up_to(move.new.drive):
+        goal = float(walk.targets[number])
+        share = (goal - move.old.drive) / (move.new.drive - move.old.drive)
+        at = correct(walk.problem, move.old.x + share * (move.new.x - move.old.x), goal)
+        if at is None:
+            return None
+        yield Point(at, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    return walk
+
+
+def _end_at_fold(
+    walk: Walk, begin: PathEquilibrium, move: ArcMove, fold: Located, after: int, fineness: float
+) -> Items:
+    """Go on where the drive turns back: at a limit point, or behind the end of a branch."""
+    joined, loses_one = find_joined_path(walk, fold, begin.unstable), after == begin.unstable + 1
+    if joined is None and loses_one and walk.options.through_folds:
+        return (yield from pass_fold(walk, move, fold, after))
+    if joined is None and loses_one:
+        return (yield from _stop_at_limit_point(walk, begin, fold))
+    if joined is None and fineness > FINEST_RETRY:  # the step came to another path, or a sharp corner lies in it
+        again = walk.restart(move.old, walk.step, same_piece=True)
+        return (yield from follow_by_arc(again, 0.1 * fineness))
+    for number in walk.targets_up_to(fold.drive):
+        goal = float(walk.targets[number])
+        beside = find_beside(walk.problem, fold.x, fold.drive, move.old, goal, begin.unstable)
+        yield Point(beside, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    if joined is None:
+        return PathStop(WhyStopped.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
+    beyond, event = joined
+    yield event
+    walk = replace(walk, branch=None)
+    if walk.done:
+        return walk
+    for number in walk.targets_up_to(beyond.drive):
+        goal = float(walk.targets[number])
+        guess = beyond.x + (goal - beyond.drive) * beyond.rate
+        at = correct(walk.problem, guess, goal) or PathEquilibrium(guess, goal, beyond.rate, beyond.unstable)
+        yield Point(at, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    yield Point(beyond, -1, walk.branch)
+    span = walk.options.span
+    return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))
+
+
+def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:
+    """Yield what is left before a limit point of the drive, where the path ends."""
+    problem, last, sense = walk.problem, fold.before, walk.sense
+    for number in walk.targets_up_to(fold.drive):
+        goal = float(walk.targets[number])
+        share = (goal - begin.drive) / (last.drive - begin.drive)
+        at = correct(problem, begin.x + share * (last.x - begin.x), goal) or correct(problem, last.x, goal)
+        if at is None or at.unstable > begin.unstable:
+            break
+        yield Point(at, number, walk.branch)
+    if (last.drive - begin.drive) * sense > 0:
+        yield Point(last, -1, walk.branch)
+    return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)

@@ -1,0 +1,179 @@
+"""The one location of events: a bisection for bifurcations, limit points and whatever has a sign."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.numerics.continuation.arc import step_along, unit_tangent
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.problem import Border, arc_weights, largest_motion
+from cfmkit.numerics.continuation.steps import hermite
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.arc import ArcMove
+    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+
+CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 1e-7
+"""Shares of the first values at which a location ends: beside a pitchfork rounding acts as an imperfection does."""
+MAX_SAMPLES = 40
+SAME_PATH_VALUE = 0.03  # share of the first values below which a sample comes on one path
+SAME_PATH_WIDTH = 5.0  # times its width by which the ends of a bracket may lie apart on one path
+HALVINGS = 40  # until only one direction changes its stability
+ONE_LOSS = 1e-4  # share of the way from the piece's begin below which several losses are one
+
+
+class Located(NamedTuple):
+    """Where a function of an equilibrium vanishes between two."""
+
+    x: FloatArray
+    drive: float
+    near: PathEquilibrium  # the nearest sample
+    before: PathEquilibrium  # on both sides
+    behind: PathEquilibrium
+    share: float  # of the way between the first two
+
+
+class _Sample(NamedTuple):
+    share: float
+    value: float
+    at: PathEquilibrium
+
+
+def locate(
+    problem: ContinuationProblem,
+    first: PathEquilibrium,
+    last: PathEquilibrium,
+    solve: Callable[[float], PathEquilibrium | None],
+    value: Callable[[PathEquilibrium], float],
+    close: float,
+) -> Located | None:
+    """Return where `value` vanishes between two equilibria, or None if they lie on two paths.
+
+    `solve` returns an equilibrium at a share of the way. By the Illinois variant of false position, then interpolation
+    through the three nearest samples. It is not one path if the value jumps, or if the sides of a narrow bracket stay
+    apart: imperfect corners beside an unstable branch look like a bifurcation else.
+    """
+    low, high = _Sample(0.0, value(first), first), _Sample(1.0, value(last), last)
+    if low.value * high.value > 0:
+        return None
+    samples = [low, high]
+    at_low, at_high, side = low.value, high.value, 0
+    goal = close * max(abs(at_low), abs(at_high))
+    for k in range(MAX_SAMPLES):
+        part = at_low / (at_low - at_high) if k % 5 < 4 else 0.5
+        share = low.share + (high.share - low.share) * part
+        middle = solve(share)
+        if middle is None:
+            share = 0.5 * (low.share + high.share)
+            middle = solve(share)
+        if middle is None:
+            break
+        sample = _Sample(share, value(middle), middle)
+        samples.append(sample)
+        if sample.value * low.value > 0:
+            low, at_low, at_high, side = sample, sample.value, (0.5 * at_high if side == 1 else at_high), 1
+        else:
+            high, at_high, at_low, side = sample, sample.value, (0.5 * at_low if side == -1 else at_low), -1
+        if abs(sample.value) < goal or high.share - low.share < 1e-12:
+            break
+    width = high.share - low.share
+    apart = largest_motion(problem, high.at.x - low.at.x)
+    if width < 0.2 and apart > SAME_PATH_WIDTH * width * largest_motion(problem, last.x - first.x) + 1e-5:
+        return None
+    return _interpolate(samples, low, high, SAME_PATH_VALUE * goal / close)
+
+
+def _interpolate(samples: list[_Sample], low: _Sample, high: _Sample, largest: float) -> Located | None:
+    """Return the place where the value vanishes by Lagrange's formula through the three smallest values."""
+    near = sorted(samples, key=lambda sample: abs(sample.value))[:3]
+    if abs(near[0].value) > largest:
+        return None
+    if len({sample.value for sample in near}) < 3:
+        near = near[:1]
+    weights = [
+        float(np.prod([other.value / (other.value - own.value) for other in near if other is not own])) for own in near
+    ]
+    x = np.array(weights) @ np.array([sample.at.x for sample in near])
+    drive = float(np.dot(weights, [sample.at.drive for sample in near]))
+    share = float(np.dot(weights, [sample.share for sample in near]))
+    return Located(x, drive, near[0].at, low.at, high.at, share)
+
+
+def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
+    """Return a function that vanishes where the number of unstable directions leaves that of an equilibrium."""
+
+    def value(at: PathEquilibrium) -> float:
+        size = abs(float(problem.modes(at, 1)[0][0]))
+        return size if at.unstable == reference.unstable else -size
+
+    return value
+
+
+def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
+    """Return the first change of stability between here and a new equilibrium on the same path."""
+    problem, here = walk.problem, walk.here
+    begin = walk.trail[0].drive
+    narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(here.drive - begin) + 1e-12 * walk.options.span)
+    for _ in range(HALVINGS):
+        if abs(new.unstable - here.unstable) <= 1 or abs(new.drive - here.drive) < narrowest:
+            break
+        drive = 0.5 * (here.drive + new.drive)
+        middle = correct(problem, hermite(here, new, drive), drive)
+        if middle is None:
+            break
+        here, new = (middle, new) if middle.unstable == walk.here.unstable else (here, middle)
+    return locate_stability_change(problem, here, new)
+
+
+def locate_stability_change(
+    problem: ContinuationProblem, first: PathEquilibrium, last: PathEquilibrium
+) -> Located | None:
+    """Return the change of stability between two equilibria at different drives."""
+
+    def solve(share: float) -> PathEquilibrium | None:
+        drive = first.drive + share * (last.drive - first.drive)
+        return correct(problem, hermite(first, last, drive), drive)
+
+    return locate(problem, first, last, solve, stability_value(problem, first), CLOSE_TO_BIFURCATION)
+
+
+def locate_stability_change_on_arc(problem: ContinuationProblem, move: ArcMove, span: float) -> Located | None:
+    """Return the change of stability within a step along the arc."""
+    first, last = np.append(move.old.x, move.old.drive), np.append(move.new.x, move.new.drive)
+    row = arc_weights(problem, span) * (last - first)
+    row /= np.linalg.norm(row)
+
+    def solve(share: float) -> PathEquilibrium | None:
+        place = first + share * (last - first)
+        return correct(problem, place[:-1], float(place[-1]), Border(row, float(row @ place)))
+
+    return locate(problem, move.old, move.new, solve, stability_value(problem, move.old), CLOSE_TO_BIFURCATION)
+
+
+def locate_fold(problem: ContinuationProblem, move: ArcMove, span: float) -> tuple[Located, int] | None:
+    """Return where the drive turns back within a step along the arc, and the unstable directions behind it.
+
+    At a limit point their number changes by one; at the end of a branch it does not. They are counted well behind the
+    fold: counts right beside it are noise.
+    """
+
+    def solve(share: float) -> PathEquilibrium | None:
+        step = step_along(problem, move.old, move.tangent_before, share * move.length, span)
+        return None if step is None else step.new
+
+    def value(at: PathEquilibrium) -> float:
+        if at is move.old:
+            return float(move.tangent_before[-1])
+        return float(unit_tangent(problem, at, move.tangent_before, span)[-1])
+
+    fold = locate(problem, move.old, move.new, solve, value, CLOSE_TO_FOLD)
+    if fold is None:
+        return None
+    past = solve(fold.share + 0.3 * (1 - fold.share))
+    return fold, move.new.unstable if past is None or past.unstable == move.old.unstable else past.unstable

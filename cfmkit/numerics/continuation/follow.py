@@ -1,0 +1,223 @@
+"""The iterator of a path: predict, correct, accept; one short loop that hands over to policies where a step fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.continuation.branch_ends import find_passed_end
+from cfmkit.numerics.continuation.by_arc import follow_by_arc
+from cfmkit.numerics.continuation.events import locate_loss
+from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
+from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.problem import largest_motion
+from cfmkit.numerics.continuation.steps import advance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.losses import Items
+    from cfmkit.numerics.continuation.path import MarchedSteps, Options, PathBranch
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+    from cfmkit.numerics.continuation.steps import Trial
+
+LANDING = 1.3  # steps by which a step may be stretched to land on a requested value
+GROWTH, GOOD_MISFIT = 1.6, 0.1  # of the step, after predictions that good
+SHRINK, POOR_MISFIT = 0.8, 0.25
+FORCE_MARGIN = 0.7  # of the allowed change of forces that a shortened step aims at
+ARC_AFTER = 7  # rejections, two each less one for an accepted step, above which the arc length leads
+ARC_ANYWAY = 24  # rejections above which it leads even where the slope is not steep
+STEEP = 0.5  # motion over the drive's range, by the slope
+MAX_REJECTIONS = 90
+FINEST_STEP = 1e-13  # share of the range
+SHORT_STEP = 1e-9  # share of the range: shorter steps count as rejections
+LOCKED = "the drive cannot go on at {place}: the structure locks, a force grows beyond all bounds"
+LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
+"""Force, in its unit, and step as a share of the range, from which on a structure is locked: pulled straight, say."""
+
+
+def follow(
+    problem: ContinuationProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None = None,
+) -> Iterator[Point | PathEvent | PathStop]:
+    """Yield the points and events of a path in order, and its ending at last.
+
+    Parameters
+    ----------
+    problem : ContinuationProblem
+        The structure. If it has a method `march`, of a `Walk`, to `MarchedSteps`, it takes steps by itself where
+        nothing happens, in compiled code, say.
+    start : PathEquilibrium
+        Where the path begins.
+    targets : (k,) array
+        Values of the drive to be reached in order; they may turn back.
+    options : Options
+        Range of the drive, branches, steps.
+    branch : PathBranch, optional
+        On which the path begins.
+
+    Yields
+    ------
+    Point, PathEvent or PathStop
+        Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
+    """
+    between = 0
+    for item in _items(problem, start, targets, options, branch):
+        yield item
+        between += isinstance(item, Point) and item.target < 0
+        if between > options.most_points:
+            yield PathStop(WhyStopped.FULL, item.at.drive, "more points than allowed at {place}")  # type: ignore[union-attr]
+            return
+
+
+def _items(
+    problem: ContinuationProblem,
+    start: PathEquilibrium,
+    targets: FloatArray,
+    options: Options,
+    branch: PathBranch | None,
+) -> Iterator[Point | PathEvent | PathStop]:
+    at_first = int(len(targets) > 0 and targets[0] == start.drive)
+    yield Point(start, at_first - 1, branch)
+    walk = Walk(
+        problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,), branch=branch
+    )
+    beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
+    if beyond is not None:
+        walk = beyond
+        yield Point(walk.here, -1, walk.branch)
+    elif start.unstable and options.branch != "primary" and not walk.done:
+        moved = None if options.branch == "stop" else start_unstable(walk)
+        if moved is None:
+            yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
+            return
+        walk = moved
+    march = getattr(problem, "march", None)
+    while not walk.done:
+        if march is not None and walk.rejections == 0:
+            walk = yield from _march(walk, march)
+            if walk.done:
+                break
+        outcome = yield from _step(walk)
+        if isinstance(outcome, PathStop):
+            yield outcome
+            return
+        assert outcome is not None
+        walk = outcome
+    yield PathStop(WhyStopped.COMPLETE, walk.here.drive)
+
+
+def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
+    """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
+    marched, number = march(walk), walk.number
+    for at, reached in marched.states:
+        yield Point(at, number if reached else -1, walk.branch)
+        number += reached
+    if marched.states:
+        passed = (walk.here, *(at for at, _ in marched.states))
+        trail = (*walk.trail, *passed[1:])
+        walk = replace(walk, before=passed[-2], here=passed[-1], trail=trail, number=number)
+    return replace(walk, step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
+
+
+def _step(walk: Walk) -> Items:
+    """Take one step by the drive, or whatever is done instead."""
+    here, sense = walk.here, walk.sense
+    if _is_locked(walk):
+        return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED)
+    if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
+        walk = replace(walk, before=None)
+    target = float(walk.targets[walk.number])
+    lands = abs(target - here.drive) <= LANDING * walk.step
+    goal = target if lands else here.drive + sense * walk.step
+    trial = advance(walk, goal)
+    if trial.excess > 1:
+        return _shorten_for_forces(walk, goal, trial.excess)
+    if trial.new is None or _skips(walk, trial.new):
+        return (yield from _reject(walk, goal))
+    walk = replace(walk, rejections=max(0, walk.rejections - 1))
+    if trial.new.unstable > here.unstable and walk.options.branch != "primary":
+        outcome = yield from lose_stability(walk, trial.new)
+        return outcome if outcome is not None else replace(walk.shorten(0.25 * abs(goal - here.drive)), before=None)
+    return (yield from _accept(walk, trial, goal, lands))
+
+
+def _is_locked(walk: Walk) -> bool:
+    if walk.step > LOCKED_STEP * walk.options.span:
+        return False
+    forces = (np.abs(walk.here.x) / walk.problem.unit)[~walk.problem.motions]
+    return bool(forces.max(initial=0.0) > LOCKED_FORCE)
+
+
+def _skips(walk: Walk, new: PathEquilibrium) -> bool:
+    """Return True if a long step has passed several bifurcations: they are passed one by one."""
+    passed = new.unstable - walk.here.unstable
+    several = abs(passed) > 1 if walk.options.branch == "primary" else passed > 1
+    return several and abs(new.drive - walk.here.drive) > walk.options.cluster * walk.options.span
+
+
+def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
+    """Yield a step's point and what has happened on it; return the walk there."""
+    here, new = walk.here, trial.new
+    assert new is not None
+    step = abs(goal - here.drive)
+    if new.unstable != here.unstable:
+        found = locate_loss(walk, new)
+        drive, near = (found.drive, found.near) if found else (new.drive, None)
+        lost = new.unstable - here.unstable
+        modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
+        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes)
+    elif walk.branch is not None:
+        end = find_passed_end(walk, new)
+        if end == "unsure":
+            return replace(walk.shorten(0.5 * step), before=None)
+        if end is not None:
+            yield end
+            walk = replace(walk, branch=None)
+            walk = replace(walk.move(new, int(lands)), before=None)
+            yield Point(new, walk.number - 1 if lands else -1, walk.branch)
+            return replace(walk, step=_next_step(walk, trial.misfit, step, lands))
+    yield Point(new, walk.number if lands else -1, walk.branch)
+    return replace(walk.move(new, int(lands)), step=_next_step(walk, trial.misfit, step, lands))
+
+
+def _next_step(walk: Walk, misfit: float, step: float, landed: bool) -> float:
+    if misfit < GOOD_MISFIT:
+        return min(walk.options.span, GROWTH * (walk.step if landed else max(walk.step, step)))
+    return SHRINK * step if misfit > POOR_MISFIT else walk.step
+
+
+def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
+    """Return the walk with a step that changes forces less: that is no rejection.
+
+    Counted as one it would send slender columns into the arc length at rest, over a sharp corner.
+    """
+    step = abs(goal - walk.here.drive) * max(FORCE_MARGIN / excess, 1e-4)
+    short = step < SHORT_STEP * walk.options.span
+    return replace(walk, step=step, before=None, rejections=walk.rejections + short)
+
+
+def _reject(walk: Walk, goal: float) -> Items:
+    """Go on after a step that failed: behind a bifurcation that is here, by a shorter step, by the arc length."""
+    options, here = walk.options, walk.here
+    if walk.rejections >= 2 and walk.searched is not here:
+        walk = replace(walk, searched=here)
+        outcome = yield from look_past(walk, goal)
+        if outcome is not None:
+            return outcome
+    walk = walk.shorten(0.5 * abs(goal - here.drive))
+    if walk.rejections > ARC_AFTER:
+        steep = largest_motion(walk.problem, here.rate) * options.span > STEEP
+        if steep or walk.rejections > ARC_ANYWAY:
+            outcome = yield from follow_by_arc(walk)
+            if outcome is not None:
+                return outcome
+    if walk.step < FINEST_STEP * options.span or walk.rejections > MAX_REJECTIONS:
+        return PathStop(WhyStopped.LOST, here.drive, "no step converged at {place}")
+    return walk

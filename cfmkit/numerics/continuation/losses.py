@@ -1,0 +1,192 @@
+"""What is done where a path loses its stability: locate it, say so, and go on along a stable branch if there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.continuation.arc import step_along
+from cfmkit.numerics.continuation.branches import (
+    AMPLITUDES,
+    LAST_AMPLITUDES,
+    descend,
+    enter_branch,
+    find_beside,
+    opens_at,
+)
+from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.events import locate_loss
+from cfmkit.numerics.continuation.path import PathBranch, PathEvent, PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.problem import PathEquilibrium, arc_weights, largest_motion
+from cfmkit.numerics.continuation.steps import advance
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.events import Located
+
+Items = Generator[Point | PathEvent, None, Walk | PathStop | None]
+"""What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
+
+FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
+NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
+"""Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
+NEAR_SHARE = 1e-3  # of the way to the first of them: the other modes of a slender column are not together with it
+ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
+LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
+LOOK_PAST_BY = 2e-3, 2e-2
+"""Shares of the range ahead of here and of the goal at which the path may be less stable."""
+LOOK_PAST_MISS = 0.02  # motion
+CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
+FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
+FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
+
+
+def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
+    """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
+    problem, options, here = walk.problem, walk.options, walk.here
+    found = locate_loss(walk, new)
+    if found is None:
+        return None
+    far = next(
+        (
+            e
+            for e in reversed(walk.trail)
+            if abs(e.drive - found.drive) > FARTHER_BACK * abs(found.drive - walk.trail[0].drive)
+        ),
+        here,
+    )
+    slope = (found.x - far.x) / (found.drive - far.drive) if found.drive != far.drive else here.rate
+    modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
+    if options.branch == "primary":
+        modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
+        yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
+        walk = yield from _reach_bifurcation(walk, found, far, slope)
+        return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
+    if options.branch == "stop":
+        yield from _reach_bifurcation(walk, found, far, slope)
+        yield Point(new, -1, walk.branch)
+        return PathStop(WhyStopped.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
+    onto, mode = None, problem.orient(modes)
+    for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
+        several = _pass_together(walk, new, found, slope, clusters)
+        if several is not None:
+            onto, modes, after = several
+        onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
+        if onto is not None:
+            break
+    yield PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes)
+    walk = yield from _reach_bifurcation(walk, found, far, slope)
+    if onto is None and options.through_folds:
+        return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
+    if onto is None:
+        return PathStop(
+            WhyStopped.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
+        )
+    return (yield from _begin_branch(walk, found, onto, after))
+
+
+def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium | None:
+    """Return the last equilibrium of this piece that is farther than a distance from a drive."""
+    return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
+
+
+def _pass_together(
+    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
+) -> tuple[PathEquilibrium, FloatArray, int] | None:
+    """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
+    problem, here = walk.problem, walk.here
+    for factor in clusters:
+        width = factor * walk.options.cluster
+        ahead = walk.sense * width * walk.options.span
+        if clusters is NEAR_CLUSTERS:
+            ahead *= min(1.0, NEAR_SHARE * abs(found.drive - walk.trail[0].drive) / abs(ahead))
+        saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
+        if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
+            continue
+        onto = descend(problem, saddle, walk.options.sign)
+        if onto is None or onto.unstable > here.unstable or not opens_at(problem, found.x, found.drive, onto):
+            continue
+        return onto, problem.modes(found.near, saddle.unstable - here.unstable)[1], saddle.unstable
+    return None
+
+
+def _reach_bifurcation(
+    walk: Walk, found: Located, far: PathEquilibrium, slope: FloatArray
+) -> Generator[Point, None, Walk]:
+    """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
+    problem, unstable = walk.problem, walk.here.unstable
+    for number in walk.targets_up_to(found.drive):
+        goal = float(walk.targets[number])
+        guess = found.x + (goal - found.drive) * slope
+        at = advance(walk, goal).new
+        if at is None or at.unstable > unstable:
+            at = correct(problem, guess, goal)
+        if at is None or at.unstable > unstable or largest_motion(problem, at.x - guess) > ON_PATH:
+            at = PathEquilibrium(guess, goal, far.rate, unstable)  # at the singular point itself
+        yield Point(at, number, walk.branch)
+        walk = replace(walk, number=number + 1)
+    return walk
+
+
+def _begin_branch(walk: Walk, found: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
+    """Yield the first points of a branch; return the walk on it."""
+    branch = PathBranch(found.drive, walk.options.sign)
+    for number in walk.targets_up_to(onto.drive) if not walk.done else ():
+        goal = float(walk.targets[number])
+        yield Point(find_beside(walk.problem, found.x, found.drive, onto, goal, walk.here.unstable), number, branch)
+        walk = replace(walk, number=number + 1)
+    yield Point(onto, -1, branch)
+    modes = after - walk.here.unstable
+    walk = walk.restart(onto, 0.5 * abs(onto.drive - found.drive))
+    return replace(walk, branch=branch, modes=modes)
+
+
+def look_past(walk: Walk, goal: float) -> Items:
+    """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
+    problem, span, here = walk.problem, walk.options.span, walk.here
+    far, primary = (
+        _well_before(walk, here.drive, LOOK_PAST_FROM * span) or walk.trail[0],
+        walk.options.branch == "primary",
+    )
+    for share in LOOK_PAST_BY:
+        for origin in (here.drive, goal):
+            drive = origin + walk.sense * share * span
+            guess = far.x + (drive - far.drive) * far.rate
+            past = correct(problem, guess, drive)
+            if (
+                past is not None
+                and (past.unstable > here.unstable or (primary and past.unstable != here.unstable))
+                and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
+            ):
+                return (yield from lose_stability(replace(walk, here=far), past))
+    return None
+
+
+def start_critical(walk: Walk) -> Walk | None:
+    """Return the walk a little behind a start at which a mode is just critical, or None if none is.
+
+    Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
+    """
+    problem, start = walk.problem, walk.here
+    values, modes = problem.modes(start, 1)
+    if abs(values[0]) > CRITICAL:
+        return None
+    tangent = np.append(problem.orient(modes), 0.0)
+    tangent /= np.sqrt(arc_weights(problem, walk.options.span) @ tangent**2)
+    for halvings in range(MAX_HALVINGS):
+        for sign in (walk.options.sign, -walk.options.sign):
+            step = step_along(problem, start, sign * tangent, FIRST_AMPLITUDE * 0.5**halvings, walk.options.span)
+            if step is None or step.new.unstable or (step.new.drive - start.drive) * walk.sense <= 0:
+                continue
+            if not walk.targets_up_to(step.new.drive):
+                return walk.restart(step.new, abs(step.new.drive - start.drive))
+    return None
+
+
+def start_unstable(walk: Walk) -> Walk | None:
+    """Return the walk at a stable equilibrium below an unstable start, or None."""
+    onto = descend(walk.problem, walk.here, walk.options.sign)
+    return None if onto is None else walk.restart(onto, FIRST_STEP_BELOW * walk.options.span)

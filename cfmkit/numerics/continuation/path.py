@@ -1,0 +1,141 @@
+"""What a path consists of: points, events and an ending; and where its follower stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from cfmkit.numerics.continuation.problem import largest_motion
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
+
+
+class PathBranch(NamedTuple):
+    """The branch that a path has been on since a bifurcation."""
+
+    drive: float  # at the bifurcation
+    sign: int
+    label: str = ""  # of what is followed, if it is not the drive of the path proper
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a path is followed."""
+
+    span: float  # range of the drive
+    branch: Literal["stable", "primary", "stop"] = "stable"
+    sign: int = 1  # of two mirror-image branches
+    through_folds: bool = False
+    largest_motion: float = 0.35  # in one step
+    largest_force: float = 8.0  # change of a force in one step, in its unit, besides half of what it was
+    first_step: float = 0.05  # share of the range
+    most_points: int = 2000
+    cluster: float = 1e-3  # share of the range within which bifurcations may be one
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium of a path."""
+
+    at: PathEquilibrium
+    target: int = -1  # number of the requested value that it is at
+    branch: PathBranch | None = None  # None: the path from rest, not left so far
+
+
+@dataclass(frozen=True, eq=False)
+class PathEvent:
+    """A bifurcation or limit point; unstable directions before and after it on the path that it lies on."""
+
+    kind: Literal["bifurcation", "limit point"]
+    drive: float
+    before: int
+    after: int
+    near: PathEquilibrium | None = None
+    modes: Any = None  # (n, k) critical ones, if they were computed
+
+
+class WhyStopped(Enum):
+    """How a path ends."""
+
+    COMPLETE = "all requested values were reached"
+    LIMIT_POINT = "the drive cannot go further"
+    JUMPS = "stability is lost and no stable equilibrium is near"
+    LOST = "no step converged"
+    OUTSIDE = "the path left the range of the drive"
+    FULL = "more points than allowed"
+
+
+@dataclass(frozen=True)
+class PathStop:
+    """The last item of a path."""
+
+    end: WhyStopped
+    drive: float
+    message: str = ""  # why, with {place} for the drive there
+
+
+class MarchedSteps(NamedTuple):
+    """Equilibria that a problem's own steps came to, by the same rules as `steps.advance`."""
+
+    states: tuple[tuple[PathEquilibrium, bool], ...]  # with whether the next requested value is reached
+    step: float  # with which to go on
+    stuck: bool  # whether steps failed, and not because something happens
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Where the follower stands: the last equilibria of one smooth piece, the next step and value."""
+
+    problem: ContinuationProblem
+    options: Options
+    targets: FloatArray
+    here: PathEquilibrium
+    step: float
+    number: int = 0  # of the next requested value
+    before: PathEquilibrium | None = None  # on the same smooth piece, for the predictor
+    trail: tuple[PathEquilibrium, ...] = ()  # this smooth piece
+    branch: PathBranch | None = None
+    modes: int = 1  # critical where this branch began
+    rejections: int = 0  # two for each, less one for each accepted step
+    searched: PathEquilibrium | None = None  # from where it was looked for a bifurcation ahead
+
+    @property
+    def sense(self) -> float:
+        """Sign of the way to the next requested value."""
+        return 1.0 if self.targets[self.number] >= self.here.drive else -1.0
+
+    @property
+    def done(self) -> bool:
+        """Whether all requested values are reached."""
+        return self.number >= len(self.targets)
+
+    def move(self, new: PathEquilibrium, reached: int = 0) -> Walk:
+        """Return the walk one equilibrium further on the same smooth piece."""
+        trail = (*self.trail, new)
+        return replace(self, before=self.here, here=new, trail=trail, number=self.number + reached)
+
+    def restart(self, new: PathEquilibrium, step: float, same_piece: bool = False) -> Walk:
+        """Return the walk at an equilibrium from which the slope alone predicts."""
+        trail = (*self.trail, new) if same_piece else (new,)
+        return replace(self, before=None, here=new, step=step, trail=trail, rejections=0)
+
+    def shorten(self, step: float, penalty: int = 2) -> Walk:
+        """Return the walk with a shorter step after a rejected one."""
+        keep = self.before is not None and step >= 0.25 * abs(self.here.drive - self.before.drive)
+        return replace(self, step=step, before=self.before if keep else None, rejections=self.rejections + penalty)
+
+    def targets_up_to(self, drive: float) -> range:
+        """Return the numbers of the next requested values up to a drive, as far as they go one way."""
+        sense, end = self.sense, self.number
+        while end < len(self.targets) and (drive - self.targets[end]) * sense >= 0:
+            if end > self.number and (self.targets[end] - self.targets[end - 1]) * sense <= 0:
+                break
+            end += 1
+        return range(self.number, end)
+
+    def moved(self, new: PathEquilibrium) -> float:
+        """Return the largest motion between here and another equilibrium."""
+        return largest_motion(self.problem, new.x - self.here.x)

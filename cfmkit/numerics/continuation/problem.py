@@ -1,0 +1,96 @@
+"""The protocol of a structure whose equilibria are followed, and an equilibrium of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+
+FORCE_WEIGHT = 1e-4  # of the square of a force, in its unit, in the arc length; a motion has 1
+
+
+class LinearisedProblem(Protocol):
+    """Residual, tangent and inertia at one place, for n unknowns."""
+
+    @property
+    def residual(self) -> FloatArray:
+        """Forces out of balance, (n,)."""
+
+    @property
+    def rate(self) -> FloatArray:
+        """Derivative of the residual by the drive, (n,)."""
+
+    @property
+    def unstable(self) -> int:
+        """Number of directions in which the structure is unstable while the drive is held."""
+
+    def solve(self, right: FloatArray) -> FloatArray | None:
+        """Return the tangent's inverse times columns (n, k), or None if it is singular."""
+
+
+class ContinuationProblem(Protocol):
+    """A structure with n unknowns: motions, which are of size one, and forces.
+
+    A mode is a direction in which the structure gives way, a column of n.
+    """
+
+    @property
+    def unit(self) -> FloatArray:
+        """Natural sizes of the unknowns, (n,): 1 for motions."""
+
+    @property
+    def motions(self) -> Any:
+        """Which unknowns are motions, (n,) of bool."""
+
+    def linearise(self, x: FloatArray, drive: float) -> LinearisedProblem:
+        """Return residual and tangent at any place."""
+
+    def modes(self, at: PathEquilibrium, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return the eigenvalues nearest to zero, nearest first, and their modes, (k,) and (n, k)."""
+
+    def orient(self, modes: FloatArray) -> FloatArray:
+        """Return one combination of modes, with the same side whatever spans them."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathEquilibrium:
+    """A converged place on a path."""
+
+    x: FloatArray  # (n,)
+    drive: float
+    rate: FloatArray  # (n,) dx/d(drive)
+    unstable: int
+    effort: float = math.nan  # what works with the drive, if the problem says so
+
+
+class Border(NamedTuple):
+    """A linear condition in place of a held drive: row . (x, drive) = level."""
+
+    row: FloatArray  # (n + 1,)
+    level: float
+
+
+def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
+    """Return the weights of the squares of (x, drive) in the arc length, (n + 1,)."""
+    return np.append(np.where(problem.motions, 1.0, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)
+
+
+def largest_motion(problem: ContinuationProblem, x: FloatArray) -> float:
+    """Return the largest size of a motion."""
+    return float(np.abs(x[problem.motions]).max(initial=0.0))
+
+
+def keep_motions(problem: ContinuationProblem, x: FloatArray) -> FloatArray:
+    """Return x with its forces zero."""
+    return np.where(problem.motions, x, 0.0)
+
+
+def force_change(problem: ContinuationProblem, old: FloatArray, new: FloatArray, largest: float, share: float) -> float:
+    """Return the largest change of a force over what a step may change: `largest` units and a share of the force."""
+    allowed = largest * problem.unit + share * np.abs(old)
+    return float((np.abs(new - old) / allowed)[~problem.motions].max(initial=0.0))

@@ -1,0 +1,20 @@
+"""Paths of the functional at the requested points, as far as a path simply goes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from equilibria import equilibria
+
+from cfmkit.elastica.outcome.path import PathStatus
+from cfmkit.elastica.results.path import EquilibriumPath
+
+
+def functional_path(net: Any, drive: Any, degree: int = 18, pieces: int = 1) -> EquilibriumPath:
+    """Return the path of a network at the points of a drive."""
+    at, _ = equilibria(net, drive, degree, pieces)
+    count = len(at.z)
+    numbers, stable = np.arange(count), np.zeros(count, int)
+    branch, accurate = np.array(["primary"] * count), np.ones(count, bool)
+    return EquilibriumPath(net, drive, at, stable, numbers, branch, PathStatus.COMPLETE, "", (), 0.0, accurate)

@@ -1,0 +1,291 @@
+"""Compiled equations beside those in numpy: the same gradients, Hessians, inertia and paths; numpy if not compiled."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import beam_networks
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    PointLoad,
+    Polynomial,
+    Rotation,
+    Section,
+    SlideSpring,
+    Taper,
+    arc,
+    guided,
+)
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.designs import NetworkDesigns, set_up
+from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchCode, MarchPlan, NumpyEquations, begin
+from cfmkit.elastica.mechanics.march import SWITCH, CompiledEquations, compiled, engine, equations, march_many
+from cfmkit.families.beam.network_from_spec import assemble
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted(path.name for path in (ROOT / "configs").glob("beam_*.yaml") if "design" not in path.name)
+needs_c = pytest.mark.skipif(compiled() is None, reason="the compiled module was not built")
+
+
+def random_state(network: Discretisation, seed: int) -> Any:
+    return 0.1 * np.random.default_rng(seed).standard_normal(network.size)
+
+
+def difference(found: Any, right: Any) -> float:
+    return float(np.abs(found - right).max() / np.abs(right).max())
+
+
+def assert_same_functional(network: Discretisation, z: Any) -> None:
+    own = equations(network)
+    assert isinstance(own, CompiledEquations)
+    gradient, hessian = own.evaluate(z, 0.3, 0.7)
+    assert difference(gradient, energy.gradient(network, z, 0.3, 0.7)) < 1e-12
+    assert difference(hessian, energy.hessian(network, z, 0.3, 0.7)) < 1e-12
+
+
+@needs_c
+@pytest.mark.parametrize("seed", range(0, 50, 10))
+def test_gradients_and_hessians_of_c_and_numpy_are_equal_on_200_random_networks(seed: int) -> None:
+    for number in range(seed, seed + 10):
+        net = beam_networks.network(number, follower=number % 2 == 0)
+        for drive in beam_networks.drives(net, number):
+            network = discretise(net, drive, 3 + number % 7)
+            assert_same_functional(network, random_state(network, number))
+
+
+@needs_c
+@pytest.mark.parametrize("name", CONFIGS)
+def test_gradients_and_hessians_of_c_and_numpy_are_equal_on_the_shipped_configs(name: str) -> None:
+    assembly = assemble(cfmkit.load(ROOT / "configs" / name))
+    network = discretise(assembly.network, assembly.drive())
+    assert_same_functional(network, random_state(network, 1))
+
+
+@needs_c
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("ramp", [False, True])
+def test_linearised_equations_are_equal_and_exact(seed: int, ramp: bool) -> None:
+    net = beam_networks.network(seed, follower=seed % 2 == 0)
+    for drive in beam_networks.drives(net, seed):
+        network = discretise(net, drive, 5)
+        own, right = equations(network, ramp), NumpyEquations(network, ramp)
+        free = random_state(network, seed)[network.free]
+        found, known = own.linearise(free, 0.4), right.linearise(free, 0.4)
+        for ours, theirs in zip(found, known, strict=True):
+            assert difference(ours, theirs) < 1e-12
+        stepped = right.gradient(free, 0.4 + 1j * COMPLEX_STEP)[network.free].imag / COMPLEX_STEP
+        assert difference(found.change, stepped) < 1e-12
+
+
+@needs_c
+@pytest.mark.parametrize("seed", range(0, 24, 6))
+def test_factors_count_what_dense_eigenvalues_count(seed: int) -> None:
+    """At poses far from equilibrium, where up to some tens of directions are unstable."""
+    counts = set()
+    for number in range(seed, seed + 6):
+        net = beam_networks.network(number, follower=False)
+        for drive in beam_networks.drives(net, number)[:3]:
+            network = discretise(net, drive, 6, pieces=1 + number % 3)
+            own, free = equations(network), random_state(network, number)[network.free]
+            free[np.isfinite(own.unit)] *= 2000  # section forces under which elements buckle
+            right = np.random.default_rng(number).standard_normal((2, own.n))
+            tangent = own.linearise(free, 0.2).tangent
+            found, unstable = own.resolve(free, 0.2, right)
+            negative = int((np.linalg.eigvalsh(tangent) < 0).sum())
+            assert unstable == negative - 2 * len(network.elements.length)
+            assert np.abs(found @ tangent - right).max() < 1e-9 * (1 + np.abs(found).max() * np.abs(tangent).max())
+            counts.add(unstable)
+    assert len(counts) > 2
+
+
+def coil(turns: float, degree: int) -> Discretisation:
+    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-4), arc(2 * np.pi * turns))
+    net = Network({"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}, {"coil": beam})
+    return discretise(net, Rotation("b", np.array([1.0])), degree)
+
+
+@needs_c
+def test_a_coil_of_twenty_turns_is_factored_with_its_inertia() -> None:
+    network = coil(20.25, 10)
+    assert len(network.free) > 450
+    own, free = equations(network), random_state(network, 2)[network.free]
+    tangent = own.linearise(free, 0.5).tangent
+    right = np.random.default_rng(1).standard_normal((1, own.n))
+    found, unstable = own.resolve(free, 0.5, right)
+    assert unstable == int((np.linalg.eigvalsh(tangent) < 0).sum()) - 2 * len(network.elements.length)
+    assert np.abs(found @ tangent - right).max() < 1e-9 * np.abs(found).max() * np.abs(tangent).max()
+
+
+@needs_c
+def test_an_element_that_buckles_between_its_ends_waits_for_its_neighbours() -> None:
+    """At the load at which the element alone is singular its unknowns cannot be eliminated first."""
+    stiff = Section(2e9, 1e-2, 1e-3, axial=False)
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, guided(0.0))}, {"x": Beam("a", "b", stiff)})
+    rigidity = 2e9 * 1e-2 * 1e-9 / 12
+    network = discretise(net, Loading((PointLoad("b", fx=-1.0),), np.array([1.0])), 8, pieces=4)
+    alone = 4 * np.pi**2 * rigidity / 0.025**2
+    for factor in (0.999999, 1.0, 1.000001):
+        own = equations(network)
+        state = own.solve(np.zeros(own.n), factor * alone)
+        assert state is not None
+        tangent = own.linearise(state.free, state.way).tangent
+        assert state.unstable == int((np.linalg.eigvalsh(tangent) < 0).sum()) - 2 * 4
+
+
+def test_factors_under_following_loads_solve_and_count_real_eigenvalues() -> None:
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
+    network = discretise(net, Loading((PointLoad("b", fx=-1.0, follows=True),), np.array([30.0])), 8, pieces=2)
+    own = equations(network)
+    free = 2 * random_state(network, 1)[network.free]
+    tangent = own.linearise(free, 30.0).tangent
+    assert np.abs(tangent - tangent.T).max() > 1e-3
+    right = np.random.default_rng(1).standard_normal((2, own.n))
+    found, unstable = own.resolve(free, 30.0, right)
+    assert found @ tangent.T == pytest.approx(right, abs=1e-9)
+    moves = np.flatnonzero(network.free < network.n_motions)
+    forces = np.setdiff1d(np.arange(own.n), moves)
+    ff = np.linalg.solve(tangent[np.ix_(forces, forces)], tangent[np.ix_(forces, moves)])
+    stiffness = tangent[np.ix_(moves, moves)] - tangent[np.ix_(moves, forces)] @ ff
+    eigenvalues = np.linalg.eigvals(stiffness)
+    assert unstable == int((eigenvalues[np.abs(eigenvalues.imag) < 1e-9 * np.abs(eigenvalues)].real < 0).sum())
+
+
+@needs_c
+@pytest.mark.parametrize(("seed", "number"), [(1, 0), (3, 2), (4, 1), (5, 3)])
+def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
+    """Constant loads first, then the drive; the last one with a load that follows."""
+    net = beam_networks.network(seed, follower=False)
+    network = discretise(net, beam_networks.drives(net, seed)[number], 6)
+    ends = []
+    for kind in (equations, NumpyEquations):
+        ramp, own = kind(network, True), kind(network)
+        loaded = ramp.march(begin(ramp), np.array([1.0]), MarchPlan(0.5, 1.0)).states[-1]
+        start, goals = begin(own, loaded.free), beam_networks.drives(net, seed)[number].points / network.scales.drive
+        ends.append(own.march(start, goals, MarchPlan(0.3 * abs(goals[0]), abs(goals[-1]), on_branch=True)))
+    one, other = ends
+    assert one.code is other.code is MarchCode.DONE
+    assert len(one.states) == len(other.states)
+    assert one.step == pytest.approx(other.step)
+    for mine, its in zip(one.states, other.states, strict=True):
+        assert (mine.target, mine.unstable) == (its.target, its.unstable)
+        assert mine.free == pytest.approx(its.free, rel=1e-8, abs=1e-8)
+        assert mine.effort == pytest.approx(its.effort, rel=1e-8, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", [equations, NumpyEquations])
+def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
+    net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})
+    own = kind(discretise(net, Loading((PointLoad("b", fy=1.0),), np.array([1.0])), 8))
+    border = np.zeros(own.n + 1)
+    border[np.flatnonzero(own.network.free == own.network.bodies["b"][2])] = 1.0
+    state = own.solve(np.zeros(own.n), 0.0, border, 0.8)
+    assert state.free @ border[:-1] == pytest.approx(0.8, rel=1e-9)
+    again = own.solve(state.free, state.way)
+    assert again.free == pytest.approx(state.free, rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize("kind", [equations, NumpyEquations])
+def test_a_march_stops_before_a_step_that_is_less_stable(kind: Any) -> None:
+    net = Network(
+        {"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0, guided(0.0))}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))}
+    )
+    critical = 4 * np.pi**2 * 1e-6 / 12 / 0.1  # shortening of a column, both ends clamped, axial strain (t/L)^2 pi^2/3
+    own = kind(discretise(net, Displacement("b", np.pi, np.array([1.2 * critical])), 8))
+    march = own.march(begin(own), np.array([1.2 * critical]) / 0.1, MarchPlan(0.01 * critical / 0.1, critical / 0.1))
+    assert march.code is MarchCode.STABILITY_CHANGES
+    assert 0.5 * critical < march.states[-1].way * 0.1 < critical
+
+
+TARGETS = np.linspace(0, 5e-3, 11)[1:]
+
+
+def leaf(thickness: float, taper: bool = False) -> tuple[Network, Displacement]:
+    thick = Taper(np.array([0.0, 1.0]), thickness * np.array([1.0, 0.8])) if taper else thickness
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.08, 0.03, guided(0.0, rotates=False))}
+    net = Network(nodes, {"x": Beam("a", "b", Section(2e9, 1e-2, thick), Polynomial((0.0, 1.0, -0.8)))})
+    return net, Displacement("b", np.pi, TARGETS)
+
+
+def leaves(count: int, taper: bool = False) -> NetworkDesigns:
+    pairs = [leaf(thickness, taper) for thickness in np.linspace(0.5e-3, 1e-3, count)]
+    return set_up(discretise(*pairs[0], 8), pairs[0], pairs)
+
+
+@pytest.mark.parametrize("taper", [False, True])
+def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
+    """Of beams that are set up together, and one by one."""
+    efforts, codes = march_many(leaves(4, taper), TARGETS)
+    assert (codes == MarchCode.DONE).all()
+    for thickness, row in zip(np.linspace(0.5e-3, 1e-3, 4), efforts, strict=True):
+        own = NumpyEquations(discretise(*leaf(thickness, taper), 8))
+        goals = TARGETS / own.network.scales.drive
+        march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
+        known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
+        assert row == pytest.approx(known, rel=1e-7)
+
+
+def test_designs_of_a_batch_may_differ_in_their_springs() -> None:
+    net, drive = leaf(1e-3)
+    pairs = [(replace(net, springs=(SlideSpring("b", 0.0, stiffness),)), drive) for stiffness in (10.0, 500.0)]
+    efforts, _ = march_many(set_up(discretise(*pairs[0], 8), pairs[0], pairs), TARGETS)
+    assert np.abs(efforts[1] - efforts[0]) == pytest.approx(490.0 * TARGETS, rel=1e-9)
+
+
+@needs_c
+def test_several_threads_march_at_once() -> None:
+    designs, found = leaves(8), {}
+    threads = [threading.Thread(target=lambda k=k: found.update({k: march_many(designs, TARGETS)[0]})) for k in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    together = march_many(designs, TARGETS)[0]
+    assert (found[0] == together).all()
+    assert (found[1] == together).all()
+
+
+def test_numpy_takes_over_without_the_compiled_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled_efforts = march_many(leaves(2), TARGETS)[0]
+    monkeypatch.setenv(SWITCH, "1")
+    assert engine() == "numpy"
+    assert type(equations(discretise(*leaf(1e-3), 8))) is NumpyEquations
+    efforts, codes = march_many(leaves(2), TARGETS)
+    assert (codes == MarchCode.DONE).all()
+    assert efforts == pytest.approx(compiled_efforts, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_wheel_is_built_without_a_compiler_and_runs_on_numpy(tmp_path: Path) -> None:
+    tree, wheels, installed = tmp_path / "tree", tmp_path / "wheels", tmp_path / "installed"
+    left_out = shutil.ignore_patterns(".git", ".venv*", "build", "*.so", "*.egg-info", "benchmarks", "tests", "made")
+    shutil.copytree(ROOT, tree, ignore=left_out)
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", wheels, tree]
+    subprocess.run(command, check=True, env={**os.environ, "CC": "false"}, capture_output=True)
+    (wheel,) = wheels.glob("*.whl")
+    assert wheel.name.endswith("py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(installed)
+    said = "from cfmkit.elastica.mechanics.march import engine; print(engine())"
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    done = subprocess.run(
+        [sys.executable, "-c", said], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["numpy"]
