@@ -71,7 +71,7 @@ def test_more_cycles_than_a_material_is_known_for_are_refused_in_one_line():
 
 
 def test_the_life_of_leaves_is_not_that_of_bought_springs_whose_wire_is_not_known_to_last():
-    keys = {"force": "11.14 N", "travel": "3.23 mm", "room": "[110 mm, 80 mm, 8 mm]", "cycles": "10000"}
+    keys = {"force": "11.14 N", "travel": "3.23 mm", "room": "[110 mm, 80 mm, 20 mm]", "cycles": "10000"}
     asked, candidates = offered("vcfm", **keys, material=LASTING)
     coiled = next(one for one in candidates if one.variant == "2 Vs, catalogue springs")
     one = made(ProposalJob("vcfm", coiled, asked, 0))
@@ -257,7 +257,8 @@ def test_hybrid_leaves_are_offered_and_need_a_rougher_wish():
 
 
 def test_a_mirrored_pair_of_strips_is_half_as_wide_and_twice_as_high():
-    keys = {"force": "20 N", "room": "[120 mm, 80 mm, 20 mm]", "material": "aluminium-7075-t6", "ripple": "5 %"}
+    band, room = "[19 N, 22 N]", "[120 mm, 80 mm, 20 mm]"  # wide strips of 20 N may have 9.6 % more
+    keys = {"force": band, "room": room, "material": "aluminium-7075-t6", "ripple": "5 %"}
     asked, candidates = offered("slider-crank", **keys)
     found = {}
     for variant in ("strip", "pair of strips"):

@@ -65,7 +65,8 @@ def poles(path: Path, node: str, direction: float) -> NDArray[np.bool_]:
     every = np.arange(len(path))
     signs, values = [np.empty(0)], [np.empty(0)]
     for stiffness, across, kept in _tangents(path, node, direction, every):
-        signs.append(np.linalg.slogdet(stiffness[:, kept[:, None], kept])[0])
+        with np.errstate(invalid="ignore"):  # a tangent beyond numbers has no sign
+            signs.append(np.linalg.slogdet(stiffness[:, kept[:, None], kept])[0])
         values.append(_condensed(stiffness, across, kept))
     held, value = np.concatenate(signs), np.concatenate(values)
     return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
