@@ -14,8 +14,12 @@ import re
 from pathlib import Path
 
 from setuptools import Extension, find_packages, setup
-from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
+
+try:
+    from setuptools.command.bdist_wheel import bdist_wheel
+except ImportError:  # before setuptools 70.1, which a build has: this file is only read
+    bdist_wheel = object
 
 HERE = Path(__file__).parent
 ROOMS = ("", ".studies", ".synthetic")
@@ -84,7 +88,7 @@ setup(
     ],
     package_dir={"cfmkit.configs": "configs", "cfmkit.docs": "docs"},
     ext_modules=[MARCH],
-    cmdclass={"build_py": BuildPages, "bdist_wheel": WheelForEveryPython},
+    cmdclass={"build_py": BuildPages} | ({} if bdist_wheel is object else {"bdist_wheel": WheelForEveryPython}),
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
     long_description=described((HERE / "README.md").read_text(encoding="utf-8"), URL),
     long_description_content_type="text/markdown",

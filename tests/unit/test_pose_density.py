@@ -37,7 +37,7 @@ def many(leaf):
 
 
 def thinned(many):
-    return replace(many, poses=(*many.poses[:-1:8], many.poses[-1]))
+    return replace(many, poses=tuple(pose for pose in many.poses if pose.travel in STOPS[::8]))
 
 
 def off(course, many):

@@ -51,7 +51,7 @@ def table(page, head):
 
 
 def test_the_names_that_the_reference_calls_new_are_those_of_the_program():
-    page = (PACKAGE.parent / "docs" / "reference.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
     named = re.findall(r"`([a-z_]+)`", " ".join(table(page, "Numbers")))
     warnings = re.findall(r"`([a-z_]+)`", page.partition("\nWarnings: ")[2].partition(". ")[0])
     keys = re.findall(r"`([a-z_.\[\]]+)`", " ".join(table(page, "Keys")))
