@@ -316,7 +316,7 @@ CLOSED = [
 WINDOWS = (None, ("2 %", "71.3 %"), "its own")
 
 
-def rows_against_single_runs(stem, number):
+def check_rows_against_single_runs(stem, number):
     """Compare the rows of a study over random numbers of a configuration with a run of each; return how many rows."""
     draw, count = np.random.default_rng(number), 4
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
@@ -358,14 +358,14 @@ class Plan:
 @pytest.mark.parametrize("stem", ["bought_springs", "ding2022", "pla_adjustable", "u_shape"])
 def test_a_row_of_a_study_is_a_run_of_its_own(stem):
     """Whatever is varied, with every metric that a sweep notes."""
-    rows_against_single_runs(stem, CLOSED.index(stem))
+    check_rows_against_single_runs(stem, CLOSED.index(stem))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(6))
 @pytest.mark.parametrize("stem", CLOSED)
 def test_every_row_of_a_study_is_a_run_of_its_own(stem, number):
-    rows_against_single_runs(stem, 100 + number)
+    check_rows_against_single_runs(stem, 100 + number)
 
 
 # --- curves and tables -----------------------------------------------------------------------------------------
