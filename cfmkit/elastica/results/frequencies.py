@@ -71,7 +71,7 @@ def frequencies(
     path : EquilibriumPath
         The equilibria.
     masses : NetworkMasses
-        Density of every beam, masses of nodes. BeamSections rotate with inertia where they shear, too.
+        Density of every beam, masses of nodes. Sections rotate with inertia where they shear, too.
     count : int
         How many frequencies, at least 1.
     points : (p,) int array, optional
