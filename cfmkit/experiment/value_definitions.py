@@ -1,4 +1,4 @@
-"""What the numbers of a recording mean, beside the metrics of any curve: name -> (dimension, definition).
+"""Definitions of the numbers of a recording, beside the metrics of any curve: name -> (dimension, definition).
 
 ``{}`` in a definition stands for what was measured, and "effort" for its dimension: force or torque.
 """

@@ -91,7 +91,7 @@ def findings_of_rows(rules: Iterable[FindingRule[S]], solution: S, count: int) -
 
 
 class RowsSolution(Protocol):
-    """What a family's solution of several mechanisms has for studies."""
+    """Values and findings of several solved mechanisms, for studies."""
 
     def __len__(self) -> int:
         """Return the number of mechanisms."""

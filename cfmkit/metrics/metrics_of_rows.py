@@ -90,7 +90,7 @@ class StressRows:
 
     @cached_property
     def samples(self) -> Sequence[RowSamples]:
-        """What is known at the points."""
+        """Values at the points."""
         return self.read()
 
 
@@ -259,7 +259,7 @@ class RowsInWindow:
 
     @property
     def reference(self) -> FloatArray:
-        """What efforts are compared with: the target, else the mean; NaN if that is zero [N or N m]."""
+        """Reference of relative metrics: the target, else the mean; NaN if that is zero [N or N m]."""
         if self._has_target.all():
             return self.curves.target
         level = np.where(np.abs(self.level) > self.curves.error, self.level, np.nan)

@@ -95,7 +95,7 @@ APART = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """What solved poses on a fine mesh differ by from those on a coarse one, as a curve."""
+    """Difference of the solved poses on a fine mesh from those on a coarse one, as a curve."""
 
     guide: PoseGuide
     solved: tuple[Balance, ...]  # along the path, at travels of the coarse mesh

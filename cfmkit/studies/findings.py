@@ -1,4 +1,4 @@
-"""What studies say beside their numbers, by name: by what says it, name -> meaning."""
+"""Findings of studies: command -> name -> meaning."""
 
 FINDINGS = {
     "sensitivity": {

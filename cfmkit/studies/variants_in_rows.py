@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class SolvedVariants:
-    """What a study reads of variants that are solved together."""
+    """Columns of a study for variants that are solved together."""
 
     def __init__(self, study: Study, specs: Sequence[Spec], solved: SolvedRows[Any]) -> None:
         """Read nothing yet."""
@@ -103,7 +103,7 @@ class SolvedVariants:
 
     @property
     def known(self) -> bool:
-        """Whether rows know everything that the study reads."""
+        """True if rows have every column of the study."""
         return all(self.values(split_name(name)[0], over) is not None for name, over in self._asked)
 
     @cached_property

@@ -43,7 +43,7 @@ LAYER_GROWTH = 4.0  # factor from one of them to the next
 TABLE_COLUMNS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
 """Tables of every element."""
 FRAME_OF_DRIVE = 3
-"""What `driven` says of a node that is held nowhere: its frame is that of the drive, of which it moves along x."""
+"""Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 

@@ -28,7 +28,7 @@ REAL_SHARE = 1e-9  # imaginary part of an eigenvalue up to which it is real, of 
 
 
 class Fields(NamedTuple):
-    """What is known at the Gauss points of the elements, (..., e, q) each."""
+    """State at the Gauss points of the elements, (..., e, q) each."""
 
     curvature: Any  # phi' by the element's parameter
     cos: Any

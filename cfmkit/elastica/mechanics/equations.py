@@ -34,7 +34,7 @@ MAX_REJECTED = 7  # two for each rejected step, one less for each accepted one
 
 
 class MarchCode(IntEnum):
-    """How a march ended."""
+    """Reasons for the end of a march."""
 
     DONE = 0  # all targets were reached
     STABILITY_CHANGES = 1  # the next step is less stable, or more
@@ -66,7 +66,7 @@ class MarchState:
 
 @dataclass(frozen=True)
 class MarchPlan:
-    """How a march goes on from a state."""
+    """Start of a march and its step."""
 
     step: float  # first one, along the way
     span: float  # range of the way
@@ -110,7 +110,7 @@ class NumpyEquations:
 
     @property
     def follows(self) -> bool:
-        """Whether some load turns with its node: the tangent is unsymmetric."""
+        """True if some load turns with its node: the tangent is unsymmetric."""
         return any(load.item.follows for load in self.network.loads)
 
     def factors(self, way: Any) -> tuple[Any, Any]:

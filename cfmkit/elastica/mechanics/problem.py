@@ -114,7 +114,7 @@ class NetworkProblem:
 
     @cached_property
     def follows(self) -> bool:
-        """Whether a load turns with its node: then the tangent is unsymmetric."""
+        """True if a load turns with its node: the tangent is unsymmetric."""
         return any(load.item.follows for load in self.network.loads if isinstance(load.item, PointLoad))
 
     def orient(self, modes: FloatArray) -> FloatArray:

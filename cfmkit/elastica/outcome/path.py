@@ -120,7 +120,7 @@ class Path(ShortRepr):
 
     @property
     def stable(self) -> Any:
-        """Whether the equilibrium is stable while the drive is held; under loads that follow: does not diverge."""
+        """True where it is stable while the drive is held; under loads that follow: where it does not diverge."""
         return read_only(self.unstable == 0, np.bool_)
 
     @cached_property
@@ -179,7 +179,7 @@ class Path(ShortRepr):
 
     @cached_property
     def effort(self) -> FloatArray:
-        """What the drive works with: the force along it [N], the moment [N m], or for loads the displacement [J]."""
+        """Work-conjugate of the drive: the force along it [N], the moment [N m], or for loads the displacement [J]."""
         scales, drive = self.layout.scales, self.layout.drive
         if isinstance(drive, Loading):
             return read_only(self._load_displacement(drive))
@@ -264,7 +264,7 @@ class Path(ShortRepr):
 
     @cached_property
     def _beam_stresses(self) -> dict[tuple[str, bool], tuple[FloatArray, FloatArray]]:
-        """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
+        """Result of `beam_stress`, of which curves, metrics between their points and findings are made."""
         return {}
 
     def stress_extremes(self, beam: str, axial: bool = True) -> StressExtremes:

@@ -74,7 +74,7 @@ class EquilibriumPath(ShortRepr):
 
     @property
     def stable(self) -> Any:
-        """Whether the equilibrium is stable while the drive is held; under loads that follow: does not diverge."""
+        """True where it is stable while the drive is held; under loads that follow: where it does not diverge."""
         return read_only(self.unstable == 0, np.bool_)
 
     @cached_property
@@ -84,7 +84,7 @@ class EquilibriumPath(ShortRepr):
 
     @property
     def fits(self) -> Any:
-        """How each beam was fitted between its nodes, by its name."""
+        """Fit of each beam between its nodes, by its name."""
         fits: dict[str, Fit] = dict(self.network.fits)
         return fits
 
@@ -112,7 +112,7 @@ class EquilibriumPath(ShortRepr):
 
     @cached_property
     def effort(self) -> FloatArray:
-        """What the drive works with: the force along it [N], the moment [N m], or for loads the displacement [J]."""
+        """Work-conjugate of the drive: the force along it [N], the moment [N m], or for loads the displacement [J]."""
         scales = self.network.scales
         if isinstance(self.given, Loading):
             return read_only(load_displacement(self.at, self.given))
@@ -176,7 +176,7 @@ class EquilibriumPath(ShortRepr):
 
     @cached_property
     def _beam_stresses(self) -> dict[tuple[str, bool], tuple[FloatArray, FloatArray]]:
-        """What `beam_stress` has found: curves, metrics between their points and findings all ask for it."""
+        """Result of `beam_stress`, of which curves, metrics between their points and findings are made."""
         return {}
 
     def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:

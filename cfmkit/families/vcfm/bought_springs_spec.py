@@ -56,7 +56,7 @@ class BoughtSprings(SpringSupport):
 
     @property
     def is_guided(self) -> bool:
-        """Whether a rod or a tube keeps it from buckling."""
+        """True if a rod or a tube keeps it from buckling."""
         return self.guides(self.coil)
 
     @property

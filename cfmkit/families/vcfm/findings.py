@@ -1,4 +1,4 @@
-"""What a mechanism of snap-through leaves and a preloaded spring can suffer from: when it does, and what is said of it.
+"""Findings of a mechanism of snap-through leaves and a preloaded spring: predicate and sentence of each.
 
 Predicates take the solution of any number of mechanisms, sentences that of one.
 """

@@ -158,7 +158,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def travel(self) -> FloatArray:
-        """How far the shuttles are to go [m]."""
+        """Requested travels of the shuttles [m]."""
         return self.column(lambda spec: spec.travel)
 
     @cached_property
@@ -194,12 +194,12 @@ class Solution(ShortRepr):
 
     @property
     def _flatness(self) -> float:
-        """What (max - min)/max a constant force may have."""
+        """Largest (max - min)/max of a force that counts as constant."""
         return self.spec.analysis.flatness
 
     @cached_property
     def is_linear(self) -> NDArray[np.bool_]:
-        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
+        """True where the leaves buckle within the travel, and so have a range of constant negative stiffness."""
         return np.isfinite(self.linear[0]) & (self.linear[0] < self.travel)
 
     @cached_property
@@ -228,7 +228,7 @@ class Solution(ShortRepr):
 
     @property
     def window_is_flat(self) -> NDArray[np.bool_]:
-        """Whether `window` is the longest flat part itself: flat by what it is, whatever the last digit says."""
+        """True where `window` is the longest flat part itself: flat by definition, whatever the last digit is."""
         if self.spec.analysis.window is not None or self.is_linear.all():
             return np.zeros(len(self), dtype=bool)
         return ~self.is_linear & np.isfinite(self.flat[0])

@@ -295,7 +295,7 @@ class Measured(Model):
 
 
 class VcfmSolid(SolidAnalysis):
-    """How the part is solved as planar solids."""
+    """Settings of planar solids."""
 
     poses: int = Field(
         41, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"

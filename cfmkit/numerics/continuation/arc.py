@@ -63,7 +63,7 @@ class ArcMove(NamedTuple):
 
     @property
     def folds(self) -> bool:
-        """Whether the drive turns back within the step."""
+        """True if the drive turns back within the step."""
         return bool(self.tangent[-1] * self.tangent_before[-1] < 0)
 
 

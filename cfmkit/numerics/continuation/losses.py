@@ -1,4 +1,4 @@
-"""What is done where a path loses its stability: locate it, say so, and go on along a stable branch if there is one."""
+"""Policy at a loss of stability: locate it, yield it, and go on along a stable branch if there is one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.events import Located
 
 Items = Generator[Point | PathEvent, None, Walk | PathStop | None]
-"""What a policy yields; it returns where to go on, how the path ends, or None if it has nothing to say."""
+"""Items of a policy, which returns the walk to go on with, the ending of the path, or None if it does not apply."""
 
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
 NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)

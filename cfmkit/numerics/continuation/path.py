@@ -1,4 +1,4 @@
-"""What a path consists of: points, events and an ending; and where its follower stands."""
+"""Parts of a path: points, events and an ending; and the state of its follower."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PathBranch(NamedTuple):
 
 @dataclass(frozen=True)
 class Options:
-    """How a path is followed."""
+    """Settings of the follower."""
 
     span: float  # range of the drive
     branch: Literal["stable", "primary", "stop"] = "stable"
@@ -58,7 +58,7 @@ class PathEvent:
 
 
 class WhyStopped(Enum):
-    """How a path ends."""
+    """Reasons for the end of a path."""
 
     COMPLETE = "all requested values were reached"
     LIMIT_POINT = "the drive cannot go further"
@@ -109,7 +109,7 @@ class Walk:
 
     @property
     def done(self) -> bool:
-        """Whether all requested values are reached."""
+        """True if all requested values are reached."""
         return self.number >= len(self.targets)
 
     def move(self, new: PathEquilibrium, reached: int = 0) -> Walk:

@@ -1,4 +1,4 @@
-"""What a specification may say about the seats and the guide of a compression spring."""
+"""Keys of the seats and the guide of a compression spring."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Positive = Field(gt=0)
 
 
 class SpringSupport(Model):
-    """How a compression spring is kept from buckling."""
+    """Seats and guide of a compression spring, which keep it from buckling."""
 
     seats: Seats = Field(
         "fixed-fixed",

@@ -61,7 +61,7 @@ class Bought(SpringSupport):
 
     @property
     def is_guided(self) -> bool:
-        """Whether a rod or a tube keeps it from buckling."""
+        """True if a rod or a tube keeps it from buckling."""
         return self.guides(self.coil)
 
     @property
