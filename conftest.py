@@ -34,6 +34,8 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(warming.wait)
 
 
+gc.set_threshold(100_000, 20, 20)  # trees of ten thousand tests are no garbage: with the default, half of collecting them
+
 SLOW_CASES = Path(__file__).parent / "tests" / "slow_cases.txt"
 
 

@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from sources import PACKAGE as ROOT
+from sources import nodes, parsed, statements
 
 from cfmkit.families import family
-
-ROOT = Path(__file__).parents[2] / "cfmkit"
 
 LAYERS = (
     ("cli", "__main__"),
@@ -46,15 +46,9 @@ def room_of(path: Path) -> str:
 
 def type_checking_lines(tree: ast.Module) -> set[int]:
     """Return the lines below ``if TYPE_CHECKING``: they import nothing when the program runs."""
-    tests = ((node, node.test) for node in ast.walk(tree) if isinstance(node, ast.If))
+    tests = ((node, node.test) for node in statements(tree) if isinstance(node, ast.If))
     blocks = (node for node, test in tests if isinstance(test, ast.Name) and test.id == "TYPE_CHECKING")
     return {line for block in blocks for line in range(block.lineno, (block.end_lineno or block.lineno) + 1)}
-
-
-@cache
-def parsed(path: Path) -> ast.Module:
-    """Return the tree of a file, which many tests walk."""
-    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache
@@ -63,7 +57,7 @@ def imports(path: Path, types: bool = False) -> list[str]:
     tree = parsed(path)
     skipped = set() if types else type_checking_lines(tree)
     found = []
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Import) and node.lineno not in skipped:
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.lineno not in skipped:
@@ -205,7 +199,7 @@ def test_every_family_has_the_same_rooms(name):
 
 def test_no_one_asks_which_family_it_is():
     for path in SOURCES:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if isinstance(node, ast.Compare):
                 sides = [node.left, *node.comparators]
                 named = any(
@@ -218,7 +212,7 @@ def test_no_one_asks_which_family_it_is():
 def longest_function(path: Path) -> tuple[int, str]:
     """Return (lines of code, name) of the longest function in a file, docstring left out."""
     sizes = [(0, "")]
-    for node in ast.walk(parsed(path)):
+    for node in statements(parsed(path)):
         if isinstance(node, ast.FunctionDef):
             first = node.body[0]
             documented = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 from beam_support import TOGGLE
+from sources import PACKAGE, nodes
 from vee_leaf import VEE
 
-import cfmkit
 from cfmkit.cli.main import main
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -188,7 +188,7 @@ WARNED = {
 FAST = ("rigid", "taut", "wide network", "wide network with frequencies", "truss law")
 EVERY = [pytest.param(name, marks=[] if name in FAST else pytest.mark.slow) for name in WARNED]
 
-FAMILIES = Path(cfmkit.__file__).parent / "families"
+FAMILIES = PACKAGE / "families"
 
 
 @cache
@@ -197,12 +197,11 @@ def findings_made() -> tuple[tuple[str, list[ast.expr], bool], ...]:
 
     What is no call of `finding` is a tuple (name, message, commands) that is handed to one.
     """
-    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in FAMILIES.rglob("*.py")}
     return tuple(
         (path.relative_to(FAMILIES).parts[0].replace("_", "-"), parts, is_call)
-        for path, tree in trees.items()
-        for node in ast.walk(tree)
-        for is_call in [isinstance(node, ast.Call) and ast.unparse(node.func) == "finding"]
+        for path in FAMILIES.rglob("*.py")
+        for node in nodes(path)
+        for is_call in [isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "finding"]
         for parts in [node.args if is_call else node.elts if isinstance(node, ast.Tuple) else []]
         if parts and isinstance(parts[0], ast.Constant)
     )

@@ -6,12 +6,11 @@ import re
 from functools import cache
 from pathlib import Path
 
-import cfmkit
+from sources import calls_of
+
 from cfmkit.cli import show_topics
 from cfmkit.experiment.value_definitions import recorded
 from cfmkit.stock.springs.spec import CatalogueSpring, SpringWire
-
-PACKAGE = Path(cfmkit.__file__).parent
 
 
 @cache
@@ -21,13 +20,8 @@ def explained():
 
 def names_of_findings():
     """Return the names that calls of `Finding` and `finding` state."""
-    calls = (
-        node
-        for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Finding", "finding")
-    )
-    constants = (part.value for call in calls for part in ast.walk(call.args[0]) if isinstance(part, ast.Constant))
+    firsts = (call.args[0] for _, call in calls_of(("Finding", "finding")))
+    constants = (part.value for first in firsts for part in ast.walk(first) if isinstance(part, ast.Constant))
     return {value for value in constants if isinstance(value, str)}
 
 
