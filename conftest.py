@@ -11,11 +11,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import blas_threads  # noqa: F401 before numpy
 import plugin_support
 import pytest
+import sources
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 plugin_support.register()
 
@@ -34,7 +39,15 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(warming.wait)
 
 
-gc.set_threshold(100_000, 20, 20)  # trees of ten thousand tests are no garbage: with the default, half of collecting them
+gc.set_threshold(100_000, 20, 20)  # by default half the time of collecting tests is a search for garbage
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _trees_are_forgotten() -> Iterator[None]:
+    """Forget the trees of the source after a file whose tests have read them."""
+    yield
+    sources.forget()
+
 
 SLOW_CASES = Path(__file__).parent / "tests" / "slow_cases.txt"
 

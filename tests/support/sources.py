@@ -1,4 +1,7 @@
-"""The source of the package as trees, read once for all tests of a process."""
+"""The source of the package as trees, read once for all tests of a file.
+
+They are millions of objects, which every collection of garbage would walk: `conftest.py` forgets them after the file.
+"""
 
 from __future__ import annotations
 
@@ -43,3 +46,9 @@ def calls_of(names: tuple[str, ...], folder: Path = PACKAGE) -> Iterator[tuple[P
             for node in nodes(path):
                 if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names:
                     yield path, node
+
+
+def forget() -> None:
+    """Forget all trees."""
+    parsed.cache_clear()
+    nodes.cache_clear()

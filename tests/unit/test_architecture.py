@@ -5,13 +5,16 @@ from __future__ import annotations
 import ast
 import re
 from functools import cache
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from sources import PACKAGE as ROOT
 from sources import nodes, parsed, statements
 
 from cfmkit.families import family
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LAYERS = (
     ("cli", "__main__"),
