@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
-from cfmkit.elastica.model.beam import Fit, fit
+from cfmkit.elastica.model.beam_fits import bundle_of, fits_of
 from cfmkit.elastica.model.drive import Displacement, Loading
-from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
-from cfmkit.elastica.model.numbering import apart, driven
-from cfmkit.elastica.model.plain_beams_at_once import Bundle
+from cfmkit.elastica.model.driven_node import driven
+from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
 from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -116,6 +115,8 @@ class Discretisation:
     nodes: Mapping[str, int]  # attachment of every node
     fits: Mapping[str, Fit]
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
+    pieces: int = 1  # elements for every smooth piece of a beam, at least
+    tension: Mapping[str, float] | None = None  # beams that were cut for a large tension
 
     @property
     def n_motions(self) -> int:
@@ -163,8 +164,8 @@ class _ArrayBuilder:
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = itertools.count()
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.bundle = _bundle(network)
-        self.fits = _fits(network, self.bundle)
+        self.bundle = bundle_of(network)
+        self.fits = fits_of(network, self.bundle)
         self.wide = any(beam.section.wide for beam in network.beams.values())
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
@@ -193,7 +194,7 @@ class _ArrayBuilder:
         free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]),
+            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]), self.pieces, self.tension,
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
@@ -394,29 +395,6 @@ class _ArrayBuilder:
         return np.flatnonzero(~held), base, rate
 
 
-def _bundle(network: Network) -> Bundle:
-    """Return the beams of a network; plain ones are fitted together."""
-    ends = np.array(
-        [
-            (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
-            for beam in network.beams.values()
-            for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
-        ]
-    )
-    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
-
-
-def _fits(network: Network, bundle: Bundle) -> dict[str, Fit]:
-    """Return how each beam is fitted between its nodes."""
-    alone = {}
-    for name in (bundle.names[k] for k in bundle.others):
-        beam = network.beams[name]
-        start, end = network.nodes[beam.start], network.nodes[beam.end]
-        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
-        alone[name] = fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
-    return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
-
-
 def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
     """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
     used = np.zeros(size, bool)
@@ -475,3 +453,9 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
     axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
     axial[elements], floored[elements] = 0.0, False
     return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+
+
+def discretise_alike(template: Discretisation, network: Network, drive: Drive) -> Discretisation:
+    """Return the arrays of another network of the same make-up: degree, cuts, floors and units of the template's."""
+    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales)
+    return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

@@ -16,6 +16,7 @@ References
 ----------
 [Me] L. Meirovitch, Principles and Techniques of Vibrations (1997): the eigenvalue problem.
 [Re] E. Reissner, J. Math. Phys. 29 (1950) 90: the mixed functional.
+[Be] M. Beck, Z. angew. Math. Phys. 3 (1952) 225: the column under a force that turns with its end.
 """
 
 from __future__ import annotations
@@ -26,13 +27,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.polynomial import legendre
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.vibration.natural_frequencies import Frequencies
 from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.network_masses import NetworkMasses
     from cfmkit.elastica.results.path import EquilibriumPath
-    from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
@@ -54,6 +54,30 @@ NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is z
 ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
+
+
+@dataclass(frozen=True, repr=False)
+class Frequencies(ShortRepr):
+    """Natural frequencies of a network about some equilibria.
+
+    Attributes
+    ----------
+    points : (p,) int array
+        Indices of the points of the path.
+    held, free : (p, n) arrays
+        The lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has no stiffness;
+        nan where the pose is unstable, and where a network has fewer.
+    flutters, diverges : (p,) bool arrays
+        Whether loads that turn with their node make motions grow that swing, or that do not: two squares of
+        frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if it is a load.
+        Other networks do not flutter, and whether they diverge is reported by the path.
+    """
+
+    points: Any
+    held: FloatArray
+    free: FloatArray
+    flutters: Any
+    diverges: Any
 
 
 @one_blas_thread

@@ -119,3 +119,33 @@ def largest_stress(net: Network, at: Equilibria, beam: str, axial: bool) -> tupl
     value, place, _, _ = extremes(net, at, beam, np.array(signs))
     best = value.argmax(axis=1)[:, None]
     return np.take_along_axis(value, best, 1)[:, 0], np.take_along_axis(place, best, 1)[:, 0]
+
+
+def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: Any, axial: bool) -> Any:
+    """Return the stress on both sides of a beam at places of its own for every point, (p, 2, n).
+
+    Parameters
+    ----------
+    net, at, beam : Network, Equilibria, str
+        As of `states`; with complex steps, too.
+    element, fraction : (p, 2, n) arrays
+        As of `SideExtremes`.
+    axial : bool
+        Whether the stress has its axial part.
+    """
+    fractions, to_series = places(at.network.degree + N_MORE_PLACES)
+    found = np.zeros(np.shape(fraction), at.z.dtype)
+    sides = np.array([1.0, -1.0])[:, None]
+    for number, own in enumerate(elements_of(at.network, beam)):
+        here = element == number
+        if not here.any():
+            continue
+        seen = sections(net, beam, element_states(net, at, beam, own, fractions))
+        bending, pull = (
+            np.moveaxis(legendre.legvander(2 * fraction - 1, len(fractions) - 1), -1, 0)
+            * np.moveaxis(values @ to_series.T, -1, 0)[:, :, None, None]
+            for values in (seen.bending_stress, seen.axial_stress)
+        )
+        stress = sides * bending.sum(axis=0) + (pull.sum(axis=0) if axial else 0.0)
+        found = np.where(here, stress, found)
+    return found

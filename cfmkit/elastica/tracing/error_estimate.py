@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.refine import embed
+from cfmkit.elastica.results.path import largest_force
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import largest_motion
 
@@ -59,7 +59,7 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     efforts: Any = np.abs(fine.effort - path.effort[list(indices)])
     forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
-    load = max(_largest_force(path.at), NO_FORCE)
+    load = max(largest_force(path.at), NO_FORCE)
     size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
     reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), SMALL_MOTION)
     relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
@@ -79,14 +79,6 @@ def polish(path: Path) -> Path:
         if near is not None and largest_motion(problem, near.x - row[free]) < SAME_POINT:
             row[free] = near.x
     return replace(path, at=replace(path.at, z=z))
-
-
-def _largest_force(at: Equilibria) -> float:
-    """Return the largest force or moment in a beam at any state, dimensionless."""
-    e = at.network.elements
-    fields = energy.fields(at.network, at.z, at.drive)
-    moment = np.abs(e.rigidity * fields.curvature * e.length[:, None]).max(initial=0.0)
-    return float(max(moment, np.abs(fields.normal).max(initial=0.0), np.abs(fields.shear).max(initial=0.0)))
 
 
 def pick_points(path: Path) -> list[int]:

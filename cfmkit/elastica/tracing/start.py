@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.outcome.path import Event
+from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow

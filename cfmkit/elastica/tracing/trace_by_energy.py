@@ -11,8 +11,7 @@ from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
 from cfmkit.elastica.model.drive import Control
-from cfmkit.elastica.outcome.path import Event, PathStatus
-from cfmkit.elastica.results.path import Path
+from cfmkit.elastica.results.path import Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched

@@ -27,7 +27,7 @@ from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
+from cfmkit.elastica.model.network_masses import NetworkMasses
 from cfmkit.families.beam.network_elements_spec import HELD
 from cfmkit.specs.units import between
 

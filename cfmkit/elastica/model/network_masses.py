@@ -38,6 +38,3 @@ class NetworkMasses:
                 raise InputError(f"mass and inertia of node {name!r} must not be negative, got {values}")
         object.__setattr__(self, "density", MappingProxyType(dict(self.density)))
         object.__setattr__(self, "nodes", MappingProxyType(dict(self.nodes)))
-
-
-__all__ = ["NetworkMasses"]
