@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.section import Section, Taper
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
     from cfmkit.elastica.results.curling_stiffening import HinderedCurling, hindered_curling
-    from cfmkit.elastica.results.gradient import Gradient, gradient
     from cfmkit.elastica.results.path import EquilibriumPath as Path
     from cfmkit.elastica.results.path import Event, PathStatus
+    from cfmkit.elastica.sensitivity import Gradient, gradient
     from cfmkit.elastica.tracing.trace_by_energy import trace
     from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
 
@@ -62,7 +62,7 @@ _HOMES = {
     "model.section": ("Section", "Taper"),
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
     "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
-    "results.gradient": ("Gradient", "gradient"),
+    "sensitivity": ("Gradient", "gradient"),
     "results.path": ("Event", "Path", "PathStatus"),
     "tracing.trace_by_energy": ("trace",),
     "tracing.trace_many": ("NetworkOutcome", "trace_many"),

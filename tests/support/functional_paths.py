@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from equilibria import equilibria
 
-from cfmkit.elastica.outcome.path import PathStatus
+from cfmkit.elastica.results.path import PathStatus
 from cfmkit.elastica.results.path import EquilibriumPath
 
 

@@ -16,7 +16,7 @@ from cfmkit.elastica import (
     PathStatus,
     trace,
 )
-from cfmkit.elastica.continuation.batch import trace_many
+from cfmkit.elastica import trace_many
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

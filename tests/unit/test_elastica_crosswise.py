@@ -27,7 +27,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.outcome import crosswise_stiffness
-from cfmkit.elastica.outcome.crosswise_stiffness import cross_stiffness
+from cfmkit.elastica.results.cross_stiffness import cross_stiffness
 
 MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
 RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12

@@ -31,7 +31,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
-from cfmkit.elastica.results.frequencies import frequencies
+from cfmkit.elastica.vibration import frequencies
 from cfmkit.elastica.vibration import NetworkMasses
 from cfmkit.errors import InputError
 

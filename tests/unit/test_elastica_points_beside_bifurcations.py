@@ -26,7 +26,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.equilibrium.network_solver import Points
-from cfmkit.elastica.outcome.between_points import between_points
+from cfmkit.elastica.results.between_points import between_points
 
 LENGTH = 35e-3
 

@@ -24,7 +24,7 @@ from cfmkit.elastica import (
     Section,
     guided,
 )
-from cfmkit.elastica.results.frequencies import frequencies
+from cfmkit.elastica.vibration import frequencies
 from cfmkit.elastica.tracing.trace_by_energy import trace
 
 if TYPE_CHECKING:

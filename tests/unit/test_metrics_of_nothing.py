@@ -8,7 +8,7 @@ from metrics_support import curve
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.elastica.outcome import member_efforts
+from cfmkit.elastica.results import member_efforts
 from cfmkit.errors import ExitCode, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Block, Measure

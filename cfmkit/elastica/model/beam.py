@@ -202,7 +202,8 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
     Elements end there (`cfmkit.elastica.mechanics.discretise`). A station keeps its fraction u of the arc length: where
-    the arc length changes along the shape's own parameter t, or u does, it moves there by dt = (du - d(arc)) / (d(arc)/dt).
+    the arc length changes along the shape's own parameter t, or u does, it moves there by
+    dt = (du - d(arc)) / (d(arc)/dt).
     """
     thickness = beam.section.thickness
     if not (np.iscomplexobj(fitted.length) or (isinstance(thickness, Taper) and np.iscomplexobj(thickness.stations))):

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.path import EquilibriumPath
 
+_ROUNDING = 1e-24  # share of the largest energy below which there is none: squares of rounded moments
+
 _STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
 
@@ -65,5 +67,6 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
                 hindered = plate * curl_hindered(curl * (rest + found.moment / rigidity) ** 2)
                 lost[number] += (density * hindered).sum(axis=1)
     total = energies.sum(axis=0)
-    share = lost.sum(axis=0) / np.where(total > 0, total, 1.0)
+    bent = total > _ROUNDING * total.max(initial=0.0)
+    share = np.where(bent, lost.sum(axis=0) / np.where(bent, total, 1.0), 0.0)
     return HinderedCurling(read_only(share), read_only(np.array(names)[lost.argmax(axis=0)], np.str_))

@@ -25,6 +25,7 @@ N_MORE_PLACES = 8
 N_GRID, N_ZOOMS = 49, 5
 """Places of a grid between two ends, and how often the neighbours of its highest place become the ends of the next: the
 last grid is (2/48)^5 of an element wide, where a parabola's top is known to rounding."""
+AT_END = 1e-14  # fraction of an element within which a place is its end
 TIED = 1e-9  # share by which one element's stress must be higher than that of the one before it
 
 
@@ -72,7 +73,8 @@ def extremes(net: Network, at: Equilibria, beam: str, signs: FloatArray) -> tupl
         both = np.stack([seen.bending_stress, seen.axial_stress])
         series = np.einsum("cs,spk->pck", signs, both) @ to_series.T
         top, fraction = _top(series)
-        arc = legendre.legval(2 * fraction - 1, to_series @ found.place)
+        inner = legendre.legval(2 * fraction - 1, to_series @ found.place)
+        arc = np.where(fraction < AT_END, found.place[0], np.where(fraction > 1 - AT_END, found.place[-1], inner))
         better = top > np.where(best > 0, best * (1 + TIED), best)
         best, place = np.where(better, top, best), np.where(better, arc, place)
         chosen, where = np.where(better, number, chosen), np.where(better, fraction, where)

@@ -271,16 +271,17 @@ class _Elements:
         """Return the turn of the nodes' frames (sparse), the freedoms that are free, the driven one with its sense."""
         from scipy.sparse import lil_array
 
-        turn, free, driven = lil_array((self.size, self.size)), np.ones(self.size, dtype=bool), (0, 0.0)
+        turn, free = lil_array((self.size, self.size)), np.ones(self.size, dtype=bool)
+        driven = 0, 0.0
         turn.setdiag(1.0)
         arrays = self.path.network
         for name, unknowns in arrays.bodies.items():
             first, (c, s) = self.first[name], arrays.attachments.frame[arrays.nodes[name]]
             turn[first : first + 2, first : first + 2] = np.array([[c, -s], [s, c]])
             free[first : first + 3] = np.isin(unknowns, arrays.free)
-            for local, unknown in enumerate(unknowns):
-                if arrays.rate[unknown]:
-                    driven = first + local, float(arrays.rate[unknown])
+            for local, rate in enumerate(arrays.rate[list(unknowns)].tolist()):
+                if rate:
+                    driven = first + local, rate
         return turn.tocsc(), np.flatnonzero(free), driven
 
     def _guess(self, path: Path, index: int) -> FloatArray:
@@ -295,8 +296,8 @@ class _Elements:
             own = beam_states.elements_of(path.network, name)
             now = beam_states.states(self.net, at, name, share)
             rest = beam_states.unloaded(self.net, at, name, share)
-            t = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
-            moved[number] = t, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
+            known = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
+            moved[number] = known, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
         first = 3 * len(self.first)
         for k, (beam, t) in enumerate(self.inner):
             places, columns = moved[beam]

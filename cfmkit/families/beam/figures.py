@@ -368,7 +368,7 @@ def bent(path: Path, beam: str, point: int) -> FloatArray:
     """Return the centre line of a beam at a point of the path, (n, 2) [m]."""
     found = states(path.net, path.take(np.array([point])).at, beam, np.linspace(0.0, 1.0, _PLACES))
     line = np.stack([found.x[0], found.y[0]], axis=-1)
-    return line[np.append(True, np.diff(found.place) > 0)]
+    return np.asarray(line[np.append(True, np.diff(found.place) > 0)])
 
 
 def rigid_parts(path: Path, point: int | None) -> list[FloatArray]:

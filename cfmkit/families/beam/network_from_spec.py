@@ -27,7 +27,6 @@ from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.model.network_masses import NetworkMasses
 from cfmkit.families.beam.network_elements_spec import HELD
 from cfmkit.specs.units import between
 
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
+    from cfmkit.elastica.vibration import NetworkMasses
     from cfmkit.families.beam.mechanism_spec import Mechanism
     from cfmkit.families.beam.network_elements_spec import (
         LoadSpec,

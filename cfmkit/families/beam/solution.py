@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Path
     from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
-    from cfmkit.elastica.results.frequencies import Frequencies
+    from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.beam.spec import BeamSpec
 
 
@@ -199,7 +199,7 @@ class Solution(ShortRepr):
         count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
         if masses is None or not count or not len(self.keep):
             return None
-        from cfmkit.elastica.results.frequencies import frequencies
+        from cfmkit.elastica.vibration import frequencies
 
         return frequencies(self.path, masses, count, self.keep, self.assembly.hold())
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-    from cfmkit.elastica.results.gradient import Gradient
+    from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
     from cfmkit.specs.evaluable_target_curve import TargetCurve

@@ -21,7 +21,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isfinite
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,11 +39,10 @@ from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
-    from cfmkit.elastica.model.network_masses import NetworkMasses
     from cfmkit.elastica.results.path import EquilibriumPath
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
@@ -54,6 +55,33 @@ NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is z
 ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
+
+
+@dataclass(frozen=True)
+class NetworkMasses:
+    """Masses of a network.
+
+    Parameters
+    ----------
+    density : mapping
+        Of every beam, by its name [kg/m^3].
+    nodes : mapping
+        Mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes, by their names.
+    """
+
+    density: Mapping[str, float]
+    nodes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze and check the values."""
+        for name, value in self.density.items():
+            if not (value > 0 and isfinite(value)):
+                raise InputError(f"the density of beam {name!r} must be positive, got {value}")
+        for name, values in self.nodes.items():
+            if not all(value >= 0 and isfinite(value) for value in values):
+                raise InputError(f"mass and inertia of node {name!r} must not be negative, got {values}")
+        object.__setattr__(self, "density", MappingProxyType(dict(self.density)))
+        object.__setattr__(self, "nodes", MappingProxyType(dict(self.nodes)))
 
 
 @dataclass(frozen=True, repr=False)

@@ -86,7 +86,7 @@ class Gradient:
         """Derivatives of `EquilibriumPath.effort`, (p, k)."""
         if isinstance(self.path.given, Loading):
             each = zip(self.designs.networks, self.stepped, strict=True)
-            columns = [load_displacement(at, drive) for (_, drive), at in each]
+            columns = [load_displacement(at, drive) for (_, drive), at in each if isinstance(drive, Loading)]
             return read_only(np.imag(np.stack(columns, axis=-1)) / COMPLEX_STEP)
         try:
             return read_only(effort_slopes(self.at, self.designs, self._rates))
