@@ -67,6 +67,16 @@ class MarchState:
     target: int = -1  # number of the target it lies at, -1 if at none
 
 
+class SolvedStates(NamedTuple):
+    """What Newton's method found near k guesses."""
+
+    converged: Any  # (k,)
+    free: FloatArray  # (k, n)
+    rate: FloatArray  # (k, n)
+    unstable: Any  # (k,)
+    effort: FloatArray  # (k,)
+
+
 @dataclass(frozen=True)
 class MarchPlan:
     """Start of a march and its step."""
@@ -212,6 +222,38 @@ class NumpyEquations:
                 return MarchState(free, way, rate, unstable, self._effort(free, way))
             last = largest
         return None
+
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses (k, n) at places (k,) of the way; see `solve`."""
+        each = [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, way, strict=True)]
+        nothing = MarchState(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
+        states = [state or nothing for state in each]
+        return SolvedStates(
+            np.array([state is not None for state in each], bool),
+            np.array([state.free for state in states]).reshape(len(each), self.n),
+            np.array([state.rate for state in states]).reshape(len(each), self.n),
+            np.array([state.unstable for state in states], np.int64),
+            np.array([state.effort for state in states]),
+        )
+
+    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+        """Return flexibility and shape of the softest mode of the motions after some powers of their flexibility.
+
+        The flexibility is 0 if the tangent is singular.
+        """
+        moves, flexibility = np.isinf(self.unit), 0.0
+        vector = np.array(vector, float)
+        try:
+            inverse = np.linalg.inv(self.linearise(free, way).tangent)
+        except np.linalg.LinAlgError:
+            return 0.0, vector
+        for _ in range(rounds):
+            moved = inverse[:, moves] @ vector[moves]
+            flexibility = float(vector[moves] @ moved[moves] / (vector[moves] @ vector[moves]))
+            vector = moved / np.linalg.norm(moved[moves])
+        return flexibility, vector
 
     def _effort(self, free: FloatArray, way: float) -> float:
         moved = self.network.base if self.ramp else self.network.rate

@@ -273,6 +273,50 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
     return code;
 }
 
+/* Newton's method for each of several guesses (count, n): codes, unstable directions and efforts to found (count, 3). */
+int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found) {
+    const Goal goal = {NULL, 0.0, NULL, tolerance, quick};
+    Work *w = work_open(m);
+    if (!w) return DIVERGED;
+    for (Int k = 0; k < count; k++, x += m->free, rate += m->free, found += 3) {
+        Found end = {0, 0, 0.0};
+        found[0] = newton(m, w, x, way + k, &goal, &end);
+        memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
+        found[1] = (double)end.told;
+        found[2] = end.effort;
+    }
+    work_close(w);
+    return CONVERGED;
+}
+
+/* Make a vector (n) the softest mode of the motions by powers of their flexibility; return the mode's flexibility, 0 if
+ * the tangent is singular. */
+double soften(const Model *m, const double *x, double way, Int rounds, double *vector) {
+    Work *w = work_open(m);
+    const Stage at = stage(m, way);
+    double flexibility = 0.0;
+    if (w) {
+        place(m, w, x, at);
+        for (Int round = assemble(m, w, at, 1) ? 0 : rounds; round < rounds; round++) {
+            double before = 0.0, along = 0.0, after = 0.0;
+            for (Int i = 0; i < m->free; i++) w->step[i] = m->unit[i] == HUGE_VAL ? vector[i] : 0.0;
+            factors_solve(&w->factors, m->follows != 0, w->step);
+            for (Int i = 0; i < m->free; i++)
+                if (m->unit[i] == HUGE_VAL) {
+                    before += vector[i] * vector[i];
+                    along += vector[i] * w->step[i];
+                    after += w->step[i] * w->step[i];
+                }
+            flexibility = along / before;
+            const double size = sqrt(after);
+            if (!(size > 0.0) || !(size < 1e300)) { flexibility = 0.0; break; }
+            for (Int i = 0; i < m->free; i++) vector[i] = w->step[i] / size;
+        }
+    }
+    work_close(w);
+    return flexibility;
+}
+
 /* ---- natural march ----------------------------------------------------------------------------------------------- */
 typedef struct { double *x, *rate; double way; } Known;
 
