@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.model.beam_fits import beam_end_at, fits_of
+from cfmkit.elastica.model.beam_fits import BeamFits, beam_end_at
 from cfmkit.elastica.model.drive import Displacement, Rotation
 from cfmkit.specs.units import to_border
 
@@ -89,7 +89,7 @@ class _Lines:
 
     def __init__(self, title: str, driven: DrivenNetwork, increments: int) -> None:
         self.title, self.network, self.drive, self.increments = title, driven.network, driven.drive, increments
-        self.fits = fits_of(driven.network)
+        self.fits = BeamFits(driven.network)
         self.number = _numbers(driven.network)
         self.spare = len(driven.network.nodes) + 1
         self.spare_element = 1

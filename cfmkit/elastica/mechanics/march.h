@@ -74,6 +74,8 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
           int quick, double *rate, double *found);
+int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found);
+double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {

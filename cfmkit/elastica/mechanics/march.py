@@ -15,6 +15,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     LinearEquations,
@@ -23,6 +24,7 @@ from cfmkit.elastica.mechanics.equations import (
     MarchState,
     NaturalMarch,
     NumpyEquations,
+    SolvedStates,
     begin,
 )
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -49,6 +51,8 @@ ADDRESSES = (
     "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
+OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESSES)
+WHOLE_NUMBERS = frozenset(("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at"))
 
 
 @cache
@@ -80,9 +84,12 @@ def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
     ramp : bool
         Whether the way is the share of what is constant instead of the drive.
     """
-    kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
-    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
-    return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
+    key = equations, ramp, compiled() is not None
+    if key not in network.known:
+        kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
+        plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
+        network.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(network, ramp)
+    return network.known[key]  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +104,8 @@ class CompiledEquations(NumpyEquations):
         super().__post_init__()
         arrays = model_arrays(self)
         counts = model_counts(self.network, self.ramp)
-        addresses = (arrays[name].ctypes.data if name in arrays else 0 for name in ADDRESSES)
-        row = np.array([*counts.values(), *addresses], np.int64)
+        row = np.array([*counts.values(), *(0 for _ in ADDRESSES)], np.int64)
+        compiled().place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
@@ -158,6 +165,24 @@ class CompiledEquations(NumpyEquations):
             return None
         way = float(at[0])
         return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
+
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses."""
+        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        rate, found = np.empty(x.shape), np.zeros((len(x), 3))
+        if compiled().solve_many(self.row, x, ways, rate, found, tolerance, quick):
+            raise MemoryError
+        converged, unstable = found[:, 0] == 0, found[:, 1].astype(np.int64)
+        for k in np.flatnonzero(converged & (unstable < 0)):
+            unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
+        return SolvedStates(converged, x, rate, unstable, found[:, 2])
+
+    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+        """Return flexibility and shape of the softest mode."""
+        shape = np.array(vector, float)
+        return compiled().soften(self.row, np.ascontiguousarray(free, float), shape, way, rounds), shape
 
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
@@ -284,26 +309,24 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     slot[network.free] = np.arange(len(network.free))
     bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
     springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
-    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name in ADDRESSES}
+    given: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
     given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
-    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}
+    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network), "unit": of.unit}
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
-    whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
     return {
-        name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64)
-        for name in ADDRESSES
-        if given[name] is not None
+        name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
+        for name, values in given.items()
+        if values is not None
     }
 
 
-def _leaves(network: Discretisation, slot: Any) -> Any:
+def _leaves(network: Discretisation) -> Any:
     """Return the last element that holds each free unknown, -1 if none does."""
-    last = np.full(network.size, -1, np.int64)
-    for number, unknowns in enumerate(network.elements.unknowns):
-        last[unknowns] = number
-    return last[slot >= 0]
+    last, unknowns = np.full(network.size, -1, np.int64), network.elements.unknowns
+    last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
+    return last[network.free]
 
 
 def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
 ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
+N_POWERS, STIFF_SHARE = 3, 1e-2
+"""Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
 NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
 
@@ -111,6 +113,12 @@ class NetworkProblem:
         flexible = int((np.abs(inverse) > energy.FLEXIBLE_SHARE * np.abs(inverse).max()).sum())
         order = np.argsort(-np.abs(inverse))[: min(count, flexible)]
         return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
+
+    def is_stiff(self, at: PathEquilibrium, stiffness: float) -> bool:
+        """Return True if no eigenvalue is as small as a stiffness by far: two powers of the flexibility say so."""
+        vector = np.cos(np.arange(len(at.x)) * np.arange(1, len(at.x) + 1))  # at right angles to no mode
+        flexibility, _ = self.equations.soften(at.x, at.drive, vector, N_POWERS)
+        return 0 < abs(flexibility) * stiffness < STIFF_SHARE
 
     @cached_property
     def follows(self) -> bool:

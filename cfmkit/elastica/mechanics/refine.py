@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica.mechanics.polynomials import basis, interpolation
+from cfmkit.elastica.model.section import Taper
+from cfmkit.elastica.model.shapes import Polynomial
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.model.network import Network
 
 DENSITIES = ("angle", "axial", "shear", "ahead")
 """Tables that are functions along an element; `weight` and `rigidity` hold the speed of its parameter, too."""
+
+
+def has_polynomial_tables(network: Network) -> bool:
+    """Return True if all tables of a network are polynomials of a low degree: to raise theirs changes nothing."""
+    sections = [beam.section for beam in network.beams.values()]
+    plain = not any(section.wide or isinstance(section.thickness, Taper) for section in sections)
+    return plain and all(isinstance(beam.shape, Polynomial) for beam in network.beams.values())
 
 
 def raise_degree(network: Discretisation, degree: int) -> Discretisation:
@@ -25,7 +36,7 @@ def raise_degree(network: Discretisation, degree: int) -> Discretisation:
     if degree == network.degree:
         return network
     e, old, new = network.elements, basis(network.degree), basis(degree)
-    to_new = interpolation(old.places, new.places).T
+    to_new = _to_points(network.degree, degree)
     speed = (e.weight / old.weights) @ to_new
     tables = {name: getattr(e, name) @ to_new for name in DENSITIES}
     tables["weight"] = speed * new.weights
@@ -38,12 +49,17 @@ def raise_degree(network: Discretisation, degree: int) -> Discretisation:
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
     size = ends + count * (degree + 1)
-    held = np.setdiff1d(np.arange(network.size), network.free)
-    free = np.setdiff1d(np.arange(size), held)
+    free = np.concatenate([network.free[network.free < ends], np.arange(ends, size)])
     base, rate = np.zeros(size, network.base.dtype), np.zeros(size)
     base[:ends], rate[:ends] = network.base[:ends], network.rate[:ends]
     elements = e._replace(**tables, unknowns=unknowns)
     return replace(network, degree=degree, elements=elements, size=size, free=free, base=base, rate=rate)
+
+
+@lru_cache(maxsize=64)
+def _to_points(degree: int, finer: int) -> Any:
+    """Return the matrix that takes values at the Gauss points of a degree to those of another, from the right."""
+    return interpolation(basis(degree).places, basis(finer).places).T
 
 
 def embed(network: Discretisation, fine: Discretisation, z: Any) -> Any:

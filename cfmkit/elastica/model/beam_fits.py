@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.beam import Fit, fit
 from cfmkit.elastica.model.plain_beams_at_once import Bundle
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.model.beam import Fit
+    from collections.abc import Iterator
+
     from cfmkit.elastica.model.network import Network
 
 
@@ -28,14 +30,25 @@ def bundle_of(network: Network) -> Bundle:
     return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
 
 
-def fits_of(network: Network, bundle: Bundle | None = None) -> dict[str, Fit]:
-    """Return how each beam is fitted between its nodes, by its name; `bundle`: its plain ones, if they are known."""
-    bundle = bundle_of(network) if bundle is None else bundle
-    found = {}
-    for name, beam in network.beams.items():
-        own = bundle.fit_of(name)
-        if own is None:
-            (xa, ya), (xb, yb) = (beam_end_at(network, name, side) for side in (0, 1))
-            own = fit(beam, (xb - xa, yb - ya))
-        found[name] = own
-    return found
+class BeamFits(Mapping[str, Fit]):
+    """How each beam is fitted between its nodes, by its name, as they are requested."""
+
+    def __init__(self, network: Network, bundle: Bundle | None = None) -> None:
+        """Remember the beams; `bundle`: the plain ones, if they are known."""
+        self._network, self._bundle = network, bundle_of(network) if bundle is None else bundle
+        self._known: dict[str, Fit] = {}
+
+    def __getitem__(self, name: str) -> Fit:
+        """Return the fit of a beam."""
+        if name not in self._known:
+            (xa, ya), (xb, yb) = (beam_end_at(self._network, name, side) for side in (0, 1))
+            self._known[name] = self._bundle.fit_of(name) or fit(self._network.beams[name], (xb - xa, yb - ya))
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._network.beams)
+
+    def __len__(self) -> int:
+        """Return the number of beams."""
+        return len(self._network.beams)

@@ -12,7 +12,6 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
-from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
@@ -182,7 +181,7 @@ class EquilibriumPath(ShortRepr):
     @cached_property
     def residual(self) -> FloatArray:
         """Gradient of the functional by all unknowns at every point, (n, size): zero at free ones; dimensionless."""
-        return read_only(equations(self.network).gradients(self.at.z, self.at.drive))
+        return self.at.residual
 
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""

@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
+from cfmkit.elastica.mechanics.refine import has_polynomial_tables, raise_degree
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.results.path import Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
@@ -56,6 +57,8 @@ class DegreeAndPieces:
 
     def finer(self, path: Path) -> Discretisation:
         """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
+        if has_polynomial_tables(path.net):
+            return raise_degree(path.network, path.network.degree + DEGREES_MORE)
         fine = self.arrays(path.net, path.given, DEGREES_MORE)
         return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
 

@@ -143,6 +143,8 @@ class Assembly(ShortRepr):
         density = {name: one.density for name, one in materials.items() if one.density is not None}
         if len(density) < len(materials):
             return None
+        from cfmkit.elastica.vibration import NetworkMasses
+
         nodes = {name: mechanism.nodes[name.split(".")[0]] for name in self.network.nodes}
         return NetworkMasses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica import PointLoad
-from cfmkit.elastica.model.beam_fits import fits_of
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.export.contours import (
     Contour,
     Curve2D,
@@ -125,7 +125,7 @@ def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, 
 def _strips(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[BeamStrip]]:
     """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
     network = assembly.network
-    fits = fits_of(network)
+    fits = BeamFits(network)
     return {name: strips(network, fits, name, SPARSE * tolerance) for name in network.beams}
 
 

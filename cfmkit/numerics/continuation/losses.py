@@ -171,6 +171,9 @@ def start_critical(walk: Walk) -> Walk | None:
     Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
     """
     problem, start = walk.problem, walk.here
+    is_stiff = getattr(problem, "is_stiff", None)
+    if is_stiff is not None and is_stiff(start, CRITICAL):
+        return None
     values, modes = problem.modes(start, 1)
     if abs(values[0]) > CRITICAL:
         return None
