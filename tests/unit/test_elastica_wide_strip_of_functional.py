@@ -26,14 +26,12 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.kernels import wide_strip as shooting
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import effort_slopes
 from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.march import CompiledEquations, equations
-from cfmkit.elastica.mechanics.wide_strip import curling_share
 
 X = np.array([0.3, 0.02, 2e9, 0.35, 0.9])  # thickness [mm], width [m], modulus [Pa], Poisson's ratio, curvature
 
@@ -49,13 +47,6 @@ def strips(x: Any) -> tuple[Network, Displacement]:
         "n": Beam("c", "b", narrow, Polynomial((0.0, -x[4], 0.5))),
     }
     return Network(nodes, beams), Displacement("b", -np.pi / 2, np.array([2e-3, 6e-3, 1.2e-2]))
-
-
-def test_the_share_of_curling_is_that_of_the_shooting_engine_on_both_sides_of_its_series() -> None:
-    z = np.array([0.0, 1e-6, 0.3, 0.999, 1.001, 5.0, 300.0, 1e6])
-    own = np.array(curling_share(z)).T
-    law = getattr(shooting.curling, "py_func", shooting.curling)
-    assert own == pytest.approx(np.array([law(value) for value in z]), rel=1e-11, abs=1e-300)
 
 
 def test_the_hessian_of_a_wide_strip_is_the_derivative_of_its_gradient() -> None:
