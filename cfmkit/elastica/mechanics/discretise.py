@@ -292,11 +292,8 @@ class _ArrayBuilder:
 
     def _tables(self, cuts: Mapping[str, list[float]]) -> dict[str, Any]:
         """Return the tables of all elements, one beam after the other: (e, q) each."""
-        plain = {
-            name: row
-            for row, name in enumerate(self.bundle.names[k] for k in self.bundle.plain)
-            if len(cuts[name]) == 2
-        }
+        names = [self.bundle.names[k] for k in self.bundle.plain]
+        plain = {name: row for row, name in enumerate(names) if len(cuts[name]) == 2}
         together = self._plain_tables() if plain and not self.wide else {}
         if together and len(plain) == len(cuts):
             return together
@@ -384,9 +381,8 @@ class _ArrayBuilder:
         """Return the line loads of every element: constant and growing with the drive."""
         given = [(k, load) for k, loads in enumerate((self.network.loads, self.drive.loads)) for load in loads]
         lines = [(k, load) for k, load in given if isinstance(load, LineLoad)]
-        total = np.zeros(
-            (len(beams), 2, 2), np.result_type(float, *(x for _, load in lines for x in (load.wx, load.wy)))
-        )
+        kind = np.result_type(float, *(value for _, load in lines for value in (load.wx, load.wy)))
+        total = np.zeros((len(beams), 2, 2), kind)
         unit = self.scales.length / self.scales.force
         for grows, load in lines:
             own = [name == load.beam for name in beams]
@@ -475,10 +471,8 @@ def _is_straight(beam: Beam, fits: Mapping[str, Fit], name: str) -> bool:
     if isinstance(beam.shape, Polynomial):
         return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
     fitted = fits[name]
-    return (
-        len(fitted.course.breaks) == 2
-        and not np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0
-    )
+    angle = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)
+    return len(fitted.course.breaks) == 2 and not np.ptp(angle) > 0
 
 
 def _turns_little(beam: Beam) -> bool:

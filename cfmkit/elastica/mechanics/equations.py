@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -55,8 +55,7 @@ class LinearEquations(NamedTuple):
     change: FloatArray
 
 
-@dataclass(frozen=True)
-class MarchState:
+class MarchState(NamedTuple):
     """An equilibrium: free unknowns (n,) and their slopes along the way, all dimensionless."""
 
     free: Any
@@ -353,7 +352,7 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
             if plan.on_branch and not _leads_back(equations, here, new, seen.moved, plan.tolerance):
                 return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
             earlier = [here, *earlier[: N_PREDICTING - 2]]
-            here = replace(new, target=passed if lands else -1)
+            here = new._replace(target=passed if lands else -1)
             states.append(here)
             passed += lands
             quality = seen.missed / (seen.moved + 1e-8)

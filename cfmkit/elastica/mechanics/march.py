@@ -6,6 +6,7 @@ addresses, so that an array of rows is many designs; what the addresses point to
 
 from __future__ import annotations
 
+import itertools
 import os
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -194,10 +195,10 @@ class CompiledEquations(NumpyEquations):
         known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
         here = np.concatenate([start.free, start.rate, [start.way]])
         code = compiled().march(self.row, given, here, known, goals, rows, stored)
-        states = tuple(
-            MarchState(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
-            for row in rows[: stored[0]].copy()
-        )
+        rows = rows[: stored[0]].copy()
+        way, effort, told, target = rows[:, 2 * n :].T.tolist()
+        given_states = zip(rows[:, :n], way, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True)
+        states = tuple(itertools.starmap(MarchState, given_states))
         march = NaturalMarch(states, MarchCode(code), float(given[0]))
         return self._counted(march, start.unstable) if self.follows else march
 
@@ -207,7 +208,7 @@ class CompiledEquations(NumpyEquations):
         for state in march.states:
             if self._unstable(state.free, state.way, state.unstable) != unstable:
                 return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
-            states.append(replace(state, unstable=unstable))
+            states.append(state._replace(unstable=unstable))
         return replace(march, states=tuple(states))
 
 

@@ -77,7 +77,7 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
             branch = branch._replace(label=what)
     # just at a bifurcation Newton's method fails where the way there has led
     if ramps:
-        at = correct(problem, at.x, 0.0) or replace(at, drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
+        at = correct(problem, at.x, 0.0) or at._replace(drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
     return DriveStart(*_remove_floors(problem, at), tuple(events), branch, first, None)
 
 

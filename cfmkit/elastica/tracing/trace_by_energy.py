@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,20 +11,25 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
-from cfmkit.elastica.mechanics.refine import has_polynomial_tables, raise_degree
+from cfmkit.elastica.mechanics.refine import embed, has_polynomial_tables, raise_degree
 from cfmkit.elastica.model.drive import Control
+from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
+from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
 DEGREES = 5, 14  # with which a path is tried first, by its tolerance
@@ -32,7 +38,10 @@ MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
 MAX_PIECES = 4
 MAX_ROUNDS = 6
-FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four at once
+FEW_BEAMS = {1: 4, 2: 2, 3: 2}  # degrees more to begin with
+SLOWEST_FALL = 0.9  # of coefficients from one degree to the next that a forecast is made from
+MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
+"""Error of a path, and motion of its points, up to which it is raised to a higher degree as it is."""
 NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
@@ -51,15 +60,19 @@ class DegreeAndPieces:
     pieces: int = 1
     tension: Mapping[str, float] | None = None
 
-    def arrays(self, network: Network, drive: Drive, more: int = 0) -> Discretisation:
-        """Return the arrays of a network, with a higher degree by `more`."""
-        return discretise(network, drive, self.degree + more, self.pieces, self.tension)
+    def arrays(self, network: Network, drive: Drive) -> Discretisation:
+        """Return the arrays of a network."""
+        return discretise(network, drive, self.degree, self.pieces, self.tension)
 
     def finer(self, path: Path) -> Discretisation:
         """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
+        return replace(self, degree=self.degree + DEGREES_MORE).raised(path)
+
+    def raised(self, path: Path) -> Discretisation:
+        """Return the arrays of this degree for a path with a lower one and the same pieces, with the same floors."""
         if has_polynomial_tables(path.net):
-            return raise_degree(path.network, path.network.degree + DEGREES_MORE)
-        fine = self.arrays(path.net, path.given, DEGREES_MORE)
+            return raise_degree(path.network, self.degree)
+        fine = self.arrays(path.net, path.given)
         return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
 
 
@@ -68,7 +81,10 @@ class TraceAttempt(NamedTuple):
 
     path: Path
     mesh: DegreeAndPieces
+    start: DriveStart
     first: Buckling | None  # first loss of stability
+    events: tuple[PathEvent, ...]  # along the drive
+    branches: tuple[PathBranch | None, ...]  # that the points are on
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
@@ -115,26 +131,27 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceAttempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
-    mesh, best, before = DegreeAndPieces(degree), None, None
+    mesh, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
+    attempt: TraceAttempt | None = None  # raised from the one before
     for count in range(MAX_ROUNDS):
-        attempt = trace_on(network, drive, control, mesh)
+        attempt = attempt or trace_on(network, drive, control, mesh)
         path = attempt.path
         if is_stretched(path.network, path.at.z):
             return attempt
         taut = _tension(path, mesh.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
             mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
-            best = attempt
+            best, attempt = attempt, None
             continue
-        path = _with_error(path, mesh)
+        finer = mesh.finer(path)
+        path = _with_error(path, finer)
         if tolerance < path.error < NEARLY * tolerance:
-            path = _with_error(polish(path), mesh)
+            path = _with_error(polish(path), finer)
         attempt = attempt._replace(path=path)
         if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
-        settled = _are_settled(path, before, control)
-        if path.error <= tolerance and settled and path.status in (PathStatus.COMPLETE, PathStatus.FULL):
+        reached = path.error <= tolerance and path.status in (PathStatus.COMPLETE, PathStatus.FULL)
+        if reached and _are_settled(attempt, finer, control, before):
             break
         if path.status is PathStatus.NO_START and count >= 2:
             break
@@ -142,17 +159,102 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             break
         before = path
         if mesh.degree < MAX_DEGREE:
-            mesh = replace(mesh, degree=min(MAX_DEGREE, mesh.degree + (4 if path.error > FAR_OFF * tolerance else 2)))
+            mesh = replace(mesh, degree=_next_degree(path, tolerance))
+            attempt = raise_attempt(attempt, mesh, control)
         elif mesh.pieces < MAX_PIECES:
-            mesh = replace(mesh, pieces=2 * mesh.pieces, degree=DEGREE_OF_PIECES)
+            mesh, attempt = replace(mesh, pieces=2 * mesh.pieces, degree=DEGREE_OF_PIECES), None
         else:
             break
     assert best is not None
     return best
 
 
-def _with_error(path: Path, mesh: DegreeAndPieces) -> Path:
-    errors = point_errors(path, mesh.finer(path), pick_points(path))
+def _first_degree(network: Network, tolerance: float) -> int:
+    """Return the degree to begin with: a higher one costs little where there are few beams, which often buckle."""
+    beams = len(network.beams)
+    more = FEW_BEAMS[beams] if beams in FEW_BEAMS and not any(coils(beam) for beam in network.beams.values()) else 0
+    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES)) + more
+
+
+def _next_degree(path: Path, tolerance: float) -> int:
+    """Return the degree with which a path should reach a tolerance.
+
+    The error of forces falls as the square of the last coefficients of the rotation.
+    """
+    degree, e = path.network.degree, path.network.elements
+    last = np.abs(path.at.z[:, e.unknowns[:, -6:-2]]).max(axis=(0, 1)) if len(path) else np.ones(4)
+    fall = float(np.sqrt(last[2:].max() / max(last[:2].max(), 1e-300)))  # from one degree to the next
+    if not (np.isfinite(path.error) and 0 < fall < 1):
+        return min(MAX_DEGREE, degree + 4)
+    more = np.log(path.error / tolerance) / (-2 * np.log(min(fall, SLOWEST_FALL)))
+    return int(min(MAX_DEGREE, degree + np.clip(2 * np.ceil(0.5 * more), 2, 8)))
+
+
+def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control) -> TraceAttempt | None:
+    """Return a path with a higher degree, its points and events found from what they were.
+
+    None if it is another path then.
+    """
+    path, start, span = attempt.path, attempt.start, _span(attempt.path)
+    if path.status is not PathStatus.COMPLETE or start.events or not path.error < MAX_RAISED_ERROR or not span:
+        return None
+    fine = mesh.raised(path)
+    problem = replace(start.problem, network=fine)
+    z = embed(path.network, fine, path.at.z)
+    guess = z[:, fine.free]
+    solved = problem.equations.solve_each(guess, path.at.drive)
+    moved = np.abs(solved.free - guess)[:, problem.motions].max(initial=0.0)
+    if not solved.converged.all() or (solved.unstable != path.unstable).any() or not moved < MAX_RAISED_MOTION:
+        return None
+    z[:, fine.free] = solved.free
+    drives = _relocate(attempt, problem)
+    if drives is None:
+        return None
+    moved_to = {event.drive: drive for event, drive in zip(attempt.events, drives, strict=True)}
+    branches = tuple(
+        branch if branch is None else branch._replace(drive=moved_to.get(branch.drive, branch.drive))
+        for branch in attempt.branches
+    )
+    unit = path.network.scales.drive
+    events = tuple(replace(event, drive=drive * unit) for event, drive in zip(path.events, drives, strict=True))
+    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=events)
+    lifted = tuple(_lift(event, drive, path.network, fine) for event, drive in zip(attempt.events, drives, strict=True))
+    started = start._replace(problem=problem)
+    return attempt._replace(path=raised, mesh=mesh, start=started, branches=branches, events=lifted)
+
+
+def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
+    """Return the drives of the events of a path on a finer mesh, None if one of them is not there."""
+    path, fine = attempt.path, problem.network
+    span = _span(path) / path.network.scales.drive
+    lift = partial(_lift_free, path.network, fine)
+    drives = []
+    for event in attempt.events:
+        drive = relocate(problem, event, lift, span)
+        if drive is None:
+            return None
+        drives.append(drive)
+    return drives
+
+
+def _lift_free(network: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
+    z = np.zeros(network.size)
+    z[network.free] = x
+    return np.asarray(embed(network, fine, z)[fine.free])
+
+
+def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discretisation) -> PathEvent:
+    def lift(at: PathEquilibrium | None) -> Any:
+        if at is None:
+            return None
+        return at._replace(x=_lift_free(network, fine, at.x), rate=_lift_free(network, fine, at.rate))
+
+    within = None if event.within is None else (lift(event.within[0]), lift(event.within[1]))
+    return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
+
+
+def _with_error(path: Path, finer: Discretisation) -> Path:
+    errors = point_errors(path, finer, pick_points(path))
     return replace(path, error=float(errors.max(initial=0.0)))
 
 
@@ -181,7 +283,7 @@ def trace_on(
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
     arrays = mesh.arrays(network, drive)
     start = find_start(arrays, control)
-    events, first, points = [*start.events], start.first, list[Point]()
+    events, first, points = list[PathEvent](), start.first, list[Point]()
     ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
@@ -189,7 +291,7 @@ def trace_on(
             if isinstance(item, Point):
                 points.append(item)
             elif isinstance(item, PathEvent):
-                events.append(Event(item.kind, item.drive * unit, item.before, item.after))
+                events.append(item)
                 if first is None and item.modes is not None:
                     first = Buckling(start.problem, item, "")
                     if first_only:
@@ -199,7 +301,9 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    return TraceAttempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
+    told = (*start.events, *(Event(event.kind, event.drive * unit, event.before, event.after) for event in events))
+    path = _path(network, drive, start, points, told, status, message)
+    return TraceAttempt(path, mesh, start, first, tuple(events), tuple(point.branch for point in points))
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
@@ -220,15 +324,19 @@ def _path(
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
-    names = [_name_branch(point.branch, arrays.scales.drive) for point in points]
     return Path(
         network, drive, Equilibria(arrays, z, drives),
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
-        branch=read_only(np.array(names, np.str_), np.str_),
+        branch=_name_branches([point.branch for point in points], arrays.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
     )  # fmt: skip
+
+
+def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
+    names = {id(branch): _name_branch(branch, unit) for branch in branches}
+    return read_only(np.array([names[id(branch)] for branch in branches], np.str_), np.str_)
 
 
 def _name_branch(branch: PathBranch | None, unit: float) -> str:
@@ -259,19 +367,24 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
     return status, text
 
 
-def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
-    """Return True if limit points, and bifurcations of the primary path, lie where they do at another degree.
+def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control, before: Path | None) -> bool:
+    """Return True if limit points, and bifurcations of the primary path, lie where they do at a higher degree.
 
     The path itself says little about their error: a straight column has none, while its high modes have waves.
     """
-    places = [event.drive for event in path.events]
-    folds = any(event.kind == "limit point" for event in path.events)
-    if not places or not (folds or control.branch == "primary"):
+    path = attempt.path
+    folds = any(event.kind == "limit point" for event in attempt.events)
+    if not attempt.events or not (folds or control.branch == "primary"):
         return True
-    if before is None or len(before.events) != len(places):
+    limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
+    drives = _relocate(attempt, replace(attempt.start.problem, network=finer))
+    if drives is not None:
+        places = np.array([event.drive for event in attempt.events])
+        return bool(np.abs(places - drives).max() * path.network.scales.drive <= limit)
+    if before is None or len(before.events) != len(path.events):
         return False
-    shift = np.abs(np.array(places) - [event.drive for event in before.events]).max()
-    return bool(shift <= max(EVENT_TOLERANCE, control.tolerance) * _span(path))
+    shifts = [abs(one.drive - other.drive) for one, other in zip(path.events, before.events, strict=True)]
+    return max(shifts) <= limit
 
 
 def _span(path: Path) -> float:

@@ -44,7 +44,7 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     found = locate_stability_change(problem, back, new)
     if found is None:
         return "unsure"
-    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near)
+    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near, within=found.within)
 
 
 def primary_slope(problem: ContinuationProblem, at: PathEquilibrium, modes: FloatArray) -> FloatArray:
@@ -70,20 +70,23 @@ def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[PathEqui
             continue
         if largest_motion(problem, beyond.x - guess) > 0.05 + 2 * abs(ahead) * largest_motion(problem, slope):
             continue
-        before = _count_before(walk, fold.drive, beyond, ahead)
-        if before > beyond.unstable:
-            return beyond, PathEvent("bifurcation", fold.drive, before, beyond.unstable, fold.near, modes)
+        before = _least_stable_before(walk, fold.drive, beyond, ahead)
+        if before is not None:
+            within = before, beyond
+            event = PathEvent("bifurcation", fold.drive, before.unstable, beyond.unstable, fold.near, modes, within)
+            return beyond, event
     return None
 
 
-def _count_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahead: float) -> int:
-    """Return the unstable directions of the path through `beyond` a little before a drive."""
-    at, most = beyond, beyond.unstable
+def _least_stable_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahead: float) -> PathEquilibrium | None:
+    """Return an equilibrium a little before a drive on the path through `beyond`, as far as it is less stable there."""
+    at, least = beyond, None
     for factor in LOOK_BACK:
-        if most - beyond.unstable >= walk.modes:
+        if least is not None and least.unstable - beyond.unstable >= walk.modes:
             break
         goal = drive - factor * ahead
         prior = correct(walk.problem, at.x + (goal - at.drive) * at.rate, goal)
         if prior is not None and prior.unstable > beyond.unstable:
-            at, most = prior, max(most, prior.unstable)
-    return most
+            least = prior if least is None or prior.unstable > least.unstable else least
+            at = prior
+    return least

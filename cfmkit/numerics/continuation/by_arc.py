@@ -86,8 +86,7 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
     """Yield the requested values within a step; return the walk with the next one, or None if one is not found."""
     for number in walk.targets_up_to(move.new.drive):
         goal = float(walk.targets[number])
-        share = (goal - move.old.drive) / (move.new.drive - move.old.drive)
-        at = correct(walk.problem, move.old.x + share * (move.new.x - move.old.x), goal)
+        at = correct(walk.problem, move.between(goal), goal)
         if at is None:
             return None
         yield Point(at, number, walk.branch)

@@ -172,7 +172,8 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         drive, near = (found.drive, found.near) if found else (new.drive, None)
         lost = new.unstable - here.unstable
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
-        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes)
+        within = found.within if found else None
+        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes, within)
     elif walk.branch is not None:
         end = find_passed_end(walk, new)
         if end == "unsure":

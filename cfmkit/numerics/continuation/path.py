@@ -36,8 +36,7 @@ class Options:
     cluster: float = 1e-3  # share of the range within which bifurcations may be one
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
+class Point(NamedTuple):
     """An equilibrium of a path."""
 
     at: PathEquilibrium
@@ -55,6 +54,7 @@ class PathEvent:
     after: int
     near: PathEquilibrium | None = None
     modes: Any = None  # (n, k) critical ones, if they were computed
+    within: tuple[PathEquilibrium, PathEquilibrium] | None = None  # equilibria on both sides, of one path
 
 
 class WhyStopped(Enum):
