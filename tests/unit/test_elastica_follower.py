@@ -61,7 +61,8 @@ def test_a_column_under_a_partly_tangential_load_diverges_where_its_tangent_is_s
     expected = (np.arccos(-share / (1 - share)) / (np.pi / 2)) ** 2
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(expected, rel=10 * tolerance)
-    assert (path.stable == (path.drive < expected)).all()
+    beside = np.abs(path.drive - expected) > 1e-9 * expected
+    assert (path.stable == (path.drive < expected))[beside].all()
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])

@@ -40,7 +40,7 @@ def strip() -> Network:
 def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a path of one degree that is too low for the tolerance."""
     monkeypatch.setattr(trace_by_energy, "MAX_ROUNDS", 1)
-    monkeypatch.setattr(trace_by_energy, "DEGREES", (5, 5))
+    monkeypatch.setattr(trace_by_energy, "_first_degree", lambda *_: 5)
     return trace(strip(), BENDING, Control(tolerance=1e-10))
 
 

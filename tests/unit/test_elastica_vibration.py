@@ -284,6 +284,6 @@ def test_masses_must_be_known_and_positive() -> None:
 
 
 def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cfmkit.elastica.vibration.stiffness_and_mass_matrices._MOST", 20)
+    monkeypatch.setattr("cfmkit.elastica.vibration.MAX_UNKNOWNS", 20)
     with pytest.raises(InputError, match="unknowns, more than 20: the beams have too many windings or too much"):
         frequencies(under(1e-9, beam()), WHOLE, 3)

@@ -195,8 +195,13 @@ class EquilibriumPath(ShortRepr):
         Raises
         ------
         cfmkit.errors.InputError
-            If a link moves the node.
+            If there is no such node, or a link moves it.
         """
+        if node not in self.net.nodes:
+            raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.net.nodes)}")
+        if self.net.moved(node):
+            master = self.net.master_of(node)
+            raise InputError(f"node {node!r} is moved by a link: what is held is its master, {master!r}")
         return read_only(node_reaction(self.at, node, self.residual))
 
     @cached_property

@@ -24,7 +24,7 @@ DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
-ROUNDING = 1e-13
+ROUNDING = 1e-13  # of a force, and of an error; dimensionless
 CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
 SAME_POINT = 1e-3  # motion by which a point may be improved
@@ -60,7 +60,9 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     load = max(largest_force(fine.at), NO_FORCE)
     size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
     reach = max(float(np.abs(own.z[:, :n_bodies]).max()), SMALL_MOTION)
-    relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
+    unloaded = (forces <= ROUNDING) & (efforts <= ROUNDING * scales.moment / scales.drive)
+    changes = np.where(unloaded, 0.0, np.maximum(efforts / size, forces / load))
+    relative = np.maximum(changes, moves / reach)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.losses import Items
+    from cfmkit.numerics.continuation.problem import ContinuationProblem
 
 LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
 TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
@@ -131,7 +132,8 @@ def _end_at_fold(
 
 def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:
     """Yield what is left before a limit point of the drive, where the path ends."""
-    problem, last, sense = walk.problem, fold.before, walk.sense
+    problem, sense = walk.problem, walk.sense
+    last = _last_before(problem, begin, fold, sense)
     for number in walk.targets_up_to(fold.drive):
         goal = float(walk.targets[number])
         share = (goal - begin.drive) / (last.drive - begin.drive)
@@ -142,3 +144,17 @@ def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> I
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
     return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)
+
+
+def _last_before(
+    problem: ContinuationProblem, begin: PathEquilibrium, fold: Located, sense: float
+) -> PathEquilibrium:
+    """Return the equilibrium nearest to a limit point, on the side that the path comes from.
+
+    A location may close in from behind: then it is the other one at that drive.
+    """
+    near: PathEquilibrium | None = fold.near
+    if fold.near.unstable > begin.unstable:
+        near = correct(problem, 2 * fold.x - fold.near.x, fold.near.drive)
+    known = near is not None and near.unstable == begin.unstable and (near.drive - fold.before.drive) * sense > 0
+    return near if near is not None and known else fold.before
