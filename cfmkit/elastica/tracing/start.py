@@ -78,7 +78,10 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
     # just at a bifurcation Newton's method fails where the way there has led
     if ramps:
         at = correct(problem, at.x, 0.0) or at._replace(drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
-    return DriveStart(*_remove_floors(problem, at), tuple(events), branch, first, None)
+    problem, at = _remove_floors(problem, at)
+    if not ramps:  # at rest nothing bears anything: forces that Newton's method leaves there are rounding
+        at = at._replace(x=np.zeros_like(at.x), effort=0.0)
+    return DriveStart(problem, at, tuple(events), branch, first, None)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
