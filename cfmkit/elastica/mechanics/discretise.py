@@ -533,4 +533,6 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff = replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff.known.update((key, made.stiffen(stiff)) for key, made in discretisation.known.items())
+    return stiff

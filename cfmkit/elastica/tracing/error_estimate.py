@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.refine import embed
 from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -81,10 +83,11 @@ def polish(path: Path) -> Path:
 
 def _largest_force(at: Equilibria) -> float:
     """Return the largest force or moment in a beam at any state, dimensionless."""
-    e = at.network.elements
-    fields = energy.fields(at.network, at.z, at.drive)
-    moment = np.abs(e.rigidity * fields.curvature * e.length[:, None]).max(initial=0.0)
-    return float(max(moment, np.abs(fields.normal).max(initial=0.0), np.abs(fields.shear).max(initial=0.0)))
+    network, e = at.network, at.network.elements
+    own = at.z[:, e.unknowns]
+    curvature = own[..., energy.rotation_columns(network.degree)] @ basis(network.degree).slopes.T
+    moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
+    return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))
 
 
 def pick_points(path: Path) -> list[int]:
@@ -92,11 +95,16 @@ def pick_points(path: Path) -> list[int]:
     if not len(path):
         return []
     at = path.at_requested if len(path.at_requested) else np.arange(len(path))
-    highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2]]
-    left = np.abs(highest).max(axis=(1, 2))  # what the last polynomials say: the next may be as large
-    parts = np.array_split(np.arange(len(at)), MAX_POINTS - 2)
-    chosen = {int(at[part[left[part].argmax()]]) for part in parts if len(part)}
-    chosen |= {int(at[np.abs(path.effort[at]).argmax()]), int(at[-1])}
+    chosen = {int(at[np.abs(path.effort[at]).argmax()]), int(at[-1])}
+    if len(at) <= MAX_POINTS:
+        chosen.update(at.tolist())
+    else:
+        highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2].ravel()]
+        left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
+        bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
+        chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))
+    if not path.events:
+        return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
     places = [event.drive for event in path.events]
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

@@ -37,6 +37,7 @@ DEGREES = 5, 14  # with which a path is tried first, by its tolerance
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
+DEGREE_OF_LAYERS = 10  # at least, where taut ones are
 MAX_PIECES = 4
 MAX_ROUNDS = 6
 FEW_BEAMS = {1: 4, 2: 2, 3: 2}  # degrees more to begin with
@@ -141,7 +142,8 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             return attempt
         taut = _tension(path, mesh.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
-            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
+            degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
+            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
         finer = mesh.finer(path)
@@ -174,7 +176,11 @@ def _first_degree(network: Network, tolerance: float) -> int:
     """Return the degree to begin with: a higher one costs little where there are few beams, which often buckle."""
     beams = len(network.beams)
     more = FEW_BEAMS[beams] if beams in FEW_BEAMS and not any(coils(beam) for beam in network.beams.values()) else 0
-    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES)) + more
+    return _plain_degree(tolerance) + more
+
+
+def _plain_degree(tolerance: float) -> int:
+    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
 
 
 def _next_degree(path: Path, tolerance: float) -> int:
@@ -256,7 +262,9 @@ def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discret
 
 def _with_error(path: Path, finer: Discretisation) -> Path:
     errors = point_errors(path, finer, pick_points(path))
-    return replace(path, error=float(errors.max(initial=0.0)))
+    told = replace(path, error=float(errors.max(initial=0.0)))
+    vars(told)["effort"] = path.effort  # is known
+    return told
 
 
 def _end_alike(path: Path, before: Path) -> bool:
@@ -309,7 +317,7 @@ def trace_on(
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
     targets = drive.points / unit
-    span = float(np.ptp(np.append(targets, 0.0)))
+    span = max(float(targets.max()), 0.0) - min(float(targets.min()), 0.0)
     nearest = abs(float(targets[0])) / span or FIRST_STEP
     return Options(
         span, control.branch, control.sign, control.through_folds, control.largest_turn,
@@ -389,7 +397,8 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
 
 
 def _span(path: Path) -> float:
-    return float(np.ptp(np.append(path.given.points, 0.0)))
+    points = path.given.points
+    return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)
 
 
 def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
