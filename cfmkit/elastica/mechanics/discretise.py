@@ -10,27 +10,25 @@ too.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, powers_at_points, slopes_at_points
-from cfmkit.elastica.model.beam import Fit, fit
+from cfmkit.elastica.mechanics.element_tables import BeamFits, element_tables, smooth_marks
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
 from cfmkit.elastica.model.numbering import apart, driven
-from cfmkit.elastica.model.plain_beams_at_once import Bundle, is_plain
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -44,7 +42,6 @@ LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
 FRAME_OF_DRIVE = 3
 """Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
-SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
 class MechanicsUnits(NamedTuple):
@@ -114,7 +111,7 @@ class Discretisation:
     scales: MechanicsUnits
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
-    fits: Mapping[str, Fit]
+    fits: BeamFits
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
 
     @cached_property
@@ -139,6 +136,7 @@ def discretise(
     pieces: int = 1,
     tension: Mapping[str, float] | None = None,
     scales: MechanicsUnits | None = None,
+    fits: BeamFits | None = None,
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -154,27 +152,29 @@ def discretise(
         Beams under a large tension N to their L sqrt(N/EI).
     scales : MechanicsUnits, optional
         Units; found from the beams unless given.
+    fits : BeamFits, optional
+        Those of the same network, if it was set up before.
 
     Raises
     ------
     cfmkit.errors.InputError
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales).build()
+    fits = fits or BeamFits(network)
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build()
 
 
 class _ArrayBuilder:
     """Numbers unknowns and attachments and collects the elements."""
 
     def __init__(
-        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any
-    ) -> None:
+        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any,
+        fits: BeamFits,
+    ) -> None:  # fmt: skip
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = 0
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.bundle = _bundle(network)
-        self.fits = BeamFits(network, self.bundle)
-        self.wide = any(beam.section.wide for beam in network.beams.values())
+        self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -187,7 +187,7 @@ class _ArrayBuilder:
         """Return the arrays."""
         beams = self.network.beams
         cuts = {name: self._cuts(name, beam) for name, beam in beams.items()}
-        tables = self._tables(cuts)
+        tables = element_tables(self.fits, self.scales, self.degree, cuts)
         ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
@@ -289,67 +289,6 @@ class _ArrayBuilder:
 
     _elements_before = 0  # of the beams that are attached
 
-    def _tables(self, cuts: Mapping[str, list[float]]) -> dict[str, Any]:
-        """Return the tables of all elements, one beam after the other: (e, q) each."""
-        names = [self.bundle.names[k] for k in self.bundle.plain]
-        plain = {name: row for row, name in enumerate(names) if len(cuts[name]) == 2}
-        together = self._plain_tables() if plain and not self.wide else {}
-        if together and len(plain) == len(cuts):
-            return together
-        parts = []
-        for name, beam in self.network.beams.items():
-            if name in plain and together:
-                parts.append({column: values[plain[name]][None] for column, values in together.items()})
-            else:
-                parts += self._smooth_tables(beam, self.fits[name], cuts[name])
-        return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-
-    def _plain_tables(self) -> dict[str, Any]:
-        """Return the tables of plain beams of one element: in a few array operations for all of them."""
-        bundle, rule = self.bundle, basis(self.degree)
-        length, force = self.scales.length, self.scales.force
-        speed = bundle.length[:, None] / length
-        ones = np.ones(len(rule.places))
-        rigidity = bundle.bending[:, None] / (force * length**2) / speed**2 * ones
-        axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
-        return {
-            "angle": bundle.coefficients @ powers_at_points(self.degree, bundle.coefficients.shape[1]),
-            "weight": speed * rule.weights, "rigidity": rigidity, "axial": axial, "shear": shear,
-            "ahead": speed * (1 - rule.places), "length": speed[:, 0],
-        }  # fmt: skip
-
-    def _smooth_tables(self, beam: Beam, fitted: Fit, cuts: list[float]) -> Iterator[dict[str, Any]]:
-        """Yield the tables of the elements in each smooth part of a beam, (k, q)."""
-        length, force, rule = self.scales.length, self.scales.force, basis(self.degree)
-        marks = _marks(beam, fitted)
-        for begin, end in itertools.pairwise(marks):
-            own = np.array([pair for pair in itertools.pairwise(cuts) if begin <= 0.5 * sum(pair) < end])
-            left, width, inside = own[:, :1], own[:, 1:] - own[:, :1], 0.5 * (begin + end)
-            t = left + width * rule.places
-            speed = fitted.speed(t, inside) * width / length + 0.0 * t
-            rigidity, axial, shear = beam.section.rigidities(fitted.arc(t), float(np.real(fitted.arc(inside))))
-            whole = speed @ rule.weights
-            yield {
-                "angle": fitted.angle(t, inside) + 0.0 * t,
-                "weight": speed * rule.weights,
-                "rigidity": rigidity / (force * length**2) / speed**2,
-                "axial": axial * force + 0.0 * t,
-                "shear": shear * force + 0.0 * t,
-                "ahead": whole[:, None] - speed @ integrals_to_points(self.degree).T,
-                "length": whole,
-            } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
-
-    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
-        """Return the tables of wide strips."""
-        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
-        curl, hindrance = beam.section.curling(thickness)
-        angle = fitted.angle(t, inside) + 0.0 * t
-        return {
-            "rest": angle @ slopes_at_points(self.degree).T,
-            "curl": curl / (speed * self.scales.length) ** 2,
-            "hindrance": hindrance + 0.0 * speed,
-        }
-
     def _floor(self, name: str, beam: Beam) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
         if beam.section.axial or not _is_straight(beam, self.fits, name):
@@ -430,44 +369,6 @@ def _direction(angle: Any) -> Any:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def _bundle(network: Network) -> Bundle:
-    """Return the beams of a network; plain ones are fitted together."""
-    ends = np.array(
-        [
-            (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
-            for beam in network.beams.values()
-            for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
-        ]
-    )
-    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
-
-
-class BeamFits(Mapping[str, Fit]):
-    """How each beam is fitted between its nodes, by its name, as they are requested."""
-
-    def __init__(self, network: Network, bundle: Bundle) -> None:
-        """Remember the beams."""
-        self._network, self._bundle, self._known = network, bundle, dict[str, Fit]()
-
-    def __getitem__(self, name: str) -> Fit:
-        """Return the fit of a beam."""
-        if name not in self._known:
-            beam = self._network.beams[name]
-            start, end = self._network.nodes[beam.start], self._network.nodes[beam.end]
-            dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
-            dy = end.y + beam.end_offset[1] - start.y - beam.start_offset[1]
-            self._known[name] = self._bundle.fit_of(name) or fit(beam, (dx, dy))
-        return self._known[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._network.beams)
-
-    def __len__(self) -> int:
-        """Return the number of beams."""
-        return len(self._network.beams)
-
-
 def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
     """Return which unknowns anything acts on: a rotation that nothing resists or turns is none of them."""
     used = np.zeros(size, bool)
@@ -485,25 +386,16 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
     return used
 
 
-def _marks(beam: Beam, fitted: Fit) -> list[float]:
-    """Return the parameters between which a beam is smooth."""
-    stations = [float(np.real(fitted.parameter(float(s)))) for s in np.real(beam.section.stations)]
-    marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
-    marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
-    marks[0], marks[-1] = 0.0, 1.0
-    return marks
-
-
 def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     """Return the parameters between which the elements of a beam lie."""
     count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
-    smooth = itertools.pairwise(_marks(beam, fitted))
+    smooth = itertools.pairwise(smooth_marks(beam, fitted))
     cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
 
 
-def _is_straight(beam: Beam, fits: Mapping[str, Fit], name: str) -> bool:
+def _is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
     """Return True if a beam is straight before it is loaded."""
     if isinstance(beam.shape, Polynomial):
         return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])

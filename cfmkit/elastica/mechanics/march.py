@@ -50,8 +50,8 @@ KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
 ADDRESSES = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
-    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot", "leaves", "base", "rate", "unit", "spring_at",
-    "spring", "load_at", "load", "rest", "curl", "hindrance",
+    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
+    "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESSES)

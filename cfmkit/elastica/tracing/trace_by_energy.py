@@ -10,8 +10,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
-from cfmkit.elastica.mechanics.refine import embed, has_polynomial_tables, raise_degree
+from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.outcome.path import Event, PathStatus
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.element_tables import BeamFits
     from cfmkit.elastica.mechanics.problem import NetworkProblem
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
@@ -62,20 +63,9 @@ class DegreeAndPieces:
     pieces: int = 1
     tension: Mapping[str, float] | None = None
 
-    def arrays(self, network: Network, drive: Drive) -> Discretisation:
-        """Return the arrays of a network."""
-        return discretise(network, drive, self.degree, self.pieces, self.tension)
-
-    def finer(self, path: Path) -> Discretisation:
-        """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
-        return replace(self, degree=self.degree + DEGREES_MORE).raised(path)
-
-    def raised(self, path: Path) -> Discretisation:
-        """Return the arrays of this degree for a path with a lower one and the same pieces, with the same floors."""
-        if has_polynomial_tables(path.net):
-            return raise_degree(path.network, self.degree)
-        fine = self.arrays(path.net, path.given)
-        return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
+    def arrays(self, network: Network, drive: Drive, fits: BeamFits | None = None) -> Discretisation:
+        """Return the arrays of a network, whose beams may be fitted already."""
+        return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits)
 
 
 class TraceAttempt(NamedTuple):
@@ -120,7 +110,10 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
         return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID)
     if path.error <= tolerance or not len(path):
         return path
-    accurate = point_errors(path, attempt.mesh.finer(path), range(len(path))) <= tolerance
+    accurate = (
+        point_errors(path, raise_degree(path.network, path.network.degree + DEGREES_MORE), range(len(path)))
+        <= tolerance
+    )
     text = f"the tolerance of {tolerance:.3g} was not reached: error {path.error:.3g}, "
     text += f"{(~accurate).sum()} of {len(path)} points"
     complete = path.status is PathStatus.COMPLETE
@@ -135,8 +128,10 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
     tolerance = control.tolerance
     mesh, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
     attempt: TraceAttempt | None = None  # raised from the one before
+    fits: BeamFits | None = None
     for count in range(MAX_ROUNDS):
-        attempt = attempt or trace_on(network, drive, control, mesh)
+        attempt = attempt or trace_on(network, drive, control, mesh, fits=fits)
+        fits = attempt.path.network.fits
         path = attempt.path
         if is_stretched(path.network, path.at.z):
             return attempt
@@ -146,7 +141,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        finer = mesh.finer(path)
+        finer = _finer(path)
         path = _with_error(path, finer)
         if tolerance < path.error < NEARLY * tolerance:
             path = _with_error(polish(path), finer)
@@ -205,7 +200,7 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
     path, start, span = attempt.path, attempt.start, _span(attempt.path)
     if path.status is not PathStatus.COMPLETE or start.events or not path.error < MAX_RAISED_ERROR or not span:
         return None
-    fine = mesh.raised(path)
+    fine = raise_degree(path.network, mesh.degree)
     problem = replace(start.problem, network=fine)
     z = embed(path.network, fine, path.at.z)
     guess = z[:, fine.free]
@@ -260,6 +255,11 @@ def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discret
     return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
 
 
+def _finer(path: Path) -> Discretisation:
+    """Return the arrays by which errors are estimated."""
+    return raise_degree(path.network, path.network.degree + DEGREES_MORE)
+
+
 def _with_error(path: Path, finer: Discretisation) -> Path:
     errors = point_errors(path, finer, pick_points(path))
     told = replace(path, error=float(errors.max(initial=0.0)))
@@ -288,9 +288,10 @@ def trace_on(
     mesh: DegreeAndPieces,
     first_only: bool = False,
     limit: int | None = None,
+    fits: BeamFits | None = None,
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
-    arrays = mesh.arrays(network, drive)
+    arrays = mesh.arrays(network, drive, fits)
     start = find_start(arrays, control)
     events, first, points = list[PathEvent](), start.first, list[Point]()
     ending = PathStop(WhyStopped.LOST, 0.0)
