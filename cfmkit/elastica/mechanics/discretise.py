@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, powers_at_points, slopes_at_points
-from cfmkit.elastica.model.beam_fits import BeamFits, bundle_of
+from cfmkit.elastica.mechanics.element_tables import element_tables, smooth_marks
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.driven_node import driven
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
@@ -26,7 +26,7 @@ from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam, Fit
@@ -43,7 +43,6 @@ LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
 FRAME_OF_DRIVE = 3
 """Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
-SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
 class MechanicsUnits(NamedTuple):
@@ -113,7 +112,7 @@ class Discretisation:
     scales: MechanicsUnits
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
-    fits: Mapping[str, Fit]
+    fits: BeamFits
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
     pieces: int = 1  # elements for every smooth piece of a beam, at least
     tension: Mapping[str, float] | None = None  # beams that were cut for a large tension
@@ -140,6 +139,7 @@ def discretise(
     pieces: int = 1,
     tension: Mapping[str, float] | None = None,
     scales: MechanicsUnits | None = None,
+    fits: BeamFits | None = None,
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -155,27 +155,29 @@ def discretise(
         Beams under a large tension N to their L sqrt(N/EI).
     scales : MechanicsUnits, optional
         Units; found from the beams unless given.
+    fits : BeamFits, optional
+        Those of the same network, if it was set up before.
 
     Raises
     ------
     cfmkit.errors.InputError
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales).build()
+    fits = fits or BeamFits(network)
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build()
 
 
 class _ArrayBuilder:
     """Numbers unknowns and attachments and collects the elements."""
 
     def __init__(
-        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any
-    ) -> None:
+        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any,
+        fits: BeamFits,
+    ) -> None:  # fmt: skip
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
         self.count = 0
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.bundle = bundle_of(network)
-        self.fits = BeamFits(network, self.bundle)
-        self.wide = any(beam.section.wide for beam in network.beams.values())
+        self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -188,7 +190,7 @@ class _ArrayBuilder:
         """Return the arrays."""
         beams = self.network.beams
         cuts = {name: self._cuts(name, beam) for name, beam in beams.items()}
-        tables = self._tables(cuts)
+        tables = element_tables(self.fits, self.scales, self.degree, cuts)
         ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
@@ -290,67 +292,6 @@ class _ArrayBuilder:
 
     _elements_before = 0  # of the beams that are attached
 
-    def _tables(self, cuts: Mapping[str, list[float]]) -> dict[str, Any]:
-        """Return the tables of all elements, one beam after the other: (e, q) each."""
-        names = [self.bundle.names[k] for k in self.bundle.plain]
-        plain = {name: row for row, name in enumerate(names) if len(cuts[name]) == 2}
-        together = self._plain_tables() if plain and not self.wide else {}
-        if together and len(plain) == len(cuts):
-            return together
-        parts = []
-        for name, beam in self.network.beams.items():
-            if name in plain and together:
-                parts.append({column: values[plain[name]][None] for column, values in together.items()})
-            else:
-                parts += self._smooth_tables(beam, self.fits[name], cuts[name])
-        return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-
-    def _plain_tables(self) -> dict[str, Any]:
-        """Return the tables of plain beams of one element: in a few array operations for all of them."""
-        bundle, rule = self.bundle, basis(self.degree)
-        length, force = self.scales.length, self.scales.force
-        speed = bundle.length[:, None] / length
-        ones = np.ones(len(rule.places))
-        rigidity = bundle.bending[:, None] / (force * length**2) / speed**2 * ones
-        axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
-        return {
-            "angle": bundle.coefficients @ powers_at_points(self.degree, bundle.coefficients.shape[1]),
-            "weight": speed * rule.weights, "rigidity": rigidity, "axial": axial, "shear": shear,
-            "ahead": speed * (1 - rule.places), "length": speed[:, 0],
-        }  # fmt: skip
-
-    def _smooth_tables(self, beam: Beam, fitted: Fit, cuts: list[float]) -> Iterator[dict[str, Any]]:
-        """Yield the tables of the elements in each smooth part of a beam, (k, q)."""
-        length, force, rule = self.scales.length, self.scales.force, basis(self.degree)
-        marks = _marks(beam, fitted)
-        for begin, end in itertools.pairwise(marks):
-            own = np.array([pair for pair in itertools.pairwise(cuts) if begin <= 0.5 * sum(pair) < end])
-            left, width, inside = own[:, :1], own[:, 1:] - own[:, :1], 0.5 * (begin + end)
-            t = left + width * rule.places
-            speed = fitted.speed(t, inside) * width / length + 0.0 * t
-            rigidity, axial, shear = beam.section.rigidities(fitted.arc(t), float(np.real(fitted.arc(inside))))
-            whole = speed @ rule.weights
-            yield {
-                "angle": fitted.angle(t, inside) + 0.0 * t,
-                "weight": speed * rule.weights,
-                "rigidity": rigidity / (force * length**2) / speed**2,
-                "axial": axial * force + 0.0 * t,
-                "shear": shear * force + 0.0 * t,
-                "ahead": whole[:, None] - speed @ integrals_to_points(self.degree).T,
-                "length": whole,
-            } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
-
-    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
-        """Return the tables of wide strips."""
-        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
-        curl, hindrance = beam.section.curling(thickness)
-        angle = fitted.angle(t, inside) + 0.0 * t
-        return {
-            "rest": angle @ slopes_at_points(self.degree).T,
-            "curl": curl / (speed * self.scales.length) ** 2,
-            "hindrance": hindrance + 0.0 * speed,
-        }
-
     def _floor(self, name: str, beam: Beam) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
         if beam.section.axial or not _is_straight(beam, self.fits, name):
@@ -448,25 +389,16 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
     return used
 
 
-def _marks(beam: Beam, fitted: Fit) -> list[float]:
-    """Return the parameters between which a beam is smooth."""
-    stations = [float(np.real(fitted.parameter(float(s)))) for s in np.real(beam.section.stations)]
-    marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
-    marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
-    marks[0], marks[-1] = 0.0, 1.0
-    return marks
-
-
 def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     """Return the parameters between which the elements of a beam lie."""
     count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
-    smooth = itertools.pairwise(_marks(beam, fitted))
+    smooth = itertools.pairwise(smooth_marks(beam, fitted))
     cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
 
 
-def _is_straight(beam: Beam, fits: Mapping[str, Fit], name: str) -> bool:
+def _is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
     """Return True if a beam is straight before it is loaded."""
     if isinstance(beam.shape, Polynomial):
         return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
@@ -496,7 +428,9 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff = replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff.known.update((key, made.stiffen(stiff)) for key, made in discretisation.known.items())
+    return stiff
 
 
 def discretise_alike(template: Discretisation, network: Network, drive: Drive) -> Discretisation:

@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -109,6 +109,10 @@ class NumpyEquations:
     def __post_init__(self) -> None:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.network))
+
+    def stiffen(self, network: Discretisation) -> NumpyEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        return replace(self, network=network)
 
     @property
     def n(self) -> int:

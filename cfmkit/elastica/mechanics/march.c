@@ -225,8 +225,7 @@ static int newton(const Model *m, Work *w, double *x, double *way, const Goal *g
             }
         found->unstable = unstable_of(m, w);
         found->told = told_unstable(m, w);
-        factors_solve(&w->factors, m->follows != 0, w->step);
-        factors_solve(&w->factors, m->follows != 0, w->slope);
+        factors_solve_two(&w->factors, m->follows != 0, w->step, w->slope);
         double along = 0.0;
         if (border) {
             double left = goal->level - border[n] * *way, below = border[n];

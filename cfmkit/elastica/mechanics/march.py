@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import itertools
 import os
+from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.discretise import BeamElements
@@ -48,8 +50,8 @@ KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
 ADDRESSES = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
-    "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
-    "spring", "load_at", "load", "rest", "curl", "hindrance",
+    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
+    "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
 OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESSES)
@@ -109,6 +111,15 @@ class CompiledEquations(NumpyEquations):
         compiled().place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
+
+    def stiffen(self, network: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        stiff, axial = copy(self), np.ascontiguousarray(network.elements.axial, float)
+        object.__setattr__(stiff, "network", network)
+        object.__setattr__(stiff, "arrays", {**self.arrays, "axial": axial})
+        object.__setattr__(stiff, "row", self.row.copy())
+        compiled().place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
+        return stiff
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -270,16 +281,15 @@ def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: 
 
 def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
-    rule, tables = basis(own.network.degree), designs.tables
+    rule, tables, products = basis(own.network.degree), designs.tables, slope_products(own.network.degree)
     found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
     bend = tables["weight"] * tables["rigidity"]
     if designs.each:
-        found["bend"] = (rule.slopes.T * bend[:, :, None, :]) @ rule.slopes
+        found["bend"] = bend @ products
         found["spring"] = np.array([[_spring(one, spring)[1] for spring in one.springs] for one in designs.each])
         found["load"] = np.array([[_load(one, load)[1] for load in one.loads] for one in designs.each])
     else:  # the same along an element, but for the weights
-        whole = (rule.slopes.T * rule.weights) @ rule.slopes
-        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None, None] * whole
+        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None] * (rule.weights @ products)
     if designs.base is not None:
         found["base"] = np.ascontiguousarray(designs.base, float)
     return found
@@ -304,15 +314,15 @@ def model_counts(network: Discretisation, ramp: bool) -> dict[str, int]:
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     """Return the arrays of a `Model` in C order."""
-    network, rule = of.network, basis(of.network.degree)
+    network = of.network
     e, a = network.elements, network.attachments
     slot = np.full(network.size, -1, np.int64)
     slot[network.free] = np.arange(len(network.free))
-    bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
+    bend = (e.weight * e.rigidity) @ slope_products(network.degree)
     springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
     given: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
-    given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
+    given |= _shape_tables(network.degree) | {"base": network.base, "rate": network.rate}
     given |= {"bend": bend, "slot": slot, "leaves": _leaves(network), "unit": of.unit}
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
@@ -321,6 +331,21 @@ def model_arrays(of: NumpyEquations) -> dict[str, Any]:
         for name, values in given.items()
         if values is not None
     }
+
+
+@lru_cache(maxsize=64)
+def _shape_tables(degree: int) -> dict[str, Any]:
+    rule, (i, j) = basis(degree), np.tril_indices(degree + 1)
+    tables = {"values": rule.values, "slopes": rule.slopes, "values_by_shape": rule.values.T}
+    tables |= {"slopes_by_shape": rule.slopes.T, "products": rule.values[:, i] * rule.values[:, j]}
+    return {name: np.ascontiguousarray(table) for name, table in tables.items()}
+
+
+@lru_cache(maxsize=64)
+def slope_products(degree: int) -> FloatArray:
+    """Return the products of the slopes of two shape functions at the Gauss points, (q, triangle), by rows of it."""
+    slopes, (i, j) = basis(degree).slopes, np.tril_indices(degree + 1)
+    return read_only(slopes[:, i] * slopes[:, j])
 
 
 def _leaves(network: Discretisation) -> Any:

@@ -24,31 +24,26 @@ def beam_end_at(network: Network, name: str, side: int) -> tuple[Any, Any]:
     return node.x + offset[0], node.y + offset[1]
 
 
-def bundle_of(network: Network) -> Bundle:
-    """Return the beams of a network; plain ones are fitted together."""
-    ends = np.array([beam_end_at(network, name, side) for name in network.beams for side in (0, 1)])
-    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
-
-
 class BeamFits(Mapping[str, Fit]):
     """How each beam is fitted between its nodes, by its name, as they are requested."""
 
-    def __init__(self, network: Network, bundle: Bundle | None = None) -> None:
-        """Remember the beams; `bundle`: the plain ones, if they are known."""
-        self._network, self._bundle = network, bundle_of(network) if bundle is None else bundle
+    def __init__(self, network: Network) -> None:
+        """Fit the plain beams, all at once."""
+        ends = np.array([beam_end_at(network, name, side) for name in network.beams for side in (0, 1)])
+        self.network, self.bundle = network, Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
         self._known: dict[str, Fit] = {}
 
     def __getitem__(self, name: str) -> Fit:
         """Return the fit of a beam."""
         if name not in self._known:
-            (xa, ya), (xb, yb) = (beam_end_at(self._network, name, side) for side in (0, 1))
-            self._known[name] = self._bundle.fit_of(name) or fit(self._network.beams[name], (xb - xa, yb - ya))
+            (xa, ya), (xb, yb) = (beam_end_at(self.network, name, side) for side in (0, 1))
+            self._known[name] = self.bundle.fit_of(name) or fit(self.network.beams[name], (xb - xa, yb - ya))
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names."""
-        return iter(self._network.beams)
+        return iter(self.network.beams)
 
     def __len__(self) -> int:
         """Return the number of beams."""
-        return len(self._network.beams)
+        return len(self.network.beams)

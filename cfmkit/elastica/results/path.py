@@ -12,6 +12,7 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
+from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
@@ -355,7 +356,8 @@ def strain_energy(at: Equilibria) -> Any:
 
 def largest_force(at: Equilibria) -> float:
     """Return the largest force or moment in a beam at any state, dimensionless."""
-    e = at.network.elements
-    fields = energy.fields(at.network, at.z, at.drive)
-    moment = np.abs(e.rigidity * fields.curvature * e.length[:, None]).max(initial=0.0)
-    return float(max(moment, np.abs(fields.normal).max(initial=0.0), np.abs(fields.shear).max(initial=0.0)))
+    network, e = at.network, at.network.elements
+    own = at.z[:, e.unknowns]
+    curvature = own[..., energy.rotation_columns(network.degree)] @ basis(network.degree).slopes.T
+    moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
+    return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))

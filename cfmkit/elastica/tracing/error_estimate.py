@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -86,11 +87,16 @@ def pick_points(path: Path) -> list[int]:
     if not len(path):
         return []
     at = path.at_requested if len(path.at_requested) else np.arange(len(path))
-    highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2]]
-    left = np.abs(highest).max(axis=(1, 2))  # what the last polynomials say: the next may be as large
-    parts = np.array_split(np.arange(len(at)), MAX_POINTS - 2)
-    chosen = {int(at[part[left[part].argmax()]]) for part in parts if len(part)}
-    chosen |= {int(at[np.abs(path.effort[at]).argmax()]), int(at[-1])}
+    chosen = {int(at[np.abs(path.effort[at]).argmax()]), int(at[-1])}
+    if len(at) <= MAX_POINTS:
+        chosen.update(at.tolist())
+    else:
+        highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2].ravel()]
+        left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
+        bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
+        chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))
+    if not path.events:
+        return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
     places = [event.drive for event in path.events]
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

@@ -10,8 +10,8 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
-from cfmkit.elastica.mechanics.refine import embed, has_polynomial_tables, raise_degree
+from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Control
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.elastica.results.path import Event, Path, PathStatus
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.numerics.continuation.problem import PathEquilibrium
@@ -36,6 +37,7 @@ DEGREES = 5, 14  # with which a path is tried first, by its tolerance
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
+DEGREE_OF_LAYERS = 10  # at least, where taut ones are
 MAX_PIECES = 4
 MAX_ROUNDS = 6
 FEW_BEAMS = {1: 4, 2: 2, 3: 2}  # degrees more to begin with
@@ -60,20 +62,9 @@ class DegreeAndPieces:
     pieces: int = 1
     tension: Mapping[str, float] | None = None
 
-    def arrays(self, network: Network, drive: Drive) -> Discretisation:
-        """Return the arrays of a network."""
-        return discretise(network, drive, self.degree, self.pieces, self.tension)
-
-    def finer(self, path: Path) -> Discretisation:
-        """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
-        return replace(self, degree=self.degree + DEGREES_MORE).raised(path)
-
-    def raised(self, path: Path) -> Discretisation:
-        """Return the arrays of this degree for a path with a lower one and the same pieces, with the same floors."""
-        if has_polynomial_tables(path.net):
-            return raise_degree(path.network, self.degree)
-        fine = self.arrays(path.net, path.given)
-        return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
+    def arrays(self, network: Network, drive: Drive, fits: BeamFits | None = None) -> Discretisation:
+        """Return the arrays of a network, whose beams may be fitted already."""
+        return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits)
 
 
 class TraceAttempt(NamedTuple):
@@ -118,7 +109,10 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
         return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID)
     if path.error <= tolerance or not len(path):
         return path
-    accurate = point_errors(path, attempt.mesh.finer(path), range(len(path))) <= tolerance
+    accurate = (
+        point_errors(path, raise_degree(path.network, path.network.degree + DEGREES_MORE), range(len(path)))
+        <= tolerance
+    )
     text = f"the tolerance of {tolerance:.3g} was not reached: error {path.error:.3g}, "
     text += f"{(~accurate).sum()} of {len(path)} points"
     complete = path.status is PathStatus.COMPLETE
@@ -133,17 +127,20 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
     tolerance = control.tolerance
     mesh, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
     attempt: TraceAttempt | None = None  # raised from the one before
+    fits: BeamFits | None = None
     for count in range(MAX_ROUNDS):
-        attempt = attempt or trace_on(network, drive, control, mesh)
+        attempt = attempt or trace_on(network, drive, control, mesh, fits=fits)
+        fits = attempt.path.network.fits
         path = attempt.path
         if is_stretched(path.network, path.at.z):
             return attempt
         taut = _tension(path, mesh.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
-            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
+            degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
+            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        finer = mesh.finer(path)
+        finer = _finer(path)
         path = _with_error(path, finer)
         if tolerance < path.error < NEARLY * tolerance:
             path = _with_error(polish(path), finer)
@@ -173,7 +170,11 @@ def _first_degree(network: Network, tolerance: float) -> int:
     """Return the degree to begin with: a higher one costs little where there are few beams, which often buckle."""
     beams = len(network.beams)
     more = FEW_BEAMS[beams] if beams in FEW_BEAMS and not any(coils(beam) for beam in network.beams.values()) else 0
-    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES)) + more
+    return _plain_degree(tolerance) + more
+
+
+def _plain_degree(tolerance: float) -> int:
+    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
 
 
 def _next_degree(path: Path, tolerance: float) -> int:
@@ -198,7 +199,7 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
     path, start, span = attempt.path, attempt.start, _span(attempt.path)
     if path.status is not PathStatus.COMPLETE or start.events or not path.error < MAX_RAISED_ERROR or not span:
         return None
-    fine = mesh.raised(path)
+    fine = raise_degree(path.network, mesh.degree)
     problem = replace(start.problem, network=fine)
     z = embed(path.network, fine, path.at.z)
     guess = z[:, fine.free]
@@ -253,9 +254,16 @@ def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discret
     return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
 
 
+def _finer(path: Path) -> Discretisation:
+    """Return the arrays by which errors are estimated."""
+    return raise_degree(path.network, path.network.degree + DEGREES_MORE)
+
+
 def _with_error(path: Path, finer: Discretisation) -> Path:
     errors = point_errors(path, finer, pick_points(path))
-    return replace(path, error=float(errors.max(initial=0.0)))
+    told = replace(path, error=float(errors.max(initial=0.0)))
+    vars(told)["effort"] = path.effort  # is known
+    return told
 
 
 def _end_alike(path: Path, before: Path) -> bool:
@@ -279,9 +287,10 @@ def trace_on(
     mesh: DegreeAndPieces,
     first_only: bool = False,
     limit: int | None = None,
+    fits: BeamFits | None = None,
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
-    arrays = mesh.arrays(network, drive)
+    arrays = mesh.arrays(network, drive, fits)
     start = find_start(arrays, control)
     events, first, points = list[PathEvent](), start.first, list[Point]()
     ending = PathStop(WhyStopped.LOST, 0.0)
@@ -308,7 +317,7 @@ def trace_on(
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
     targets = drive.points / unit
-    span = float(np.ptp(np.append(targets, 0.0)))
+    span = max(float(targets.max()), 0.0) - min(float(targets.min()), 0.0)
     nearest = abs(float(targets[0])) / span or FIRST_STEP
     return Options(
         span, control.branch, control.sign, control.through_folds, control.largest_turn,
@@ -388,7 +397,8 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
 
 
 def _span(path: Path) -> float:
-    return float(np.ptp(np.append(path.given.points, 0.0)))
+    points = path.given.points
+    return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)
 
 
 def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:

@@ -111,7 +111,8 @@ def follow_arc(
     problem: ContinuationProblem, here: PathEquilibrium, tangent: FloatArray, length: float, options: Options
 ) -> Iterator[ArcMove]:
     """Yield accepted steps along the arc from an equilibrium, until none is found."""
-    first, weights, before = length, arc_weights(problem, options.span), None
+    first, weights = length, arc_weights(problem, options.span)
+    before: ArcMove | None = None
     while length > max(SHORTEST_SHARE * first, SHORTEST):
         bend = before.bend(length) if before is not None and length <= LONGEST_BEND * before.length else None
         step = step_along(problem, here, tangent, length, options.span, bend)

@@ -125,7 +125,7 @@ def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) ->
             size, mode = softest(at, mode)
         else:
             size = abs(float(problem.modes(at, 1)[0][0]))
-        return size if at.unstable == reference.unstable else -size
+        return float(size if at.unstable == reference.unstable else -size)
 
     return value
 
@@ -179,7 +179,8 @@ def relocate(
         return None
     if (first.unstable, last.unstable) != tuple(at.unstable for at in event.within):
         return None
-    located = locate_stability_change(problem, first, last)
+    # of several changes next to each other it is that to the stable side
+    located = locate_stability_change(problem, *((first, last) if event.before < event.after else (last, first)))
     return None if located is None else located.drive
 
 

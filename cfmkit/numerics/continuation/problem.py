@@ -39,6 +39,9 @@ class ContinuationProblem(Protocol):
     A mode is a direction in which the structure gives way, a column of n.
     """
 
+    def __hash__(self) -> int:
+        """Return a number for this very object."""
+
     @property
     def unit(self) -> FloatArray:
         """Natural sizes of the unknowns, (n,): 1 for motions."""
