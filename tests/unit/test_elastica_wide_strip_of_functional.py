@@ -83,5 +83,3 @@ def test_paths_stresses_and_energies_are_those_of_a_fine_mesh() -> None:
     bare = {name: replace(beam, section=replace(beam.section, wide=False)) for name, beam in net.beams.items()}
     narrow = functional_path(replace(net, beams=bare), drive, 8)
     assert np.abs(narrow.effort / path.effort - 1).max() > 1e-3
-
-

@@ -1,6 +1,5 @@
 """Efforts that are zero up to rounding: what is relative to them has no value; `static_balance` judges balancers."""
 
-
 import numpy as np
 import pytest
 from metrics_support import curve

@@ -47,7 +47,7 @@ MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
 NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
-MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam that is not cut: it locks
+MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: it locks
 WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_END = 1e-3  # share of the range within which two paths end alike
@@ -311,8 +311,9 @@ def trace_on(
         points.pop()
     status, message = _explain(start, ending, unit)
     told = (*start.events, *(Event(event.kind, event.drive * unit, event.before, event.after) for event in events))
-    path = _path(network, drive, start, points, told, status, message)
-    return TraceAttempt(path, mesh, start, first, tuple(events), tuple(point.branch for point in points))
+    path = _without_locked_points(_path(network, drive, start, points, told, status, message))
+    branches = tuple(point.branch for point in points[: len(path)])
+    return TraceAttempt(path, mesh, start, first, tuple(events), branches)
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
@@ -403,17 +404,30 @@ def _span(path: Path) -> float:
 
 def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e = path.network.elements
+    e, found = path.network.elements, dict[str, float]()
     if not len(path):
         return {}
-    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=(0, 2))
+    whole = _tautness(path)
+    resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
+    for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
+        if right - left > WHOLE and resolved[number] * (right - left) > TAUT:
+            found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
+    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
+
+
+def _tautness(path: Path) -> FloatArray:
+    """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
+    e = path.network.elements
+    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=1) * e.length
-    tautness = np.sqrt(force / bending) * e.length
-    whole: dict[str, float] = {}
-    for beam, length in zip(e.beam, e.length, strict=True):
-        whole[beam] = whole.get(beam, 0.0) + length
-    found: dict[str, float] = {}
-    for beam, value, length, (left, right) in zip(e.beam, tautness, e.length, e.cuts, strict=True):
-        if value > TAUT and right - left > WHOLE:
-            found[beam] = max(found.get(beam, 0.0), float(value / length * whole[beam]))
-    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value < MAX_TENSION}
+    lengths = {beam: e.length[[other == beam for other in e.beam]].sum() for beam in set(e.beam)}
+    return np.asarray(np.sqrt(force / bending) * [lengths[beam] for beam in e.beam])
+
+
+def _without_locked_points(path: Path) -> Path:
+    """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
+    rigid = ~path.network.elements.axial.any(axis=1)
+    if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
+        return path
+    locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
+    return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

@@ -160,11 +160,8 @@ def _in_the_way(solution: Solution) -> str:
         reported = f"inextensible beams between places that do not move ({', '.join(tied)}) hold the network rigid"
         return f"{said}; {reported}: leave one out, or set 'mechanism.axial: true'"
     if along:
-        held = (
-            f"inextensible beams that lie straight along the drive ({', '.join(along)}) do not move until they buckle"
-        )
-        bent = "or bend them by analysis.imperfection, by at least 1e-8 of their length"
-        return f"{said}; {held}: set 'mechanism.axial: true', {bent}"
+        held = f"inextensible beams lie straight along the drive ({', '.join(along)})"
+        return f"{said}; {held}: let them stretch by 'mechanism.axial: true'"
     return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
 
 
