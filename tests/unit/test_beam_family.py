@@ -778,9 +778,7 @@ def test_elastica_that_a_force_pulls_taut_move_as_far_as_they_are_long():
     drive = (("kind: displacement", "kind: force"), ("travel: 8 mm", "force: 1e6 N"))
     result = cfmkit.analyze(cfmkit.loads(functools.reduce(lambda text, change: text.replace(*change), drive, TAUT)))
     assert result.status is Status.COMPLETE
-    assert result.curve.motion[-1] == pytest.approx(
-        (20 * np.pi - 60) * MM, rel=1e-5
-    )  # the arc drawn straight
+    assert result.curve.motion[-1] == pytest.approx((20 * np.pi - 60) * MM, rel=1e-5)  # the arc drawn straight
 
 
 @pytest.mark.parametrize(

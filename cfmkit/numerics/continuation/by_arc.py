@@ -146,9 +146,7 @@ def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> I
     return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)
 
 
-def _last_before(
-    problem: ContinuationProblem, begin: PathEquilibrium, fold: Located, sense: float
-) -> PathEquilibrium:
+def _last_before(problem: ContinuationProblem, begin: PathEquilibrium, fold: Located, sense: float) -> PathEquilibrium:
     """Return the equilibrium nearest to a limit point, on the side that the path comes from.
 
     A location may close in from behind: then it is the other one at that drive.
