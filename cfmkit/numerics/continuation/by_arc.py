@@ -108,10 +108,16 @@ def _end_at_fold(
         again = walk.restart(move.old, walk.step, same_piece=True)
         return (yield from follow_by_arc(again, 0.1 * fineness))
     for number in walk.targets_up_to(fold.drive):
-        goal = float(walk.targets[number])
+        goal, turns = float(walk.targets[number]), walk.turns_at(fold.drive)
         beside = find_beside(walk.problem, fold.x, fold.drive, move.old, goal, begin.unstable)
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
+        if turns:
+            return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
+    if walk.turns_at(fold.drive):
+        yield Point(fold.near._replace(drive=float(walk.targets[walk.number])), walk.number, walk.branch)
+        walk = replace(walk, number=walk.number + 1)
+        return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if joined is None:
         return PathStop(WhyStopped.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined

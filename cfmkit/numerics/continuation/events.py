@@ -23,6 +23,7 @@ CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 3e-4
 """Shares of the first values at which a location ends: beside a pitchfork rounding acts as an imperfection does, and
 the drive of a fold is better known than its place, by the square."""
 MAX_SAMPLES = 40
+JUST_BEFORE = 1e-4  # of a step: how far the last equilibrium before a fold lies from it
 SAME_PATH_VALUE = 0.03  # share of the first values below which a sample comes on one path
 SAME_PATH_WIDTH = 5.0  # times its width by which the ends of a bracket may lie apart on one path
 HALVINGS = 40  # until only one direction changes its stability
@@ -216,5 +217,8 @@ def locate_fold(problem: ContinuationProblem, move: ArcMove, span: float) -> tup
     fold = locate(problem, move.old, move.new, solve, value, CLOSE_TO_FOLD)
     if fold is None:
         return None
+    just_before = solve(fold.share - JUST_BEFORE)
+    if just_before is not None and just_before.unstable == move.old.unstable and value(just_before) * value(move.old) > 0:
+        fold = fold._replace(before=just_before)
     past = solve(fold.share + 0.3 * (1 - fold.share))
     return fold, move.new.unstable if past is None or past.unstable == move.old.unstable else past.unstable
