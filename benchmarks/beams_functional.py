@@ -43,7 +43,7 @@ from cfmkit.elastica.mechanics.designs import set_up
 from cfmkit.elastica.mechanics.discretise import discretise
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP, MarchPlan, NumpyEquations, begin
 from cfmkit.elastica.mechanics.march import engine, equations, march_many
-from cfmkit.elastica.results.frequencies import frequencies
+from cfmkit.elastica.vibration import frequencies
 from cfmkit.elastica.vibration import NetworkMasses
 
 if TYPE_CHECKING:

@@ -1,13 +1,12 @@
 """Planar networks of slender beams in large deflection: one engine for all families that bend.
 
 `Network` says what it is, a `Displacement`, `Rotation` or `Loading` what is done to it, `trace` follows the
-equilibria, `Path` answers questions about them. Compiled code is loaded, and compiled once, when something is solved.
+equilibria, `Path` answers questions about them.
 
 References
 ----------
-[LL] C.-C. Lan, K.-M. Lee, ASME J. Mech. Des. 128 (2006) 765: the generalised (multiple) shooting method.
 [R] E. Reissner, Z. angew. Math. Phys. 23 (1972) 795: the beam theory.
-[D] M. Redheffer's star product, used to chain segments: J. Math. Phys. 41 (1962) 1.
+[Re] E. Reissner, J. Math. Phys. 29 (1950) 90: the mixed functional.
 """
 
 from __future__ import annotations
@@ -16,8 +15,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.continuation.batch import NetworkOutcome, trace_many
-    from cfmkit.elastica.continuation.trace_to_tolerance import trace
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
     from cfmkit.elastica.model.network import (
@@ -37,13 +34,14 @@ if TYPE_CHECKING:
     )
     from cfmkit.elastica.model.section import Section, Taper
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
-    from cfmkit.elastica.outcome.curling_stiffening import HinderedCurling, hindered_curling
-    from cfmkit.elastica.outcome.path import Event, Path, PathStatus
-    from cfmkit.elastica.sensitivity.output_derivatives import Gradient, gradient
+    from cfmkit.elastica.results.curling_stiffening import HinderedCurling, hindered_curling
+    from cfmkit.elastica.results.path import EquilibriumPath as Path
+    from cfmkit.elastica.results.path import Event, PathStatus
+    from cfmkit.elastica.sensitivity import Gradient, gradient
+    from cfmkit.elastica.tracing.trace_by_energy import trace
+    from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
 
 _HOMES = {
-    "continuation.batch": ("NetworkOutcome", "trace_many"),
-    "continuation.trace_to_tolerance": ("trace",),
     "model.beam": ("Beam",),
     "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
     "model.network": (
@@ -63,9 +61,11 @@ _HOMES = {
     ),
     "model.section": ("Section", "Taper"),
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
-    "outcome.curling_stiffening": ("HinderedCurling", "hindered_curling"),
-    "outcome.path": ("Event", "Path", "PathStatus"),
-    "sensitivity.output_derivatives": ("Gradient", "gradient"),
+    "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
+    "sensitivity": ("Gradient", "gradient"),
+    "results.path": ("Event", "Path", "PathStatus"),
+    "tracing.trace_by_energy": ("trace",),
+    "tracing.trace_many": ("NetworkOutcome", "trace_many"),
 }
 _HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.elastica.model.beam_fits import BeamFits, beam_end_at
 from cfmkit.elastica.model.drive import Displacement, Rotation
-from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class _Lines:
 
     def __init__(self, title: str, driven: DrivenNetwork, increments: int) -> None:
         self.title, self.network, self.drive, self.increments = title, driven.network, driven.drive, increments
-        self.layout = Layout(driven.network, driven.drive)
+        self.fits = BeamFits(driven.network)
         self.number = _numbers(driven.network)
         self.spare = len(driven.network.nodes) + 1
         self.spare_element = 1
@@ -159,7 +159,7 @@ class _Lines:
 
     def _chain(self, name: str) -> _Chain:
         """Return a beam's nodes and thicknesses: pieces end at corners of the shape and steps of the section."""
-        fit, beam = self.layout.fits[name], self.network.beams[name]
+        fit, beam = self.fits[name], self.network.beams[name]
         stations = [fit.parameter(float(one)) for one in beam.section.stations[1:-1]]
         breaks = np.unique(np.round(np.concatenate([np.real(fit.course.breaks), stations]), 13))
         marks = [0.0]
@@ -167,7 +167,7 @@ class _Lines:
             share = float(np.real(fit.arc(right) - fit.arc(left)))
             marks += np.linspace(left, right, max(4, math.ceil(share * ELEMENTS)) + 1)[1:].tolist()
         halves = np.interp(np.arange(2 * len(marks) - 1) / 2, np.arange(len(marks)), marks)
-        start = np.array(self.layout.beam_end_at(name, 0), float)
+        start = np.array(beam_end_at(self.network, name, 0), float)
         places = np.concatenate([[start], start + np.cumsum([_run(fit, *one) for one in pairwise(halves)], axis=0)])
         middles = 0.5 * (np.array(marks[1:]) + np.array(marks[:-1]))
         arcs = [float(np.real(fit.arc(float(one)))) for one in middles]

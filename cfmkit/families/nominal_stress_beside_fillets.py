@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Displacement, Network, Path, Rotation
     from cfmkit.elastica.model.beam import Beam
-    from cfmkit.elastica.outcome.sections import Sections
+    from cfmkit.elastica.results.beam_states import BeamSections as Sections
     from cfmkit.families.fem_results import FilletRow
 
 NEGLIGIBLE = 0.1
@@ -119,12 +119,12 @@ class SolvedBeams:
     def axes(self) -> Mapping[str, FloatArray]:
         """Centre lines before any load, (k, 2) each [m]."""
         path = self.path
-        return {name: path.shape(name, 0) - path.line_motion(name)[0] for name in path.layout.network.beams}
+        return {name: path.shape(name, 0) - path.line_motion(name)[0] for name in path.net.beams}
 
     @cached_property
     def sections(self) -> Mapping[str, Sections]:
         """Stresses at the places of the centre lines, at all points."""
-        return {name: self.path.sections(name) for name in self.path.layout.network.beams}
+        return {name: self.path.sections(name) for name in self.path.net.beams}
 
     @cached_property
     def largest(self) -> FloatArray:
@@ -141,7 +141,7 @@ class SolvedBeams:
             return float("nan")
         stresses = [
             stress
-            for name, beam in self.path.layout.network.beams.items()
+            for name, beam in self.path.net.beams.items()
             for place in edge
             if (stress := self._on_edge(name, beam, place, point)) is not None
         ]

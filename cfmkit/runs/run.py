@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -289,7 +290,9 @@ def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) 
 
     content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
     cited = {"bibtex": text} if (text := family(spec.family).bibtex) else {}
-    return {"command": command, "arguments": list(arguments), "spec": content, **cited}
+    march = sys.modules.get("cfmkit.elastica.mechanics.march")  # of beams that bend only
+    engine = {} if march is None else {"beam_engine": march.engine()}
+    return {"command": command, "arguments": list(arguments), "spec": content, **engine, **cited}
 
 
 def analysed(spec: Spec, run: Run) -> Report:

@@ -20,11 +20,11 @@ from cfmkit.errors import CfmError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-NUMERICAL = ("numba", "numpy", "scipy")
+NUMERICAL = ("numpy", "scipy")
 """The libraries whose versions can change a number."""
 
-_LEFT_BEHIND = (".pyc", ".pyo", ".nbi", ".nbc", ".so", ".pyd")
-"""Endings of what Python, numba and a compiler put beside source files."""
+_LEFT_BEHIND = (".pyc", ".pyo", ".so", ".pyd")
+"""Endings of what Python and a compiler put beside source files."""
 
 
 def file_hash(path: Path) -> str | None:

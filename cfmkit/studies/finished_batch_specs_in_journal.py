@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 RECORDS = 1
 """How records are written: those of another number are not found."""
 
-LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numba", "numpy", "pint", "pydantic", "scipy", "shapely")
+LIBRARIES = ("SALib", "PyYAML", "ezdxf", "matplotlib", "numpy", "pint", "pydantic", "scipy", "shapely")
 """Those that can change a file of a run."""
 
 KEPT = (ExitCode.OK, ExitCode.INVALID, ExitCode.NO_SOLUTION, ExitCode.PARTIAL, ExitCode.REQUIREMENT_MISSED)

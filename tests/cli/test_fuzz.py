@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from cfmkit.cli.main import main
-from cfmkit.elastica.warming import warm
 from cfmkit.store.file_names_and_overwrite_checks import JOURNAL
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
@@ -149,12 +148,6 @@ def check_mutants(folder: Path, count: int, seed: int, capsys: pytest.CaptureFix
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    """Compile the whole engine, which takes half a minute where it has not been done, and is no case's own time."""
-    assert list(warm())
 
 
 @pytest.fixture

@@ -37,7 +37,6 @@ COMMANDS = {
     "sensitivity": ("sensitivity", "studies/cam_tolerance.yaml", *FEW, "-o", "out", "--no-plots"),
     "show": ("show", "cam"),
     "sweep": ("sweep", "cam.yaml", "--vary", "mechanism.roller_radius=8 mm:16 mm:3", "-o", "out", "--no-plots"),
-    "warm": ("warm",),
 }
 
 SECONDS = re.compile(r" +(\w+ )*[\d.]+ (ms|s|min|h)( \d+ s)?$|\d+ files, [\d.]+ MB", re.M)
@@ -59,8 +58,6 @@ def test_every_verb_is_tried():
 def test_the_program_says_and_writes_what_the_same_command_does_here(cli, command):
     configs = cli.folder / "configs"
     found = []
-    if command == ("doctor",):
-        cli("warm")  # else it may say that nothing is compiled, and say otherwise when another test has compiled it
     for run in (cli, cli.program):
         shutil.copytree(CONFIGS, configs)
         *head, lines = (configs / "synthetic/cam_loop.csv").read_text().split("\n", 2)

@@ -238,22 +238,19 @@ def test_the_doctor_knows_versions_folders_and_the_solver(site, capsys):
     assert main(["doctor", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["versions"]["cfmkit"] == cfmkit.__version__
-    assert {"numpy", "numba"} <= {one["name"] for one in found["packages"] if one["version"]}
+    assert {"numpy", "scipy"} <= {one["name"] for one in found["packages"] if one["version"]}
     assert all(one["writable"] for one in found["folders"])
     assert found["message"] == "nothing is wrong"
     assert main(["doctor"]) == 0
     assert capsys.readouterr().out.endswith("nothing is wrong\n")
 
 
-def test_the_doctor_sees_whether_the_solver_is_compiled(tmp_path, monkeypatch):
-    from cfmkit.elastica.kernels import disk_cache, machine_code
-
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert disk_cache.kept_in() is None
-    (tmp_path / "solver-0123456789abcdef01234567.code").touch()
-    assert disk_cache.kept_in() is None
-    disk_cache.write("solver", machine_code.Code((), b"code"))
-    assert disk_cache.kept_in() == tmp_path
+def test_the_doctor_says_what_the_beam_engine_runs_on(site, monkeypatch, capsys):
+    monkeypatch.setenv("CFMKIT_WITHOUT_C", "1")
+    assert main(["doctor", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["solver"] == {"engine": "numpy", "switched_off": True}
+    assert main(["doctor"]) == 0
+    assert "CFMKIT_WITHOUT_C is set" in capsys.readouterr().out
 
 
 def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, capsys):

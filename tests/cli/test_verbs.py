@@ -12,7 +12,7 @@ from cfmkit import families
 from cfmkit._version import __version__
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "clean", "warm", "doctor"]
+VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "clean", "doctor"]
 
 
 def test_version_is_printed(cli):
@@ -411,11 +411,3 @@ def test_a_shell_without_completion_is_refused_in_one_line(cli):
     done = cli("--show-completion", "tcsh")
     assert (done.code, len(done.err.splitlines())) == (2, 1)
     assert "tcsh" in done.err
-
-
-def test_the_beam_engine_can_be_compiled_ahead(cli):
-    done = cli("warm", "--json")
-    parts = json.loads(done.out)["parts"]
-    assert done.code == 0
-    assert [part["name"] for part in parts][:2] == ["equilibria and paths", "states along beams"]
-    assert all(part["seconds"] >= 0 for part in parts)

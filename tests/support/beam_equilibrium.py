@@ -8,16 +8,34 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from cfmkit.elastica import LineSpring, Loading, Path, PointLoad, SlideSpring, TorsionSpring
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.results.beam_states import elements_of, states, unloaded
+from cfmkit.elastica.results.path import N_PLACES
+
+
+def parameters(path: Path, beam: str) -> np.ndarray:
+    """Return the parameters of a beam's shape at its sampled places: evenly spaced on each element."""
+    share = np.linspace(0.0, 1.0, N_PLACES)
+    cuts = path.network.elements.cuts[elements_of(path.network, beam)]
+    return np.concatenate([left + (right - left) * share for left, right in cuts])
+
+
+def mean_motion(path: Path, beam: str) -> np.ndarray:
+    """Return the integral of the displacements along a beam at every point, (n, 2) [m^2]."""
+    places, own = basis(path.network.degree).places, elements_of(path.network, beam)
+    weights = path.network.elements.weight[own].ravel() * path.network.scales.length
+    now, rest = states(path.net, path.at, beam, places), unloaded(path.net, path.at, beam, places)
+    return np.stack([(now.x - rest[:, 0]) @ weights, (now.y - rest[:, 1]) @ weights], axis=1)
 
 
 class Judge:
     """What is out of balance at one point of a path, from its answers alone."""
 
     def __init__(self, path: Path, point: int) -> None:
-        self.path, self.point, self.network = path, point, path.layout.network
+        self.path, self.point, self.network = path, point, path.net
         self.beams = list(self.network.beams)
         self.moved = {name: path.motion(name)[point] for name in self.network.nodes}
-        drive = path.layout.drive
+        drive = path.given
         self.loads: list[tuple[Any, float]] = [(load, 1.0) for load in self.network.loads]
         if isinstance(drive, Loading):
             self.loads += [(load, float(path.drive[point])) for load in drive.loads]
@@ -40,24 +58,22 @@ class Judge:
 
         Every sampled state is integrated as far as the next, so that no error grows along a beam.
         """
-        beam, sampler = self.network.beams[name], self.path.sampler
-        rows, scales = sampler.rows(self.beams.index(name)), self.path.layout.scales
-        units = np.array([scales.length, scales.length, 1.0, scales.moment, scales.force, scales.force])
-        y = sampler.states[self.point, rows.index][:, :6] * units
+        beam, t, seen = self.network.beams[name], parameters(self.path, name), self.path.states(name)
+        y = np.stack([getattr(seen, one)[self.point] for one in ("x", "y", "turn", "moment", "h", "v")], axis=1)
         ends = np.array([y[k] - self.wanted(name, side, y[k]) for side, k in enumerate((0, -1))])
-        one, other = np.arange(len(rows.t) - 1), np.arange(1, len(rows.t))
-        apart = rows.t[other] > rows.t[one]
+        one, other = np.arange(len(t) - 1), np.arange(1, len(t))
+        apart = t[other] > t[one]
         miss = [ends, (y[other] - y[one])[~apart]]
         one, other = one[apart], other[apart]
         marks = np.union1d(
             self.path.fits[name].course.breaks,
             [self.path.fits[name].parameter(float(f)) for f in beam.section.stations],
         )
-        pieces = np.searchsorted(marks, 0.5 * (rows.t[one] + rows.t[other]), side="right") - 1
+        pieces = np.searchsorted(marks, 0.5 * (t[one] + t[other]), side="right") - 1
         for piece in np.unique(pieces):
             own = pieces == piece
             reached = self.carried(
-                name, y[one[own]], rows.t[one[own]], rows.t[other[own]], 0.5 * (marks[piece] + marks[piece + 1])
+                name, y[one[own]], t[one[own]], t[other[own]], 0.5 * (marks[piece] + marks[piece + 1])
             )
             miss.append(y[other[own]] - reached)
         found = np.concatenate(miss)

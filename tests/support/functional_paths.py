@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from equilibria import equilibria
 
-from cfmkit.elastica.outcome.path import PathStatus
-from cfmkit.elastica.results.path import EquilibriumPath
+from cfmkit.elastica.results.path import EquilibriumPath, PathStatus
 
 
 def functional_path(net: Any, drive: Any, degree: int = 18, pieces: int = 1) -> EquilibriumPath:

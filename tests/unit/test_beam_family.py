@@ -251,10 +251,15 @@ def test_a_path_that_ends_early_is_partial_and_says_where():
     assert warned(result)["ends_early"]
 
 
-def test_shallow_beams_without_stretching_have_no_path_and_no_number_is_invented():
+def test_shallow_beams_without_stretching_buckle_at_once():
+    """As ever thinner ones that stretch do: their force grows with the cube of the thickness."""
     result = solved("beam_williams_toggle", "analysis.fidelity=inextensible")
-    assert result.status is not Status.COMPLETE
-    assert all(np.isfinite(curve.effort).all() for curve in result.curves)
+    assert result.status is Status.COMPLETE
+    thin = solved("beam_williams_toggle", "mechanism.thickness=0.00729 in")  # of 0.243 in
+    assert thin.status is Status.COMPLETE
+    stiffest = np.abs(result.curve.effort).max()
+    places = slice(5, 101)  # before the branch ends, where both differ by their stretch
+    assert thin.curve.effort[places] / 0.03**3 == pytest.approx(result.curve.effort[places], abs=1e-3 * stiffest)
 
 
 def test_stress_above_the_allowable_one_is_told_with_its_place():
@@ -589,7 +594,7 @@ TO_STRESS = ("analysis:", "design: {rescale: {to_allowable_stress: true}}\nanaly
             ),
             "within a travel of 1094 mm, and a longer one would tear beams",
         ),
-        ((("50 MPa", "5 GPa"),), "before the path ends: the beams are taut at 399 mm"),
+        ((("50 MPa", "90 GPa"),), "before the path ends: the beams are taut at 400 mm"),
     ],
 )
 def test_a_stress_that_is_not_reached_gives_no_travel(changes, words):
@@ -645,8 +650,8 @@ def test_a_travel_that_only_beams_of_several_times_their_length_could_follow_is_
 
 def test_a_network_without_any_equilibrium_cannot_be_rescaled():
     design = cfmkit.design(config("beam_rescaled", "mechanism.nodes.n4.at=[12.44 mm, 2.4e10 mm]"))
-    assert design.status is Status.NO_EQUILIBRIUM
-    assert "has no force at the end of its window" in design.message
+    assert design.status in (Status.NO_EQUILIBRIUM, Status.INFEASIBLE)
+    assert design.spec is None
 
 
 def test_the_last_point_of_a_drive_to_the_negative_side_counts():
@@ -769,12 +774,11 @@ def test_straight_beams_on_a_pin_that_are_pulled_into_one_line_are_said_to_be_ta
     assert "taut" not in pushed.message
 
 
-def test_elastica_that_a_force_pulls_taut_before_the_first_point_are_said_to_be():
+def test_elastica_that_a_force_pulls_taut_move_as_far_as_they_are_long():
     drive = (("kind: displacement", "kind: force"), ("travel: 8 mm", "force: 1e6 N"))
     result = cfmkit.analyze(cfmkit.loads(functools.reduce(lambda text, change: text.replace(*change), drive, TAUT)))
-    assert result.status is Status.NO_EQUILIBRIUM
-    assert "the beams are taut at " in result.message
-    assert "limit point" not in result.message
+    assert result.status is Status.COMPLETE
+    assert result.curve.motion[-1] == pytest.approx((20 * np.pi - 60) * MM, rel=1e-5)  # the arc drawn straight
 
 
 @pytest.mark.parametrize(
@@ -933,7 +937,7 @@ def test_the_usable_stroke_that_a_stress_ends_does_not_depend_on_the_number_of_p
     assert found[0] == pytest.approx(found[1], rel=2e-6)
 
 
-@pytest.mark.parametrize("window", ["14 mm", "22.07014403435127 mm"])
+@pytest.mark.parametrize("window", ["14 mm", "22.0701434087 mm"])
 def test_a_peak_at_a_bifurcation_is_there_however_many_points_and_if_one_is_on_it(window):
     """Cubics went across the kink: with 31 points the peak was 1.3e-2 off, the place of a stress 7.5e-4."""
     found = []
@@ -966,27 +970,29 @@ def test_equilibria_between_points_are_those_of_a_path_through_them(name):
 
 
 def test_a_short_run_loads_neither_the_compiler_nor_masked_arrays():
-    """Both cost more than the solver does: numba 0.4 s, numpy.ma, which np.unique loads, 20 ms."""
+    """Both cost more than the solver does: numpy.ma, which np.unique loads, 20 ms."""
     code = (
         "import sys, cfmkit; cfmkit.analyze(cfmkit.load(sys.argv[1])); "
-        "sys.exit(any(name in sys.modules for name in ('numba', 'scipy', 'numpy.ma')))"
+        "sys.exit(any(name in sys.modules for name in ('scipy', 'numpy.ma')))"
     )
     command = [sys.executable, "-c", code, str(Path(__file__).parents[2] / "configs" / "beam_lan2010.yaml")]
     codes = (subprocess.run(command, check=False).returncode for _ in range(2))
     assert 0 in codes  # the first one may compile
 
 
-def test_a_straight_strip_pressed_along_itself_names_the_strip_and_a_cure_that_buckles_it():
-    pressed = TAUT.replace(", shape: {kind: arc, sweep: 60 deg}", "").replace("support: pinned", "support: clamped")
-    pressed = pressed.replace("direction: 0 deg}\nanalysis", "direction: 180 deg}\nanalysis")
-    result = cfmkit.analyze(cfmkit.loads(pressed))
+def test_a_straight_strip_pulled_along_itself_names_the_strip_and_a_cure_and_a_pressed_one_buckles():
+    text = TAUT.replace(", shape: {kind: arc, sweep: 60 deg}", "").replace("support: pinned", "support: clamped")
+    result = cfmkit.analyze(cfmkit.loads(text))
     assert result.status.exit_code == 4
-    assert "inextensible beams that lie straight along the drive (s) do not move until they buckle" in result.message
+    assert "inextensible beams lie straight along the drive (s)" in result.message
     assert "\n" not in result.message
     (early,) = (item for item in result.warnings if item.name == "ends_early")
     assert early.cures == ("analysis.fidelity=extensible",)
-    buckled = cfmkit.analyze(result.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
-    assert "bifurcation" in {item.name for item in buckled.warnings}
+    pressed = cfmkit.analyze(cfmkit.loads(text.replace("direction: 0 deg}\nanalysis", "direction: 180 deg}\nanalysis")))
+    assert pressed.status is Status.COMPLETE
+    assert "bifurcation" in {item.name for item in pressed.warnings}
+    buckled = cfmkit.analyze(pressed.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
+    assert pressed.curve.effort[-1] == pytest.approx(buckled.curve.effort[-1], rel=1e-2)
 
 
 TIED = """\
@@ -1050,13 +1056,13 @@ def test_what_stands_in_the_way_of_a_network_is_said_with_its_cure(tmp_path, cap
     assert said in captured.out + captured.err
 
 
-def test_a_straight_strip_pressed_straight_has_no_solution(tmp_path, monkeypatch, capsys):
+def test_a_straight_strip_pulled_straight_has_no_solution(tmp_path, monkeypatch, capsys):
     text = re.sub(r"    (spare|t|m|left|right): .*\n", "", TIED.replace("EXTRA", "spare"))
     text = text.replace("  beams:\n", "  beams:\n    s: {start: a, end: b}\n").replace(
         "support: pinned", "support: guided, direction: 0 deg"
     )
-    text = text.replace("kind: rotation, node: m", "kind: displacement, node: b, direction: 180 deg")
+    text = text.replace("kind: rotation, node: m", "kind: displacement, node: b, direction: 0 deg")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "strip.yaml").write_text(text.replace("10 deg", "1 mm"), encoding="utf-8")
     assert main(["analyze", "strip.yaml", "--no-plots"]) == 4
-    assert "(s) do not move until they buckle" in " ".join(capsys.readouterr().out.split())
+    assert "inextensible beams lie straight along the drive (s)" in " ".join(capsys.readouterr().out.split())

@@ -17,7 +17,7 @@ import numpy as np
 from lan_2010 import half
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.verification.corotational import recheck
 
 
@@ -89,7 +89,7 @@ E, WIDTH, THICK = 2e9, 1e-2, 1e-3
 
 def _polygon(network: Network, drive: Displacement, per_beam: int) -> tuple[Polygon, float]:
     """Return the polygon of a network, in units of 10 mm and of the bending rigidity, and its driven node."""
-    layout = Layout(network, drive)
+    fits = BeamFits(network)
     section = Section(E, WIDTH, THICK)
     rigidity = float(section.rigidities(np.array([0.5]), 0.5)[0][0])
     unit = 1e-2
@@ -98,7 +98,7 @@ def _polygon(network: Network, drive: Displacement, per_beam: int) -> tuple[Poly
     elements = []
     fine = np.linspace(0, 1, 20001)
     for name, beam in network.beams.items():
-        fitted = layout.fits[name]
+        fitted = fits[name]
         angle = fitted.angle(fine, 0.5)
         step = np.diff(fine) * fitted.length / unit
         middle = 0.5 * (angle[1:] + angle[:-1])

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from beam_networks import drives, network
 
 from cfmkit.elastica import (
     CLAMPED,
@@ -21,10 +20,6 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.network_solver import MarchOptions, Solver
-from cfmkit.elastica.equilibrium.uncondensed_solver import UncondensedSolver
-from cfmkit.elastica.model.network_under_drive import Layout
 from cfmkit.errors import InputError
 
 LENGTH, ANGLE = 35e-3, np.radians(8)
@@ -142,34 +137,6 @@ def test_points_next_to_each_other_at_the_end_of_a_branch(
     assert path.requested[path.at_requested].tolist() == list(range(1 + len(offs) + len(behind)))
     assert path.stable.all()
     assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 0)]
-
-
-@pytest.mark.parametrize("seed", [1, 3, 4, 5, 6, 8, 10])
-def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
-    """Solutions, tangents, borders, marches and finer meshes, in the unknowns of the plain solver."""
-    net = network(seed, follower=False)
-    plain = Solver(Layout(net, drives(net, seed)[0]), Mesh(2, 2), 1e-12)
-    steady = UncondensedSolver(plain)
-    start = plain.tightened()
-    assert start is not None
-    one, other = (solver.solve(start.y, 0.02) for solver in (plain, steady))
-    assert one is not None
-    assert other is not None
-    np.testing.assert_allclose(other.y, one.y, rtol=0, atol=1e-9 * np.abs(one.y).max())
-    np.testing.assert_allclose(other.tangent, one.tangent, rtol=0, atol=1e-7 * np.abs(one.tangent).max())
-    assert (other.unstable, other.shortness) == (one.unstable, pytest.approx(one.shortness))
-    border = np.random.default_rng(seed).standard_normal(plain.n + 1)
-    level = float(border[:-1] @ one.y[: plain.n] + border[-1] * one.drive)
-    across = steady.solve(one.y, 0.021, border, level)
-    assert across is not None
-    assert across.drive == pytest.approx(one.drive, abs=1e-7)
-    options = MarchOptions(1e-12, 0.01, 0.35, sense=1.0)
-    paths = [solver.march(start, np.array([0.02, 0.04]), options, 200)[1] for solver in (plain, steady)]
-    np.testing.assert_allclose(paths[1].y[-1], paths[0].y[-1], rtol=0, atol=1e-9 * np.abs(one.y).max())
-    fine, changes = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
-    again, _ = plain.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
-    assert np.isfinite(changes).all()
-    np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
 
 
 def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:

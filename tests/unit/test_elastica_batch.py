@@ -15,8 +15,8 @@ from cfmkit.elastica import (
     Network,
     PathStatus,
     trace,
+    trace_many,
 )
-from cfmkit.elastica.continuation.batch import trace_many
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -49,12 +49,3 @@ def test_a_coil_that_its_thickness_leaves_no_room_for_is_refused_at_once(tmp_pat
     said = capsys.readouterr().err
     assert "mechanism.beams.b3.shape winds the beam to a radius of 0.2707 mm" in said
     assert "half of its thickness of 1 mm" in said
-
-
-@pytest.mark.parametrize("turns", [3.1, 3.6, 4.1, 4.7, 5.3])
-def test_integrals_along_a_coil_take_any_number_of_steps(turns):
-    """The energy stored is that of an even moment in a beam of this length."""
-    path = trace(coil(turns), Rotation("b", np.array([1.0])))
-    weights = path.sampler.weights(path.layout, 0)
-    length = path.fits["coil"].length
-    assert weights.sum() == pytest.approx(length, rel=1e-9)

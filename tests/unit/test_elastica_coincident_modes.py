@@ -23,11 +23,6 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation.critical_points import Curvature, eigenvalues
-from cfmkit.elastica.continuation.switching import descend
-from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.uncondensed_solver import ExpandedSolver
-from cfmkit.elastica.model.network_under_drive import Layout
 
 LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)
 
@@ -52,7 +47,7 @@ def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: 
 def moments(path: Path, point: int) -> Any:
     """Return the moments at the shuttle."""
     at = path.at_requested[point]
-    return np.array([path.end_force(name, 1)[at, 2] for name in path.layout.network.beams])
+    return np.array([path.end_force(name, 1)[at, 2] for name in path.net.beams])
 
 
 def changes(path: Path) -> list[tuple[str, int, int]]:
@@ -179,40 +174,3 @@ def test_a_mode_that_is_one_of_several_bends_all_leaves() -> None:
     found = moments(path, 4)
     assert found == pytest.approx(np.full(3, found.mean()), rel=0.05)
     assert found.mean() == pytest.approx(moments(alone(), 4)[0], rel=0.05)
-
-
-@pytest.mark.parametrize("axial", [True, False])
-def test_the_curvature_of_the_energy_counts_unstable_directions_and_leads_down(axial: bool) -> None:
-    """Beyond their critical load two columns are a saddle; beams that do not stretch have rigid directions."""
-    section = Section(2e9, 1e-2, 1e-3, axial=axial)
-    nodes = {name: Node(x, 0, CLAMPED) for name, x in (("a", 0.0), ("b", 0.02))}
-    nodes |= {name: Node(x, 0.1, SHUTTLE) for name, x in (("s", 0.0), ("t", 0.02))}
-    net = Network(nodes, {"x": Beam("a", "s", section), "y": Beam("b", "t", section)})
-    critical = 4 * np.pi**2 * 2e9 * (1e-2 * 1e-9 / 12) / 0.1**2
-    drive = Loading(tuple(PointLoad(name, fy=-critical) for name in "st"), np.array([0.9, 1.02]))
-    layout = Layout(net, drive)
-    solver = ExpandedSolver(layout, Mesh(8, 4), 1e-11)
-    spots = [solver.solve(solver.unstressed(), load / layout.scales.drive) for load in (0.9, 1.02)]
-    for spot, unstable in zip(spots, (0, 2), strict=True):
-        assert spot is not None
-        assert spot.unstable == unstable
-        curvature = Curvature(solver, spot.y, spot.drive)
-        assert (curvature.values < 0).sum() == unstable
-        found = eigenvalues(solver, spot.y, spot.drive)
-        assert found[:4] == pytest.approx(curvature.values[:4], rel=1e-6)
-        matrix, _ = solver.tangent_at(spot.y, spot.drive)
-        forces = matrix @ curvature.modes[:, :4]
-        free = solver.n_free
-        np.testing.assert_allclose(forces[free:], 0.0, atol=1e-6 * np.abs(matrix).max())
-        np.testing.assert_allclose(
-            forces[:free], -curvature.modes[:free, :4] * curvature.values[:4], atol=1e-6 * np.abs(matrix).max()
-        )
-    assert spots[1] is not None
-    ends = [descend(solver, spots[1], sign) for sign in (1, -1)]
-    turns = []
-    for end in ends:
-        assert end is not None
-        assert end.unstable == 0
-        turns.append(end.y[solver.plain_free : solver.n_free].reshape(-1, 3)[:, 2])
-        assert solver.pose_change(end.y, spots[1].y) > 0.05
-    np.testing.assert_allclose(turns[0], -turns[1], atol=1e-8)

@@ -24,7 +24,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
 from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.errors import InputError
 

@@ -31,8 +31,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
-from cfmkit.elastica.results.frequencies import frequencies
-from cfmkit.elastica.vibration import NetworkMasses
+from cfmkit.elastica.vibration import NetworkMasses, frequencies
 from cfmkit.errors import InputError
 
 MODULUS, WIDTH, THICKNESS, LENGTH, DENSITY = 200e9, 10e-3, 1e-3, 0.1, 7850.0

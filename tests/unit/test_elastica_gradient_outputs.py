@@ -30,11 +30,11 @@ def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
     """Everything that can be requested at the requested points."""
     keep = path.at_requested[at]
     found = {"effort": path.effort[keep], "energy": path.energy[keep]}
-    for node in path.layout.network.nodes:
+    for node in path.net.nodes:
         found[f"motion {node}"] = path.motion(node)[keep]
     for node in path.layout.masters:
         found[f"reaction {node}"] = path.reaction(node)[keep]
-    for beam in path.layout.network.beams:
+    for beam in path.net.beams:
         found[f"start force {beam}"] = path.end_force(beam, 0)[keep]
         found[f"end force {beam}"] = path.end_force(beam, 1)[keep]
         found[f"shape {beam}"] = np.array([path.shape(beam, int(k)) for k in keep])
@@ -51,11 +51,11 @@ def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
 def slopes(g: Any) -> dict[str, Any]:
     """The derivatives of the same."""
     found = {"effort": g.effort, "energy": g.energy}
-    for node in g.path.layout.network.nodes:
+    for node in g.path.net.nodes:
         found[f"motion {node}"] = g.motion[node]
     for node in g.path.layout.masters:
         found[f"reaction {node}"] = g.reaction[node]
-    for beam in g.path.layout.network.beams:
+    for beam in g.path.net.beams:
         found[f"start force {beam}"] = g.end_force(beam, 0)
         found[f"end force {beam}"] = g.end_force(beam, 1)
         found[f"shape {beam}"] = g.shape(beam)
@@ -102,23 +102,6 @@ def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
         a, b, c, d = (output(p) for p in values)
         want = (a - 8 * b + 8 * c - d) / (12 * way[kind])
         np.testing.assert_allclose(slope, want, rtol=1e-6, atol=1e-6 * np.abs(want).max())
-
-
-def test_states_in_some_segments_have_the_derivatives_of_all_there_and_none_elsewhere() -> None:
-    """Also of a path that is sampled more coarsely; of axial stress the derivatives at single rows."""
-    path = trace(*pushed(X), FINE).sampled(3)
-    found, sampler = gradient(path, pushed, X), path.sampler
-    wanted = np.zeros((len(found.points), len(sampler.cut.segment_step) - 1), dtype=np.bool_)
-    wanted[0, ::2] = wanted[1, ::3] = True
-    some = found.rows_of(wanted)
-    every = found.rows[:, :, [2, 3, 0, 1, 6, 4, 5]]  # phi, moment, x, y, energy, h, v
-    inside = np.repeat(wanted, sampler.per_segment, axis=1)
-    np.testing.assert_array_equal(some[inside], every[inside])
-    assert not some[~inside].any()
-    axial = np.concatenate([found.sections(beam).axial_stress for beam in path.layout.network.beams], axis=1)
-    points, rows = np.nonzero(inside)
-    size = abs(axial).max()
-    np.testing.assert_allclose(found.axial_stress_at(some, points, rows), axial[inside], rtol=1e-10, atol=1e-12 * size)
 
 
 def test_a_variable_that_changes_the_make_up_is_refused() -> None:

@@ -24,10 +24,8 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.mesh import Mesh, grid, table
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.shapes import Bent
-from cfmkit.elastica.sensitivity.array_derivatives import ComplexSteps, slope
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -91,27 +89,6 @@ def difference(output: Callable[[Any], Any], x: Any, which: int, step: float = 1
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("thickness", THICKNESS)
-@pytest.mark.parametrize("closure", ["rotscale", "raw"])
-def test_derivatives_of_tables_are_those_of_tables_on_grids_that_move(shape: str, thickness: str, closure: Any) -> None:
-    """A complex step leaves the grid where it is: angles, lengths and compliances of all drifts and kicks count."""
-    build, x = one_beam(SHAPES[shape], THICKNESS[thickness], closure), np.array([1.0, 1.05, 1.0, 1.0])
-    known = Layout(build(x), DOWN)
-    cut = grid(known, Mesh())
-
-    def moved(values: Any) -> Any:
-        layout = Layout(build(values), DOWN)
-        layout.scales = known.scales
-        return table(layout, grid(layout, Mesh()))
-
-    sizes = np.abs(table(known, cut)).max(axis=(0, 1))
-    for which, tilted in enumerate(ComplexSteps(known, build, x).stepped):
-        want, found = difference(moved, x, which), slope(table(tilted, cut))
-        off = np.abs(found - want).max(axis=(0, 1))
-        assert (off <= 1e-9 * sizes).all(), (which, off, sizes)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
 def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> None:
     build, x = one_beam(SHAPES[shape], THICKNESS["steps"]), np.ones(4)
     found = gradient(trace(build(x), DOWN, FINE), build, x)
@@ -136,29 +113,8 @@ def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> N
             assert off <= 1e-6 * np.abs(want).max(), (name, which, off, np.abs(want).max())
 
 
-def knot_of_the_curve() -> float:
-    """The fraction of the arc length at the first inner knot of a spline."""
-    fitted = Layout(one_beam(curve, 1e-3)(np.ones(4)), DOWN).fits["ad"]
-    return float(fitted.arc(fitted.course.breaks[1]))
-
-
 def corner_of_the_polyline() -> float:
     return float(corner(1.0).course(1.0).breaks[1])
-
-
-@pytest.mark.parametrize(
-    ("shape", "station", "after"),
-    [(curve, knot_of_the_curve, 0.8), (curve, knot_of_the_curve, 1.2), (corner, corner_of_the_polyline, 1.2)],
-)
-def test_a_station_may_lie_where_smooth_pieces_of_the_shape_meet(shape: Any, station: Any, after: float) -> None:
-    """A step of the thickness at a knot of a spline, or its kink at either: each moves as it does alone."""
-    u = station()
-    build = one_beam(shape, Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
-    x = np.ones(4)
-    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0]
-    for which in range(3):
-        want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, which)
-        assert found[which] == pytest.approx(want, rel=1e-6)
 
 
 def test_a_corner_that_moves_past_a_step_is_refused_and_one_that_stays_with_it_is_not() -> None:
@@ -186,3 +142,24 @@ def test_a_step_of_the_thickness_is_moved_as_a_whole() -> None:
     x = np.array([0.5])
     with pytest.raises(InputError, match="must move alike"):
         gradient(trace(build(x), DOWN), build, x)
+
+
+def knot_of_the_curve() -> float:
+    """The fraction of the arc length at the first inner knot of a spline."""
+    fitted = BeamFits(one_beam(curve, 1e-3)(np.ones(4)))["ad"]
+    return float(fitted.arc(fitted.course.breaks[1]))
+
+
+@pytest.mark.parametrize(
+    ("shape", "station", "after"),
+    [(curve, knot_of_the_curve, 0.8), (curve, knot_of_the_curve, 1.2), (corner, corner_of_the_polyline, 1.2)],
+)
+def test_a_station_may_lie_where_smooth_pieces_of_the_shape_meet(shape: Any, station: Any, after: float) -> None:
+    """A step of the thickness at a knot of a spline, or its kink at either: each moves as it does alone."""
+    u = station()
+    build = one_beam(shape, Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
+    x = np.ones(4)
+    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0]
+    for which in range(3):
+        want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, which)
+        assert found[which] == pytest.approx(want, rel=1e-6)

@@ -25,8 +25,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.network_solver import Points
-from cfmkit.elastica.outcome.between_points import between_points
+from cfmkit.elastica.results.between_points import between_points
 
 LENGTH = 35e-3
 
@@ -107,12 +106,9 @@ def test_a_path_may_end_or_begin_at_its_bifurcation(last: bool) -> None:
     place = float(whole.corners[0])
     there, left = whole.at(np.array([place])), int(np.searchsorted(path.drive, place))
     kept = slice(0, left) if last else slice(left, None)
-    parts = [(getattr(path.points, name)[kept], getattr(there.points, name)) for name in ("y", "drive", "info")]
-    y, drive, info = (np.concatenate(pair if last else pair[::-1]) for pair in parts)
-    names = [*path.branch[kept], path.branch[left]] if last else [path.branch[left - 1], *path.branch[kept]]
-    law = between_points(
-        replace(path, points=Points(y, drive, info), branch=np.array(names), accurate=np.ones(len(drive), bool))
-    )
+    part = path.take(kept)
+    corner = replace(there, branch=path.branch[left : left + 1] if last else path.branch[left - 1 : left])
+    law = between_points(part.joined(corner) if last else corner.joined(part))
     assert law is not None
     assert law.corners[-1 if last else 0] == pytest.approx(place)
     near = place + (-1e-4 if last else 1e-4) * np.arange(6.0)

@@ -20,8 +20,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation import branch_rejoins_path, decisions_after_march, trace_to_tolerance
-from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.tracing import trace_by_energy
 
 DOWN = -np.pi / 2
 BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
@@ -39,9 +38,9 @@ def strip() -> Network:
 
 
 def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a path on one mesh that is too coarse for the tolerance."""
-    monkeypatch.setattr(trace_to_tolerance, "_ROUNDS", 1)
-    monkeypatch.setattr(trace_to_tolerance, "first_mesh", lambda layout, tolerance: Mesh(2, 1))
+    """Return a path of one degree that is too low for the tolerance."""
+    monkeypatch.setattr(trace_by_energy, "MAX_ROUNDS", 1)
+    monkeypatch.setattr(trace_by_energy, "_first_degree", lambda *_: 5)
     return trace(strip(), BENDING, Control(tolerance=1e-10))
 
 
@@ -88,29 +87,3 @@ def test_a_path_on_which_nothing_bears_a_load_is_as_accurate_as_its_poses(tolera
     assert path.status is PathStatus.COMPLETE
     assert path.error < 1e-8
     assert np.abs(path.effort).max() < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("travel", "on_branch"), [((4.0, 5.5, 6.0), 1), ((4.5, 5.0, 6.0), 1), ((4.0, 4.7, 5.0, 6.0), 2)]
-)
-def test_a_branch_s_end_that_was_stepped_over_is_noticed(
-    monkeypatch: pytest.MonkeyPatch, travel: tuple[float, ...], on_branch: int
-) -> None:
-    """Without a search for the end, long steps pass from the branch to the path that it joins; it is found behind."""
-    monkeypatch.setattr(decisions_after_march, "predicted_end", lambda *given: (None, False))
-    path = trace(v_beam(), Displacement("d", DOWN, np.array(travel) * 1e-3))
-    names = path.branch[path.at_requested]
-    assert all(name.startswith("bifurcated") for name in names[:on_branch])
-    assert all(name == "primary" for name in names[on_branch:])
-    assert path.events[-1].kind == "bifurcation"
-    assert path.events[-1].drive == pytest.approx(4.773454576e-3, rel=1e-7)  # as with the search for the end
-
-
-def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From 4.71 mm one step passes it; from 4.7 mm the steps become short there, and rounding decides what is found."""
-    monkeypatch.setattr(decisions_after_march, "predicted_end", lambda *given: (None, False))
-    monkeypatch.setattr(branch_rejoins_path, "closed_behind", lambda *given: None)
-    path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.71, 5.0, 6.0]) * 1e-3))
-    assert path.branch[path.at_requested][2:].tolist() == ["primary", "primary"]
-    assert path.events[-1].kind == "unresolved"
-    assert 4.71e-3 < path.events[-1].drive <= 5.0e-3 * (1 + 1e-9)

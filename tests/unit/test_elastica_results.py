@@ -12,7 +12,6 @@ from functional_paths import functional_path
 from cfmkit.elastica import (
     CLAMPED,
     Beam,
-    Control,
     Displacement,
     Loading,
     Network,
@@ -22,11 +21,7 @@ from cfmkit.elastica import (
     Rotation,
     Section,
     guided,
-    trace,
 )
-from cfmkit.elastica.outcome import between_points as today
-from cfmkit.elastica.outcome import crosswise_stiffness
-from cfmkit.elastica.results.between_points import between_loads, between_points
 from cfmkit.elastica.results.cross_stiffness import cross_stiffness, poles
 from cfmkit.errors import InputError
 
@@ -37,35 +32,6 @@ STRIP = Section(MODULUS, WIDTH, THICKNESS)
 
 def assert_near(found: Any, known: Any, tolerance: float = 1e-6) -> None:
     assert np.abs(found - known).max() <= tolerance * np.abs(known).max() + 1e-300
-
-
-@pytest.mark.parametrize(("seed", "number"), [(3, 0), (8, 0), (3, 1), (4, 2), (4, 3), (3, 3)])
-def test_all_results_are_those_of_the_shooting_engine(seed: int, number: int) -> None:
-    """Networks with every feature, each kind of drive."""
-    net = beam_networks.network(seed)
-    drive = beam_networks.drives(net, seed)[number]
-    path, old = functional_path(net, drive), trace(net, drive, Control(tolerance=1e-10))
-    keep = old.at_requested
-    assert_near(path.drive, old.drive[keep], 1e-12)
-    assert_near(path.effort, old.effort[keep])
-    assert_near(path.energy, old.energy[keep])
-    for nodes, output in ((list(net.nodes), "motion"), (list(old.layout.masters), "reaction")):
-        found = np.array([getattr(path, output)(name) for name in nodes])
-        assert_near(found, np.array([getattr(old, output)(name)[keep] for name in nodes]))
-    for beam in net.beams:
-        for end in (0, 1):
-            assert_near(path.end_force(beam, end), old.end_force(beam, end)[keep])
-            assert_near(path.shape(beam, 1)[-end], old.shape(beam, int(keep[1]))[-end], 1e-9)
-            assert_near(path.line_motion(beam)[:, -end], old.line_motion(beam)[keep][:, -end], 1e-5)
-        for axial in (True, False):
-            assert_near(path.beam_stress(beam, axial)[0], old.beam_stress(beam, axial)[0][keep])
-            found, known = path.stress_extremes(beam, axial), old.stress_extremes(beam, axial)
-            assert_near(found.value, known.value[keep])
-    peak, known = path.peak_stress(), old.peak_stress()
-    assert_near(peak.value, known.value[keep])
-    if number == 0:
-        stiffness = cross_stiffness(path, "d", drive.direction)
-        assert_near(stiffness, crosswise_stiffness.cross_stiffness(old, "d", drive.direction, keep))
 
 
 def test_sections_of_a_cantilever_are_those_of_statics() -> None:
@@ -136,28 +102,3 @@ def arch(points: int, load: bool = False) -> tuple[Network, Displacement | Loadi
     if load:
         return net, Loading((PointLoad("b", fy=1.0),), np.linspace(0, 1.5, points)[1:])
     return net, Displacement("b", -np.pi / 2, np.linspace(0, 0.04, points)[1:])
-
-
-def test_between_its_points_a_path_is_that_of_the_shooting_engine() -> None:
-    net, drive = arch(14)
-    old = today.between_points(trace(net, drive, Control(tolerance=1e-9)), allowed=6e6)
-    new = between_points(functional_path(net, drive, 14), allowed=6e6)
-    assert old is not None
-    assert new is not None
-    places = np.linspace(0.01, 0.039, 20)  # at the start, which the old path has a point at, cubics differ
-    assert_near(new.effort("", places), old.effort("", places), 1e-7)
-    assert_near(new.stress("", places), old.stress("", places), 1e-5)
-    assert new.largest_stress("", 0.01, 0.037) == pytest.approx(old.largest_stress("", 0.01, 0.037), rel=1e-6)
-    assert_near(np.array(new.peaks), np.array(old.peaks), 1e-6)
-
-
-def test_between_its_points_a_path_under_a_load_is_that_of_the_shooting_engine() -> None:
-    net, drive = arch(12, load=True)
-    old = today.between_loads(trace(net, drive, Control(tolerance=1e-9)), "b", np.pi / 2)
-    new = between_loads(functional_path(net, drive, 14), "b", np.pi / 2)
-    assert old is not None
-    assert new is not None
-    low, high = new.places[[0, -1]]
-    places = np.linspace(max(low, old.places[0]), min(high, old.places[-1]), 13)[4:-1]
-    assert_near(new.effort("", places), old.effort("", places), 1e-7)
-    assert_near(new.stress("", places), old.stress("", places), 1e-5)

@@ -29,7 +29,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.model.beam import GAUSS
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits, beam_end_at
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
 FINE = Control(tolerance=1e-10)
@@ -68,13 +68,13 @@ def halves(taper: Taper, u: float) -> tuple[Taper, Taper]:
 
 def cut(net: Network, name: str, u: float) -> Network:
     """Return the network with one beam cut at a fraction of its length."""
-    beam, layout = net.beams[name], Layout(net, DRIVE)
-    fitted, angle = layout.fits[name], np.polynomial.Polynomial(beam.shape.coefficients)  # type: ignore[union-attr]
+    beam = net.beams[name]
+    fitted, angle = BeamFits(net)[name], np.polynomial.Polynomial(beam.shape.coefficients)  # type: ignore[union-attr]
     places, weights = GAUSS
     along = fitted.angle(u * places, 0.5)
     x, y = (
         float(start + u * fitted.length * weights @ f(along))
-        for start, f in zip(layout.beam_end_at(name, 0), (np.cos, np.sin), strict=True)
+        for start, f in zip(beam_end_at(net, name, 0), (np.cos, np.sin), strict=True)
     )
     shapes = [Polynomial(tuple(angle(np.polynomial.Polynomial(line)).coef.tolist())) for line in ([0.0, u], [u, 1 - u])]
     sections = [dataclasses.replace(beam.section, thickness=t) for t in halves(beam.section.thickness, u)]  # type: ignore[arg-type]

@@ -24,8 +24,8 @@ from cfmkit.elastica import (
     Section,
     guided,
 )
-from cfmkit.elastica.results.frequencies import frequencies
 from cfmkit.elastica.tracing.trace_by_energy import trace
+from cfmkit.elastica.vibration import frequencies
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

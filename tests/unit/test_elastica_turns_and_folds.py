@@ -22,7 +22,6 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.continuation.passing_limit_points import one_way
 
 DOWN = -np.pi / 2
 RISE = 35e-3 * np.sin(np.radians(8.0))
@@ -73,19 +72,6 @@ def reported(path: Path) -> list[tuple[str, int, int]]:
 
 def places(path: Path) -> list[float]:
     return [event.drive for event in path.events]
-
-
-@pytest.mark.parametrize(
-    ("points", "ends"),
-    [([1, 2, 3], [3]), ([0, 1, 0, 1], [2, 3, 4]), ([-1], [1]), ([1, -1, -2, 0], [1, 3, 4]), ([0, -1, 1], [2, 3])],
-)
-def test_a_drive_is_taken_in_stretches_that_go_one_way(points: list[float], ends: list[int]) -> None:
-    found = [one_way(points, asked) for asked in range(len(points))]
-    starts = [0, *ends[:-1]]
-    assert found == [
-        next((start, end) for start, end in zip(starts, ends, strict=True) if asked < end)
-        for asked in range(len(points))
-    ]
 
 
 @pytest.mark.parametrize(("count", "tolerance"), [(1, 1e-5), (1, 1e-7), (2, 1e-7)])

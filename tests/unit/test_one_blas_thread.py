@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from cfmkit.elastica.vibration.natural_frequencies import frequencies
+from cfmkit.elastica.vibration import frequencies
 from cfmkit.numerics.one_blas_thread import CHOSEN, one_blas_thread
 from cfmkit.solid.adaptive_solution import DrivenPart
 

@@ -633,7 +633,7 @@ def test_a_strip_with_a_place_a_hundred_times_thinner_is_a_hinge_and_refused(cha
 def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.MonkeyPatch) -> None:
     """They were computed along the whole strip at every point, for each point anew."""
     calls: list[int] = []
-    monkeypatch.setattr("cfmkit.elastica.outcome.path.along_beam", lambda *_: calls.append(1))
+    monkeypatch.setattr("cfmkit.elastica.results.path.EquilibriumPath.sections", lambda *_: calls.append(1))
     assert api.analyze(spec("strip", "analysis.points=7", "analysis.recheck=false")).status.usable
     assert not calls
 

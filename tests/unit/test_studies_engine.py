@@ -180,7 +180,7 @@ def test_whatever_decides_a_row_makes_it_new(tmp_path, change):
         assert run(work(option, **change), journal=journal).reused == 0
 
 
-@pytest.mark.parametrize("changed", ["content", "numba"])
+@pytest.mark.parametrize("changed", ["content", "numpy"])
 def test_rows_of_other_code_are_computed_again(tmp_path, monkeypatch, changed):
     with Journal(tmp_path / "journal") as journal:
         run(work(FRICTION), journal=journal)

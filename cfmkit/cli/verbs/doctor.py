@@ -85,13 +85,7 @@ _EXTRAS = ("cluster",)
 
 
 def _folders() -> Mapping[str, Path]:
-    from cfmkit.elastica.kernels.disk_cache import folders
-
-    return {
-        "output (the current folder)": Path.cwd(),
-        "temporary files": Path(tempfile.gettempdir()),
-        "compiled solver": next((path for path in folders() if _writable(path)), folders()[0]),
-    }
+    return {"output (the current folder)": Path.cwd(), "temporary files": Path(tempfile.gettempdir())}
 
 
 def _writable(path: Path) -> bool:
@@ -113,10 +107,10 @@ def _locks() -> Record:
 
 
 def _solver() -> Record:
-    from cfmkit.elastica.kernels.disk_cache import kept_in
+    """Return what the beam engine runs on: "C" or "numpy"."""
+    from cfmkit.elastica.mechanics.march import SWITCH, engine
 
-    folder = kept_in()
-    return {"compiled": folder is not None, "folder": None if folder is None else str(folder)}
+    return {"engine": engine(), "switched_off": SWITCH in os.environ}
 
 
 def _fonts() -> Record:
@@ -129,10 +123,9 @@ def _fonts() -> Record:
 
 def _caches() -> Iterator[Record]:
     """Yield what cfmkit and its libraries keep between runs: everything there can be deleted and is made again."""
-    from cfmkit.elastica.kernels.disk_cache import folders
     from cfmkit.plots.font_cache import kept_lists
 
-    for what, path in {"compiled solver": next(iter(folders())), "list of fonts": kept_lists()}.items():
+    for what, path in {"list of fonts": kept_lists()}.items():
         files = [one for one in Path(path).glob("*") if one.is_file()] if os.path.isdir(path) else []
         size = sum(one.stat().st_size for one in files)
         yield {"name": what, "path": str(path), "files": len(files), "megabytes": round(size / 1e6, 2)}
@@ -179,8 +172,7 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("folders", found["folders"], (field("name"), access, field("path", wraps=True)))
     locks = {True: "by the operating system", False: f"none: the file {SOFT_LOCK} marks a live run", None: "not tried"}
     yield from listed("file locks here", [{"locks": locks[found["locks"]["native"]]}], (field("locks", wraps=True),))
-    compiled = found["solver"]["folder"] or "not yet: takes about 15 s at the first use, or run `cfmkit warm`"
-    yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
+    yield from listed("beam engine", [{"engine": _engine(found["solver"])}], (field("engine", wraps=True),))
     fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is incomplete"}
     yield from listed("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
     size = Field("size", lambda one: f"{one['files']} files, {one['megabytes']} MB")
@@ -189,6 +181,13 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("families", found["families"], (field("name"), field("package"), field("version"), state))
     reported = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
     yield Verbatim("\n".join(["", *reported, ""]))
+
+
+def _engine(solver: Mapping[str, Any]) -> str:
+    if solver["engine"] == "C":
+        return "runs on compiled C"
+    why = "CFMKIT_WITHOUT_C is set" if solver["switched_off"] else "no C compiler was there when it was installed"
+    return f"runs on numpy, about 30 times slower: {why}"
 
 
 def _version(package: Mapping[str, Any]) -> str:

@@ -18,13 +18,16 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
@@ -44,6 +47,11 @@ class Equilibria:
     network: Discretisation
     z: FloatArray
     drive: FloatArray
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Gradient of the functional by all unknowns at every point, (p, size): zero at free ones."""
+        return read_only(equations(self.network).gradients(self.z, self.drive))
 
 
 def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:

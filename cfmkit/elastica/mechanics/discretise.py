@@ -11,24 +11,25 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
-from cfmkit.elastica.model.beam import Fit, fit
+from cfmkit.elastica.mechanics.element_tables import element_tables, smooth_marks
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.drive import Displacement, Loading
-from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
-from cfmkit.elastica.model.numbering import apart, driven
-from cfmkit.elastica.model.plain_beams_at_once import Bundle
+from cfmkit.elastica.model.driven_node import driven
+from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring, apart
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
 from cfmkit.elastica.model.shapes import Polynomial
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network, Spring
 
@@ -40,11 +41,8 @@ MAX_TURN = 3.0  # of an unloaded element [rad]; a basis of degree 10 integrates 
 TAUT = 12.0  # L sqrt(N/EI) of a beam from which on its ends are resolved by elements of their own
 LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
-TABLE_COLUMNS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", "length")
-"""Tables of every element."""
 FRAME_OF_DRIVE = 3
 """Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
-SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
 
 class MechanicsUnits(NamedTuple):
@@ -114,8 +112,19 @@ class Discretisation:
     scales: MechanicsUnits
     bodies: Mapping[str, tuple[int, int, int]]  # unknowns of nodes that no link moves
     nodes: Mapping[str, int]  # attachment of every node
-    fits: Mapping[str, Fit]
+    fits: BeamFits
     floored: Any = ()  # (e,) elements of beams that do not stretch but for a floor
+    pieces: int = 1  # elements for every smooth piece of a beam, at least
+    tension: Mapping[str, float] | None = None  # beams that were cut for a large tension
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What was made of these arrays, by what made it; it does not go to other processes."""
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is sent to another process."""
+        return {name: value for name, value in self.__dict__.items() if name != "known"}
 
     @property
     def n_motions(self) -> int:
@@ -130,6 +139,7 @@ def discretise(
     pieces: int = 1,
     tension: Mapping[str, float] | None = None,
     scales: MechanicsUnits | None = None,
+    fits: BeamFits | None = None,
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -145,27 +155,29 @@ def discretise(
         Beams under a large tension N to their L sqrt(N/EI).
     scales : MechanicsUnits, optional
         Units; found from the beams unless given.
+    fits : BeamFits, optional
+        Those of the same network, if it was set up before.
 
     Raises
     ------
     cfmkit.errors.InputError
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales).build()
+    fits = fits or BeamFits(network)
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build()
 
 
 class _ArrayBuilder:
     """Numbers unknowns and attachments and collects the elements."""
 
     def __init__(
-        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any
-    ) -> None:
+        self, network: Network, drive: Drive, degree: int, pieces: int, tension: Mapping[str, float], scales: Any,
+        fits: BeamFits,
+    ) -> None:  # fmt: skip
         self.network, self.drive, self.degree, self.pieces, self.tension = network, drive, degree, pieces, tension
-        self.count = itertools.count()
+        self.count = 0
         self.places: list[tuple[Any, Any, Any, Any]] = []  # unknowns, arm, origin, angle of the frame
-        self.bundle = _bundle(network)
-        self.fits = _fits(network, self.bundle)
-        self.wide = any(beam.section.wide for beam in network.beams.values())
+        self.fits, self.bundle = fits, fits.bundle
         self.scales = scales or self._scales()
         self.bodies = {name: self._body() for name in network.nodes if not network.moved(name)}
         self.driven = driven(network, drive)
@@ -176,8 +188,10 @@ class _ArrayBuilder:
 
     def build(self) -> Discretisation:
         """Return the arrays."""
-        self.together = self._plain_tables()
-        pieces = [piece for name, beam in self.network.beams.items() for piece in self._beam(name, beam)]
+        beams = self.network.beams
+        cuts = {name: self._cuts(name, beam) for name, beam in beams.items()}
+        tables = element_tables(self.fits, self.scales, self.degree, cuts)
+        ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
         given = [(load, False) for load in self.network.loads] + [(load, True) for load in self.drive.loads]
         loads = tuple(
@@ -185,26 +199,32 @@ class _ArrayBuilder:
         )
         nodes = {name: self._attach(name) for name in self.network.nodes}
         dofs, arms, origins, frames = zip(*self.places, strict=True)
-        turn = np.array(frames)
-        attachments = Attachments(
-            np.array(dofs), np.array(arms), np.array(origins), np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        )
-        elements, size = self._elements(pieces, attachments)
+        frame = np.array([(1.0, 0.0)] * len(frames)) if not any(frames) else _direction(np.array(frames))
+        attachments = Attachments(np.array(dofs), np.array(arms), np.array(origins), frame)
+        floors = np.array([self._floor(name, beam) for name, beam in beams.items()])
+        each = np.array([len(own) - 1 for own in cuts.values()])
+        elements, size = self._elements(cuts, tables, ends, attachments, np.repeat(floors, each))
         free, base, rate = self._constraints(size, elements, attachments, [*springs, *loads])
         return Discretisation(
             self.degree, elements, attachments, springs, loads, size, free, base, rate, self.scales,
-            self.bodies, nodes, self.fits, np.array([piece["floored"] for piece in pieces]),
+            self.bodies, nodes, self.fits, np.repeat(floors > 0, each), self.pieces, self.tension,
         )  # fmt: skip
 
     # -- bodies and attachments ------------------------------------------------------------------------------------
     def _scales(self) -> MechanicsUnits:
-        length = float(np.mean([np.real(fitted.length) for fitted in self.fits.values()]))
+        lengths = [np.real(self.fits[name].length) for name in (self.bundle.names[k] for k in self.bundle.others)]
+        length = float(np.mean([*(np.real(self.bundle.length) if self.bundle.plain else ()), *lengths]))
         section = next(iter(self.network.beams.values())).section
         rigidity = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
         return MechanicsUnits(length, rigidity / length**2, length if isinstance(self.drive, Displacement) else 1.0)
 
+    def _number(self, more: int) -> int:
+        self.count += more
+        return self.count - more
+
     def _body(self) -> tuple[int, int, int]:
-        return next(self.count), next(self.count), next(self.count)
+        first = self._number(3)
+        return first, first + 1, first + 2
 
     def _own_place(self, name: str) -> tuple[Any, Any, Any, Any]:
         """Return unknowns, arm, origin and frame of a node.
@@ -215,14 +235,13 @@ class _ArrayBuilder:
         node, at = self.network.nodes[name], self.network.nodes[master]
         turn, pinned = self._turn_of(carrier), carrier != master
         swing = turn if pinned and not apart(self.network, carrier) else self.bodies[master][2]
-        unknowns = np.array([*self.bodies[master][:2], swing, turn])
-        frame = self.turned.get(master, at.support.direction)
-        arm = np.array([node.x - at.x, node.y - at.y]) / self.scales.length
-        return unknowns, arm, np.array([at.x, at.y]) / self.scales.length, frame
+        frame, length = self.turned.get(master, at.support.direction), self.scales.length
+        arm = ((node.x - at.x) / length, (node.y - at.y) / length)
+        return (*self.bodies[master][:2], swing, turn), arm, (at.x / length, at.y / length), frame
 
     def _turn_of(self, carrier: str) -> int:
         if carrier not in self.turns:
-            self.turns[carrier] = next(self.count)
+            self.turns[carrier] = self._number(1)
         return self.turns[carrier]
 
     def _attach(self, name: str, offset: Any = (0.0, 0.0), pin: bool = False) -> int:
@@ -235,10 +254,10 @@ class _ArrayBuilder:
                 raise InputError(
                     f"{carrier!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own"
                 )
-        unknowns = unknowns.copy()
         if pin:
-            unknowns[3] = next(self.count)
-        self.places.append((unknowns, arm + np.asarray(offset) / self.scales.length, origin, frame))
+            unknowns = (*unknowns[:3], self._number(1))
+        length = self.scales.length
+        self.places.append((unknowns, (arm[0] + offset[0] / length, arm[1] + offset[1] / length), origin, frame))
         return len(self.places) - 1
 
     def _spring_places(self, spring: Spring) -> tuple[int, ...]:
@@ -247,125 +266,79 @@ class _ArrayBuilder:
         return tuple(self._attach(name) for name in (spring.start, spring.end) if name is not None)
 
     # -- elements --------------------------------------------------------------------------------------------------
-    def _beam(self, name: str, beam: Beam) -> Iterator[dict[str, Any]]:
-        """Yield the elements of a beam."""
-        fitted = self.fits[name]
+    def _cuts(self, name: str, beam: Beam) -> list[float]:
+        """Return the parameters between which the elements of a beam lie."""
+        tautness = self.tension.get(name, 0.0)
+        whole = self.pieces == 1 and tautness <= TAUT and _turns_little(beam)
+        return [0.0, 1.0] if whole and is_plain(beam) else _cuts(beam, self.fits[name], self.pieces, tautness)
+
+    def _beam(self, beam: Beam, cuts: list[float], tables: Mapping[str, Any]) -> list[tuple[int, int]]:
+        """Return the attachments of the ends of a beam's elements; those inside the beam are bodies of their own."""
         start = self._attach(beam.start, beam.start_offset, beam.start_joint == "pin")
         end = self._attach(beam.end, beam.end_offset, beam.end_joint == "pin")
-        known = self.together.get(name)
-        cuts = [0.0, 1.0] if known else _cuts(beam, fitted, self.pieces, self.tension.get(name, 0.0))
-        floor = self._floor(beam, fitted)
-        last = start
-        for k, (left, right) in enumerate(itertools.pairwise(cuts)):
-            piece = known or self._piece(beam, fitted, left, right)
-            piece["axial"] = piece["axial"] + floor
-            piece["ends"] = last, (end if k == len(cuts) - 2 else self._inner_body(last, piece))
-            yield piece | {
-                "beam": name,
-                "cuts": (left, right),
-                "raw": beam.closure == "raw",
-                "inner": k < len(cuts) - 2,
-                "floored": floor > 0,
-            }
-            last = piece["ends"][1]
+        inner, count = len(cuts) - 2, len(self.places)
+        if inner:
+            first = self._elements_before
+            rows = slice(first, first + inner)
+            chords = [(tables["weight"][rows] * turn(tables["angle"][rows])).sum(axis=1) for turn in (np.cos, np.sin)]
+            _, arm, origin, _ = self.places[start]
+            x, y = ((origin[k] + arm[k] + np.cumsum(chords[k])).tolist() for k in (0, 1))
+            for place in zip(x, y, strict=True):
+                body = self._body()
+                self.places.append(((*body, body[2]), (0.0, 0.0), place, 0.0))
+        self._elements_before += inner + 1
+        marks = [start, *range(count, count + inner), end]
+        return list(itertools.pairwise(marks))
 
-    def _plain_tables(self) -> dict[str, dict[str, Any]]:
-        """Return the tables of plain beams of one element, by name: in a few array operations for all of them."""
-        bundle, rule = self.bundle, basis(self.degree)
-        if not bundle.plain or self.pieces > 1 or self.wide:
-            return {}
-        length, force = self.scales.length, self.scales.force
-        speed = bundle.length[:, None] / length
-        powers = np.vander(rule.places, bundle.coefficients.shape[1], increasing=True)
-        angle, weight, ones = bundle.coefficients @ powers.T, speed * rule.weights, np.ones(len(rule.places))
-        rigidity = bundle.bending[:, None] / (force * length**2) / speed**2 * ones
-        axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
-        tables = zip(angle, weight, rigidity, axial, shear, speed * (1 - rule.places), speed[:, 0], strict=True)
-        return {
-            name: dict(zip(TABLE_COLUMNS, own, strict=True))
-            for name, own in zip((bundle.names[k] for k in bundle.plain), tables, strict=True)
-            if _turns_little(self.network.beams[name]) and self.tension.get(name, 0.0) <= TAUT
-        }
+    _elements_before = 0  # of the beams that are attached
 
-    def _piece(self, beam: Beam, fitted: Fit, left: float, right: float) -> dict[str, Any]:
-        """Return the tables of an element between two parameters of a beam's shape."""
-        length, force = self.scales.length, self.scales.force
-        rule, inside = basis(self.degree), 0.5 * (left + right)
-        t = left + (right - left) * rule.places
-        speed = fitted.speed(t, inside) * (right - left) / length + 0.0 * t
-        rigidity, axial, shear = beam.section.rigidities(fitted.arc(t), float(np.real(fitted.arc(inside))))
-        whole = (speed * rule.weights).sum()
-        return {
-            "angle": fitted.angle(t, inside) + 0.0 * t,
-            "weight": speed * rule.weights,
-            "rigidity": rigidity / (force * length**2) / speed**2,
-            "axial": axial * force + 0.0 * t,
-            "shear": shear * force + 0.0 * t,
-            "ahead": whole - integrals_to_points(self.degree) @ speed,
-            "length": whole,
-        } | (self._curling(beam, fitted, t, inside, speed) if self.wide else {})
-
-    def _curling(self, beam: Beam, fitted: Fit, t: Any, inside: float, speed: Any) -> dict[str, Any]:
-        """Return the tables of wide strips."""
-        thickness = beam.section.thickness_at(fitted.arc(t), float(np.real(fitted.arc(inside))))
-        curl, hindrance = beam.section.curling(thickness)
-        angle = fitted.angle(t, inside) + 0.0 * t
-        return {
-            "rest": slopes_at_points(self.degree) @ angle,
-            "curl": curl / (speed * self.scales.length) ** 2,
-            "hindrance": hindrance + 0.0 * speed,
-        }
-
-    def _floor(self, beam: Beam, fitted: Fit) -> float:
+    def _floor(self, name: str, beam: Beam) -> float:
         """Return 1/EA that a straight beam gets which does not stretch."""
-        if beam.section.axial or len(fitted.course.breaks) > 2 or not _is_straight(beam, fitted):
+        if beam.section.axial or not _is_straight(beam, self.fits, name):
             return 0.0
         rigidity = np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])
         floor = FLOOR_UNDER_LOADS if isinstance(self.drive, Loading) else FLOOR_UNDER_MOTION
         return float(floor * self.scales.force * self.scales.length**2 / rigidity)
 
-    def _inner_body(self, last: int, piece: Mapping[str, Any]) -> int:
-        """Return the attachment of a new body at the end of an element inside a beam."""
-        _, arm, origin, _ = self.places[last]
-        x, y = ((piece["weight"] * turn(piece["angle"])).sum() for turn in (np.cos, np.sin))
-        body = self._body()
-        self.places.append((np.array([*body, body[2]]), np.zeros(2), origin + arm + np.array([x, y]), 0.0))
-        return len(self.places) - 1
-
-    def _elements(self, pieces: list[dict[str, Any]], attachments: Attachments) -> tuple[BeamElements, int]:
+    def _elements(
+        self, cuts: Mapping[str, list[float]], tables: dict[str, Any], ends: Any, attachments: Attachments, floors: Any
+    ) -> tuple[BeamElements, int]:
         """Return the elements and the number of unknowns: bubbles and forces are numbered behind motions of ends."""
-        bubbles = [[next(self.count) for _ in range(self.degree - 1)] for _ in pieces]
-        forces = [[next(self.count), next(self.count)] for _ in pieces]
-        ends = np.array([piece["ends"] for piece in pieces])
-        unknowns = np.hstack([attachments.unknowns[ends[:, 0]], attachments.unknowns[ends[:, 1]], bubbles, forces])
-        columns = (*TABLE_COLUMNS, *(("rest", "curl", "hindrance") if self.wide else ()))
-        tables = {name: np.array([piece[name] for piece in pieces]) for name in columns}
-        beams = tuple(piece["beam"] for piece in pieces)
-        line = self._line_loads()
+        count = len(ends)
+        bubbles = self._number(count * (self.degree - 1)) + np.arange(count * (self.degree - 1)).reshape(count, -1)
+        forces = self._number(2 * count) + np.arange(2 * count).reshape(count, 2)
+        whole = attachments.unknowns
+        unknowns = np.concatenate([whole[ends[:, 0]], whole[ends[:, 1]], bubbles, forces], axis=1)
+        if floors.any():
+            tables = tables | {"axial": tables["axial"] + floors[:, None]}
+        beams = tuple(name for name, own in cuts.items() for _ in own[1:])
         elements = BeamElements(
-            **tables, line=np.array([line[name] for name in beams]), gap=np.zeros((len(pieces), 2)), ends=ends,
-            unknowns=unknowns, beam=beams, cuts=np.array([piece["cuts"] for piece in pieces]),
+            **tables, line=self._line_loads(beams), gap=np.zeros((count, 2)), ends=ends, unknowns=unknowns, beam=beams,
+            cuts=np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)]),
         )  # fmt: skip
-        return elements._replace(gap=self._gaps(pieces, elements, attachments)), next(self.count)
+        return elements._replace(gap=self._gaps(elements, attachments)), self.count
 
-    def _line_loads(self) -> dict[str, Any]:
-        """Return the line loads of every beam: constant and growing with the drive."""
-        sums: dict[str, Any] = {name: np.zeros((2, 2)) for name in self.network.beams}
+    def _line_loads(self, beams: tuple[str, ...]) -> Any:
+        """Return the line loads of every element: constant and growing with the drive."""
+        given = [(k, load) for k, loads in enumerate((self.network.loads, self.drive.loads)) for load in loads]
+        lines = [(k, load) for k, load in given if isinstance(load, LineLoad)]
+        kind = np.result_type(float, *(value for _, load in lines for value in (load.wx, load.wy)))
+        total = np.zeros((len(beams), 2, 2), kind)
         unit = self.scales.length / self.scales.force
-        for grows, loads in enumerate((self.network.loads, self.drive.loads)):
-            for load in loads:
-                if isinstance(load, LineLoad):
-                    added = np.zeros((2, 2), np.result_type(load.wx, load.wy, float))
-                    added[grows] = np.array([load.wx, load.wy]) * unit * (self.scales.drive if grows else 1.0)
-                    sums[load.beam] = sums[load.beam] + added
-        return sums
+        for grows, load in lines:
+            own = [name == load.beam for name in beams]
+            total[own, grows] += np.array([load.wx, load.wy]) * unit * (self.scales.drive if grows else 1.0)
+        return total
 
-    def _gaps(self, pieces: list[dict[str, Any]], elements: BeamElements, attachments: Attachments) -> Any:
+    def _gaps(self, elements: BeamElements, attachments: Attachments) -> Any:
         """Return by how much the last element of each beam that is forced into place misses its node."""
+        raw = [self.network.beams[name].closure == "raw" for name in elements.beam]
+        if not any(raw):
+            return elements.gap
         place = attachments.origin + attachments.arm
         span = place[elements.ends[:, 1]] - place[elements.ends[:, 0]]
         reach = [(elements.weight * turn(elements.angle)).sum(axis=1) for turn in (np.cos, np.sin)]
-        last = np.array([piece["raw"] and not piece["inner"] for piece in pieces])
+        last = np.array(raw) & (elements.cuts[:, 1] == 1.0)
         return np.where(last[:, None], span - np.stack(reach, axis=1), 0.0)
 
     # -- what is held ----------------------------------------------------------------------------------------------
@@ -394,27 +367,9 @@ class _ArrayBuilder:
         return np.flatnonzero(~held), base, rate
 
 
-def _bundle(network: Network) -> Bundle:
-    """Return the beams of a network; plain ones are fitted together."""
-    ends = np.array(
-        [
-            (network.nodes[node].x + offset[0], network.nodes[node].y + offset[1])
-            for beam in network.beams.values()
-            for node, offset in ((beam.start, beam.start_offset), (beam.end, beam.end_offset))
-        ]
-    )
-    return Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
-
-
-def _fits(network: Network, bundle: Bundle) -> dict[str, Fit]:
-    """Return how each beam is fitted between its nodes."""
-    alone = {}
-    for name in (bundle.names[k] for k in bundle.others):
-        beam = network.beams[name]
-        start, end = network.nodes[beam.start], network.nodes[beam.end]
-        dx = end.x + beam.end_offset[0] - start.x - beam.start_offset[0]
-        alone[name] = fit(beam, (dx, end.y + beam.end_offset[1] - start.y - beam.start_offset[1]))
-    return {name: bundle.fit_of(name) or alone[name] for name in bundle.names}
+def _direction(angle: Any) -> Any:
+    """Return cosine and sine in a last axis."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def _used(size: int, elements: BeamElements, attachments: Attachments, acting: list[Attached]) -> Any:
@@ -436,21 +391,20 @@ def _used(size: int, elements: BeamElements, attachments: Attachments, acting: l
 
 def _cuts(beam: Beam, fitted: Fit, pieces: int, tautness: float) -> list[float]:
     """Return the parameters between which the elements of a beam lie."""
-    stations = [float(np.real(fitted.parameter(float(s)))) for s in np.real(beam.section.stations)]
-    marks = sorted({*np.real(fitted.course.breaks).tolist(), *stations})
-    marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > SAME_PLACE]
-    marks[0], marks[-1] = 0.0, 1.0
     count = pieces if _turns_little(beam) else max(pieces, int(np.ceil(fitted.turn / MAX_TURN)))
-    cuts = [left + (right - left) * k / count for left, right in itertools.pairwise(marks) for k in range(count)]
+    smooth = itertools.pairwise(smooth_marks(beam, fitted))
+    cuts = [left + (right - left) * k / count for left, right in smooth for k in range(count)]
     cuts.append(1.0)
     return _refine_ends(cuts, tautness) if tautness > TAUT else cuts
 
 
-def _is_straight(beam: Beam, fitted: Fit) -> bool:
-    """Return True if a beam without corners is straight before it is loaded."""
+def _is_straight(beam: Beam, fits: BeamFits, name: str) -> bool:
+    """Return True if a beam is straight before it is loaded."""
     if isinstance(beam.shape, Polynomial):
         return not any(np.real(coefficient) for coefficient in beam.shape.coefficients[1:])
-    return not np.ptp(np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)) > 0
+    fitted = fits[name]
+    angle = np.real(fitted.angle(np.linspace(0, 1, 9), 0.5)) + np.zeros(9)
+    return len(fitted.course.breaks) == 2 and not np.ptp(angle) > 0
 
 
 def _turns_little(beam: Beam) -> bool:
@@ -474,4 +428,12 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
     """Return the same arrays with elements that do not stretch at all."""
     axial, floored = discretisation.elements.axial.copy(), discretisation.floored.copy()
     axial[elements], floored[elements] = 0.0, False
-    return replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff = replace(discretisation, elements=discretisation.elements._replace(axial=axial), floored=floored)
+    stiff.known.update((key, made.stiffen(stiff)) for key, made in discretisation.known.items())
+    return stiff
+
+
+def discretise_alike(template: Discretisation, network: Network, drive: Drive) -> Discretisation:
+    """Return the arrays of another network of the same make-up: degree, cuts, floors and units of the template's."""
+    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales)
+    return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

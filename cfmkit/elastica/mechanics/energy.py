@@ -67,7 +67,7 @@ def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
 
 def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
-    own, kind = _element_gradients(network, z, drive, share)
+    own, kind = element_gradients(network, z, drive, share)
     parts = list(_contributions(network, z, drive, share))
     total = np.zeros(network.size, np.result_type(kind, *(part.gradient for part in parts)))
     np.add.at(total, network.elements.unknowns, own)
@@ -85,7 +85,7 @@ def _end_poses(network: Discretisation, z: Any) -> tuple[AttachmentPoses, Attach
     return tuple(poses(network.attachments, z, network.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
 
 
-def _element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
+def element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
     """Return the gradients of the elements by their unknowns, (e, degree + 9), and their type."""
     e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
     start, end = _end_poses(network, z)

@@ -20,6 +20,8 @@ import numpy as np
 from cfmkit.elastica.mechanics import energy
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
@@ -30,6 +32,7 @@ SAME_EQUILIBRIUM = 1e-7  # motions that differ by less are one
 FORCE_CHANGE = 8.0  # of a section force in one step, in EI/L^2 of its element, besides half of what it was
 LAND_FROM = 1.3  # steps to a target from which on it is hit by one
 SHORTEST_STEP = 1e-13  # share of the range
+N_PREDICTING = 3  # states whose polynomial predicts the next
 MAX_REJECTED = 7  # two for each rejected step, one less for each accepted one
 
 
@@ -52,8 +55,7 @@ class LinearEquations(NamedTuple):
     change: FloatArray
 
 
-@dataclass(frozen=True)
-class MarchState:
+class MarchState(NamedTuple):
     """An equilibrium: free unknowns (n,) and their slopes along the way, all dimensionless."""
 
     free: Any
@@ -64,13 +66,23 @@ class MarchState:
     target: int = -1  # number of the target it lies at, -1 if at none
 
 
+class SolvedStates(NamedTuple):
+    """What Newton's method found near k guesses."""
+
+    converged: Any  # (k,)
+    free: FloatArray  # (k, n)
+    rate: FloatArray  # (k, n)
+    unstable: Any  # (k,)
+    effort: FloatArray  # (k,)
+
+
 @dataclass(frozen=True)
 class MarchPlan:
     """Start of a march and its step."""
 
     step: float  # first one, along the way
     span: float  # range of the way
-    before: MarchState | None = None  # the state before the first, for a cubic prediction
+    before: MarchState | None = None  # the state before the first, for a better prediction
     largest_turn: float = 0.35  # change of a motion in one step
     tolerance: float = 1e-10
     on_branch: bool = False  # check that every state leads back: a branch may end
@@ -97,6 +109,10 @@ class NumpyEquations:
     def __post_init__(self) -> None:
         """Set the units."""
         object.__setattr__(self, "unit", force_units(self.network))
+
+    def stiffen(self, network: Discretisation) -> NumpyEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        return replace(self, network=network)
 
     @property
     def n(self) -> int:
@@ -210,6 +226,38 @@ class NumpyEquations:
             last = largest
         return None
 
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses (k, n) at places (k,) of the way; see `solve`."""
+        each = [self.solve(*pair, tolerance=tolerance, quick=quick) for pair in zip(free, way, strict=True)]
+        nothing = MarchState(np.full(self.n, np.nan), np.nan, np.full(self.n, np.nan), 0, np.nan)
+        states = [state or nothing for state in each]
+        return SolvedStates(
+            np.array([state is not None for state in each], bool),
+            np.array([state.free for state in states]).reshape(len(each), self.n),
+            np.array([state.rate for state in states]).reshape(len(each), self.n),
+            np.array([state.unstable for state in states], np.int64),
+            np.array([state.effort for state in states]),
+        )
+
+    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+        """Return flexibility and shape of the softest mode of the motions after some powers of their flexibility.
+
+        The flexibility is 0 if the tangent is singular.
+        """
+        moves, flexibility = np.isinf(self.unit), 0.0
+        vector = np.array(vector, float)
+        try:
+            inverse = np.linalg.inv(self.linearise(free, way).tangent)
+        except np.linalg.LinAlgError:
+            return 0.0, vector
+        for _ in range(rounds):
+            moved = inverse[:, moves] @ vector[moves]
+            flexibility = float(vector[moves] @ moved[moves] / (vector[moves] @ vector[moves]))
+            vector = moved / np.linalg.norm(moved[moves])
+        return flexibility, vector
+
     def _effort(self, free: FloatArray, way: float) -> float:
         moved = self.network.base if self.ramp else self.network.rate
         return float(self.gradient(free, way) @ moved)
@@ -240,14 +288,19 @@ class _Judgement(NamedTuple):
     agrees: bool  # the chord with the slopes at its ends: else it is another path
 
 
-def predict(here: MarchState, before: MarchState | None, goal: float) -> FloatArray:
-    """Return the cubic through two states and their slopes at a place of the way, or the tangent of one."""
-    if before is None or before.way == here.way:
-        return np.asarray(here.free + (goal - here.way) * here.rate)
-    d = here.way - before.way
-    s = (goal - before.way) / d
-    ends = (1 + 2 * s) * (1 - s) ** 2 * before.free + s * s * (3 - 2 * s) * here.free
-    return np.asarray(ends + d * (s * (1 - s) ** 2 * before.rate + s * s * (s - 1) * here.rate))
+def predict(states: Sequence[MarchState], goal: float) -> FloatArray:
+    """Return Hermite's polynomial through up to three states and their slopes at a place of the way.
+
+    Of one it is the tangent, of two the cubic.
+    """
+    total: Any = 0.0
+    for own in states:
+        others = [other.way for other in states if other is not own]
+        share = float(np.prod([(goal - way) / (own.way - way) for way in others])) ** 2
+        slope = 2 * sum(1 / (own.way - way) for way in others)
+        ahead = goal - own.way
+        total = total + share * ((1 - slope * ahead) * own.free + ahead * own.rate)
+    return np.asarray(total)
 
 
 def _judge(equations: NumpyEquations, here: MarchState, new: MarchState, guess: FloatArray) -> _Judgement:
@@ -276,7 +329,8 @@ def _leads_back(equations: NumpyEquations, here: MarchState, new: MarchState, mo
 
 
 def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
-    here, before, step = start, plan.before, plan.step
+    here, step = start, plan.step
+    earlier = [] if plan.before is None or plan.before.way == start.way else [plan.before]  # on this way, latest first
     states: list[MarchState] = []
     passed = rejected = 0
     while passed < len(targets) and len(states) < plan.room:
@@ -284,9 +338,9 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
         sense, lands = np.sign(left), abs(left) <= LAND_FROM * step
         goal = float(targets[passed]) if lands else here.way + sense * step
         ahead = goal - here.way
-        if before is not None and (here.way - before.way) * sense < 0:
-            before = None
-        guess = predict(here, before, goal)
+        if earlier and (here.way - earlier[0].way) * sense < 0:
+            earlier = []
+        guess = predict((here, *earlier), goal)
         new = equations.solve(guess, goal, tolerance=plan.tolerance, quick=True)
         seen = _Judgement(0.0, 0.0, 0.0, True) if new is None else _judge(equations, here, new, guess)
         same = new is not None and new.unstable == start.unstable
@@ -301,7 +355,8 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
                 return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, step)
             if plan.on_branch and not _leads_back(equations, here, new, seen.moved, plan.tolerance):
                 return NaturalMarch(tuple(states), MarchCode.BRANCH_ENDS, step)
-            before, here = here, replace(new, target=passed if lands else -1)
+            earlier = [here, *earlier[: N_PREDICTING - 2]]
+            here = new._replace(target=passed if lands else -1)
             states.append(here)
             passed += lands
             quality = seen.missed / (seen.moved + 1e-8)
@@ -310,8 +365,8 @@ def _march(equations: NumpyEquations, start: MarchState, targets: FloatArray, pl
             elif quality > 0.25:
                 step = 0.8 * abs(ahead)
             continue
-        if before is not None and step < 0.25 * abs(here.way - before.way):
-            before = None
+        if earlier and step < 0.25 * abs(here.way - earlier[0].way):
+            earlier = []
         if rejected > MAX_REJECTED or step < SHORTEST_STEP * plan.span:
             return NaturalMarch(tuple(states), MarchCode.STEPS_FAIL, step)
     return NaturalMarch(tuple(states), MarchCode.DONE if passed == len(targets) else MarchCode.FULL, step)

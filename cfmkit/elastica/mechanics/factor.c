@@ -72,12 +72,14 @@ int factors_add(Factors *f, const Int *at, Int count, const double *matrix) {
         if (at[i] >= 0 && f->position[at[i]] < 0 && !enter(f, at[i])) return 0;
         where[i] = at[i] < 0 ? -1 : f->position[at[i]];
     }
-    for (Int i = 0; i < count; i++) {
-        if (where[i] < 0) continue;
-        double *row = f->front + row_start(where[i]);
-        for (Int j = 0; j < count; j++)
-            if (where[j] >= 0 && where[j] <= where[i]) row[where[j]] += matrix[i * count + j];
-    }
+    for (Int i = 0; i < count; i++)
+        for (Int j = 0; j <= i; j++) {
+            const Int a = where[i], b = where[j];
+            if (a < 0 || b < 0) continue;
+            const double own = matrix[i * count + j] * (a == b && i != j ? 2.0 : 1.0); /* an unknown may stand twice */
+            if (a >= b) f->front[row_start(a) + (size_t)b] += own;
+            else f->front[row_start(b) + (size_t)a] += own;
+        }
     return 1;
 }
 
@@ -100,17 +102,51 @@ static void exchange(Factors *f, Int a, Int b) { /* two rows and columns of the 
     f->position[f->index[a]] = a; f->position[f->index[b]] = b;
 }
 
-/* Return the largest number beside the diagonal of a column; own: and of rows that may be eliminated, with the row. */
-static double largest_beside(const Factors *f, const Int *leaves, Int element, Int column, Int skip, Int *partner) {
-    double largest = 0.0, own = 0.0;
+/* Take a share of a pivot's row from each row of the front before it; of two pivots both shares at once. */
+FAST static void take_one(Int rows, double *restrict front, const double *restrict pivot, const double *restrict factor) {
+    for (Int i = 0; i < rows; front += ++i) {
+        const double share = factor[i];
+        if (share == 0.0) continue;
+        for (Int j = 0; j <= i; j++) front[j] -= share * pivot[j];
+    }
+}
+
+FAST static void take_two(Int rows, double *restrict front, const double *restrict p, const double *restrict q,
+                          const double *restrict first, const double *restrict second) {
+    for (Int i = 0; i < rows; front += ++i) {
+        const double x = first[i], y = second[i];
+        if (x == 0.0 && y == 0.0) continue;
+        for (Int j = 0; j <= i; j++) front[j] -= x * p[j] + y * q[j];
+    }
+}
+
+/* Return the largest number beside the diagonal of a column, one row left out. */
+static double largest_beside(const Factors *f, Int column, Int skip) {
+    double largest = 0.0;
     const double *row = f->front + row_start(column);
-    for (Int k = 0; k < f->fronts; k++) {
-        if (k == column || k == skip) continue;
-        const double size = fabs(k < column ? row[k] : f->front[row_start(k) + (size_t)column]);
-        if (size > largest) largest = size;
-        if (partner && size > own && leaves[f->index[k]] <= element) { own = size; *partner = k; }
+    for (Int k = 0; k < column; k++)
+        if (k != skip && fabs(row[k]) > largest) largest = fabs(row[k]);
+    for (Int k = column + 1; k < f->fronts; k++) {
+        const double size = fabs(f->front[row_start(k) + (size_t)column]);
+        if (k != skip && size > largest) largest = size;
     }
     return largest;
+}
+
+static double entry(const Factors *f, Int i, Int j) {
+    return i > j ? f->front[row_start(i) + (size_t)j] : f->front[row_start(j) + (size_t)i];
+}
+
+/* Return the row that a column is coupled with most of those that may be eliminated, -1 if with none. */
+static Int find_partner(const Factors *f, const Int *leaves, Int element, Int column) {
+    double largest = 0.0;
+    Int partner = -1;
+    for (Int k = 0; k < f->fronts; k++)
+        if (k != column && leaves[f->index[k]] <= element && fabs(entry(f, column, k)) > largest) {
+            largest = fabs(entry(f, column, k));
+            partner = k;
+        }
+    return partner;
 }
 
 static int reserve(Factors *f, Int more) {
@@ -147,12 +183,8 @@ static int eliminate_one(Factors *f, Int at) {
     if (!reserve(f, rows)) return 0;
     double *factor = begin_pivot(f, f->index[rows], rows, 0, 1.0 / d, 0.0);
     f->negative += d < 0.0;
-    for (Int i = 0; i < rows; i++) {
-        const double share = factor[i] = pivot[i] / d;
-        if (share == 0.0) continue;
-        double *row = f->front + row_start(i);
-        for (Int j = 0; j <= i; j++) row[j] -= share * pivot[j];
-    }
+    for (Int i = 0; i < rows; i++) factor[i] = pivot[i] / d;
+    take_one(rows, f->front, pivot, factor);
     return 1;
 }
 
@@ -170,40 +202,37 @@ static int eliminate_two(Factors *f, Int one, Int other) {
     first = f->factor + f->first[f->pivots - 2];
     f->negative += det < 0.0 ? 1 : a < 0.0 ? 2 : 0;
     for (Int i = 0; i < rows; i++) {
-        const double x = first[i] = (c * p[i] - b * q[i]) / det, y = second[i] = (a * q[i] - b * p[i]) / det;
-        if (x == 0.0 && y == 0.0) continue;
-        double *row = f->front + row_start(i);
-        for (Int j = 0; j <= i; j++) row[j] -= x * p[j] + y * q[j];
+        first[i] = (c * p[i] - b * q[i]) / det;
+        second[i] = (a * q[i] - b * p[i]) / det;
     }
+    take_two(rows, f->front, p, q, first, second);
     return 1;
-}
-
-static double entry(const Factors *f, Int i, Int j) {
-    return i > j ? f->front[row_start(i) + (size_t)j] : f->front[row_start(j) + (size_t)i];
 }
 
 /* Eliminate what no later element holds; return 0 if there is no memory, or at the end if the matrix is singular. */
 int factors_eliminate(Factors *f, const Int *leaves, Int element) {
-    Int at = f->fronts - 1;
-    while (at >= 0) {
-        if (leaves[f->index[at]] > element) { at--; continue; }
-        Int partner = -1;
-        const double d = entry(f, at, at), beside = largest_beside(f, leaves, element, at, -1, &partner);
-        int done = 0;
-        if (d != 0.0 && fabs(d) >= THRESHOLD * beside) {
-            if (!eliminate_one(f, at)) return 0;
-            done = 1;
-        } else if (partner >= 0) {
+    int progress = 1;
+    while (progress) { /* what had no pivot may have one after the others */
+        progress = 0;
+        for (Int at = f->fronts - 1; at >= 0; at--) {
+            if (at >= f->fronts || leaves[f->index[at]] > element) continue;
+            const double d = entry(f, at, at);
+            if (d != 0.0 && fabs(d) >= THRESHOLD * largest_beside(f, at, -1)) {
+                if (!eliminate_one(f, at)) return 0;
+                progress = 1;
+                continue;
+            }
+            const Int partner = find_partner(f, leaves, element, at);
+            if (partner < 0) continue;
             const double c = entry(f, partner, partner), b = entry(f, at, partner), det = d * c - b * b;
-            const double mine = largest_beside(f, leaves, element, at, partner, NULL);
-            const double its = largest_beside(f, leaves, element, partner, at, NULL);
             const double most = fabs(det) / THRESHOLD;
-            if (det != 0.0 && fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most) {
+            if (det == 0.0) continue;
+            const double mine = largest_beside(f, at, partner), its = largest_beside(f, partner, at);
+            if (fabs(c) * mine + fabs(b) * its <= most && fabs(b) * mine + fabs(d) * its <= most) {
                 if (!eliminate_two(f, at, partner)) return 0;
-                done = 1;
+                progress = 1;
             }
         }
-        at = done ? f->fronts - 1 : at - 1;
     }
     return 1;
 }
@@ -235,22 +264,54 @@ static int dense_factors(Factors *f) {
 
 int factors_finish(Factors *f, int unsymmetric) { return unsymmetric ? dense_factors(f) : f->fronts == 0; }
 
+static void dense_solve(const Factors *f, double *x) {
+    const Int n = f->n;
+    for (Int k = 0; k < n; k++) {
+        const double t = x[f->index[k]];
+        x[f->index[k]] = x[k];
+        x[k] = t;
+    }
+    for (Int i = 1; i < n; i++) for (Int j = 0; j < i; j++) x[i] -= f->dense[i * n + j] * x[j];
+    for (Int i = n - 1; i >= 0; i--) {
+        for (Int j = i + 1; j < n; j++) x[i] -= f->dense[i * n + j] * x[j];
+        x[i] /= f->dense[i * n + i];
+    }
+}
+
+/* Put the solutions in the place of two right sides, (n) each. */
+void factors_solve_two(const Factors *f, int unsymmetric, double *restrict x, double *restrict y) {
+    if (unsymmetric) { dense_solve(f, x); dense_solve(f, y); return; }
+    for (Int p = 0; p < f->pivots; p++) {
+        const double a = x[f->unknown[p]], b = y[f->unknown[p]];
+        for (Int k = f->first[p]; k < f->first[p + 1]; k++) {
+            x[f->row[k]] -= f->factor[k] * a;
+            y[f->row[k]] -= f->factor[k] * b;
+        }
+    }
+    for (Int p = 0; p < f->pivots; p++) {
+        const Int own = f->unknown[p];
+        const double *by = f->inverse + 2 * p;
+        if (!f->pair[p]) { x[own] *= by[0]; y[own] *= by[0]; continue; }
+        const Int other = f->unknown[p + 1];
+        const double a = x[own], b = x[other], c = y[own], d = y[other];
+        x[own] = by[0] * a + by[1] * b; x[other] = by[3] * a + by[2] * b;
+        y[own] = by[0] * c + by[1] * d; y[other] = by[3] * c + by[2] * d;
+        p++;
+    }
+    for (Int p = f->pivots - 1; p >= 0; p--) {
+        double a = x[f->unknown[p]], b = y[f->unknown[p]];
+        for (Int k = f->first[p]; k < f->first[p + 1]; k++) {
+            a -= f->factor[k] * x[f->row[k]];
+            b -= f->factor[k] * y[f->row[k]];
+        }
+        x[f->unknown[p]] = a;
+        y[f->unknown[p]] = b;
+    }
+}
+
 /* Put the solution in the place of the right side, (n). */
 void factors_solve(const Factors *f, int unsymmetric, double *x) {
-    if (unsymmetric) {
-        const Int n = f->n;
-        for (Int k = 0; k < n; k++) {
-            const double t = x[f->index[k]];
-            x[f->index[k]] = x[k];
-            x[k] = t;
-        }
-        for (Int i = 1; i < n; i++) for (Int j = 0; j < i; j++) x[i] -= f->dense[i * n + j] * x[j];
-        for (Int i = n - 1; i >= 0; i--) {
-            for (Int j = i + 1; j < n; j++) x[i] -= f->dense[i * n + j] * x[j];
-            x[i] /= f->dense[i * n + i];
-        }
-        return;
-    }
+    if (unsymmetric) { dense_solve(f, x); return; }
     for (Int p = 0; p < f->pivots; p++) {
         const double own = x[f->unknown[p]];
         if (own != 0.0)

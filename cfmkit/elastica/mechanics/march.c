@@ -12,6 +12,7 @@
 #define MAX_ROUNDS 14
 #define LAND_FROM 1.3           /* steps to a target from which on it is hit by one */
 #define SHORTEST_STEP 1e-13     /* share of the range */
+#define N_PREDICTING 3          /* states whose polynomial predicts the next */
 
 enum { CONVERGED, DIVERGED, SINGULAR_OR_FAR };
 enum { DONE, STABILITY_CHANGES, STEPS_FAIL, FULL, BRANCH_ENDS, NO_START };
@@ -224,8 +225,7 @@ static int newton(const Model *m, Work *w, double *x, double *way, const Goal *g
             }
         found->unstable = unstable_of(m, w);
         found->told = told_unstable(m, w);
-        factors_solve(&w->factors, m->follows != 0, w->step);
-        factors_solve(&w->factors, m->follows != 0, w->slope);
+        factors_solve_two(&w->factors, m->follows != 0, w->step, w->slope);
         double along = 0.0;
         if (border) {
             double left = goal->level - border[n] * *way, below = border[n];
@@ -272,19 +272,69 @@ int solve(const Model *m, double *x, double *way, const double *border, double l
     return code;
 }
 
-/* ---- natural march ----------------------------------------------------------------------------------------------- */
-typedef struct { const double *x, *rate; double way; } Known;
-
-/* The cubic through two equilibria and their slopes, or the tangent. */
-static void predict(Int n, const Known *here, const Known *before, double goal, double *guess) {
-    const double ahead = goal - here->way;
-    if (!before || before->way == here->way) {
-        for (Int i = 0; i < n; i++) guess[i] = here->x[i] + ahead * here->rate[i];
-        return;
+/* Newton's method for each of several guesses (count, n): codes, unstable directions and efforts to found (count, 3). */
+int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found) {
+    const Goal goal = {NULL, 0.0, NULL, tolerance, quick};
+    Work *w = work_open(m);
+    if (!w) return DIVERGED;
+    for (Int k = 0; k < count; k++, x += m->free, rate += m->free, found += 3) {
+        Found end = {0, 0, 0.0};
+        found[0] = newton(m, w, x, way + k, &goal, &end);
+        memcpy(rate, w->slope, (size_t)m->free * sizeof(double));
+        found[1] = (double)end.told;
+        found[2] = end.effort;
     }
-    const double d = here->way - before->way, s = (goal - before->way) / d, r = 1.0 - s;
-    const double x0 = (1.0 + 2.0 * s) * r * r, x1 = s * s * (3.0 - 2.0 * s), t0 = d * s * r * r, t1 = d * s * s * (s - 1.0);
-    for (Int i = 0; i < n; i++) guess[i] = x0 * before->x[i] + x1 * here->x[i] + t0 * before->rate[i] + t1 * here->rate[i];
+    work_close(w);
+    return CONVERGED;
+}
+
+/* Make a vector (n) the softest mode of the motions by powers of their flexibility; return the mode's flexibility, 0 if
+ * the tangent is singular. */
+double soften(const Model *m, const double *x, double way, Int rounds, double *vector) {
+    Work *w = work_open(m);
+    const Stage at = stage(m, way);
+    double flexibility = 0.0;
+    if (w) {
+        place(m, w, x, at);
+        for (Int round = assemble(m, w, at, 1) ? 0 : rounds; round < rounds; round++) {
+            double before = 0.0, along = 0.0, after = 0.0;
+            for (Int i = 0; i < m->free; i++) w->step[i] = m->unit[i] == HUGE_VAL ? vector[i] : 0.0;
+            factors_solve(&w->factors, m->follows != 0, w->step);
+            for (Int i = 0; i < m->free; i++)
+                if (m->unit[i] == HUGE_VAL) {
+                    before += vector[i] * vector[i];
+                    along += vector[i] * w->step[i];
+                    after += w->step[i] * w->step[i];
+                }
+            flexibility = along / before;
+            const double size = sqrt(after);
+            if (!(size > 0.0) || !(size < 1e300)) { flexibility = 0.0; break; }
+            for (Int i = 0; i < m->free; i++) vector[i] = w->step[i] / size;
+        }
+    }
+    work_close(w);
+    return flexibility;
+}
+
+/* ---- natural march ----------------------------------------------------------------------------------------------- */
+typedef struct { double *x, *rate; double way; } Known;
+
+/* Hermite's polynomial through up to three equilibria and their slopes. */
+static void predict(Int n, const Known *known, int count, double goal, double *guess) {
+    memset(guess, 0, (size_t)n * sizeof(double));
+    for (int k = 0; k < count; k++) {
+        const double ahead = goal - known[k].way;
+        double share = 1.0, slope = 0.0;
+        for (int j = 0; j < count; j++)
+            if (j != k) {
+                const double apart = known[k].way - known[j].way;
+                share *= (goal - known[j].way) / apart;
+                slope += 2.0 / apart;
+            }
+        share *= share;
+        const double by_x = share * (1.0 - slope * ahead), by_rate = share * ahead;
+        for (Int i = 0; i < n; i++) guess[i] += by_x * known[k].x[i] + by_rate * known[k].rate[i];
+    }
 }
 
 /* How a step went: largest motion, what the prediction missed of it, change of forces over the allowed one, and whether
@@ -342,15 +392,19 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
     const Int n = m->free, wide = 2 * n + 4;
     const size_t bytes = (size_t)n * sizeof(double);
     const Goal goal = {NULL, 0.0, NULL, plan->tolerance, 1};
-    int code = DONE, known = before != NULL, rejected = 0;
+    int code = DONE, known = 1, rejected = 0; /* equilibria that predict */
     Int kept = 0, passed = 0;
     Found found = {(Int)plan->unstable, (Int)plan->unstable, 0.0};
-    double *memory = calloc((size_t)(6 * n + 1), sizeof(double)), *old_x = memory, *old_rate = memory + n;
-    double *guess = memory + 2 * n, *next = memory + 3 * n, *scratch = memory + 4 * n;
-    Known here = {x, rate, *way}, old = {old_x, old_rate, 0.0};
+    double *memory = calloc((size_t)(8 * n + 1), sizeof(double));
+    double *guess = memory, *next = memory + n, *scratch = memory + 2 * n;
+    Known at[N_PREDICTING] = {{x, rate, *way}, {memory + 4 * n, memory + 5 * n, 0.0}, {memory + 6 * n, memory + 7 * n, 0.0}};
     Work *w = work_open(m);
     if (!w || !memory) { code = NO_START; goto end; }
-    if (before) { memcpy(old_x, before, bytes); memcpy(old_rate, before + n, bytes); old.way = before[2 * n]; }
+    if (before && before[2 * n] != *way) {
+        memcpy(at[1].x, before, bytes); memcpy(at[1].rate, before + n, bytes);
+        at[1].way = before[2 * n];
+        known = 2;
+    }
     if (plan->start != 0.0) {
         const Goal first = {NULL, 0.0, NULL, plan->tolerance, 0};
         if (newton(m, w, x, way, &first, &found)) { code = NO_START; goto end; }
@@ -363,13 +417,13 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         const int lands = fabs(left) <= LAND_FROM * plan->step;
         double to = lands ? targets[passed] : *way + sense * plan->step;
         const double ahead = to - *way;
-        here.way = *way;
-        if (known && (*way - old.way) * sense < 0.0) known = 0;
-        predict(n, &here, known ? &old : NULL, to, guess);
+        at[0].way = *way;
+        if (known > 1 && (*way - at[1].way) * sense < 0.0) known = 1;
+        predict(n, at, known, to, guess);
         memcpy(next, guess, bytes);
         const int bad = newton(m, w, next, &to, &goal, &found);
         Judgement j = {0.0, 0.0, 0.0, 1};
-        if (!bad) j = judge(m, &here, next, w->slope, guess, ahead, plan->largest_force);
+        if (!bad) j = judge(m, at, next, w->slope, guess, ahead, plan->largest_force);
         const int same = found.unstable == (Int)plan->unstable;
         const int too_far = bad || j.moved > plan->largest_turn || j.missed > 0.4 * j.moved + SAME_EQUILIBRIUM;
         if (!bad && j.force > 1.0 && j.moved <= plan->largest_turn) /* too long for the forces: no sign of trouble */
@@ -380,11 +434,15 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
         } else {
             rejected = rejected ? rejected - 1 : 0;
             if (!same) { code = STABILITY_CHANGES; break; }
-            if (plan->on_branch != 0.0 && !leads_back(m, w, &here, next, ahead, j.moved, plan->tolerance, scratch)) {
+            if (plan->on_branch != 0.0 && !leads_back(m, w, at, next, ahead, j.moved, plan->tolerance, scratch)) {
                 code = BRANCH_ENDS;
                 break;
             }
-            memcpy(old_x, x, bytes); memcpy(old_rate, rate, bytes); old.way = *way; known = 1;
+            const Known last = at[2]; /* its memory takes the one that is left */
+            at[2] = at[1];
+            at[1] = last;
+            memcpy(at[1].x, x, bytes); memcpy(at[1].rate, rate, bytes); at[1].way = *way;
+            known = known < N_PREDICTING ? known + 1 : known;
             memcpy(x, next, bytes); memcpy(rate, w->slope, bytes); *way = to;
             store(n, rows + wide * kept++, x, rate, to, &found, lands ? (double)passed : -1.0);
             passed += lands;
@@ -393,7 +451,7 @@ int march(const Model *m, Plan *plan, double *x, double *rate, double *way, cons
             else if (quality > 0.25) plan->step = 0.8 * size;
             continue;
         }
-        if (known && plan->step < 0.25 * fabs(*way - old.way)) known = 0;
+        if (known > 1 && plan->step < 0.25 * fabs(*way - at[1].way)) known = 1;
         if (rejected > 7 || plan->step < SHORTEST_STEP * plan->range) { code = STEPS_FAIL; break; }
     }
     if (code == DONE && passed < count) code = FULL;

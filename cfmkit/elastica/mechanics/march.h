@@ -6,9 +6,18 @@
 
 #define MAX_DEGREE 40
 #define MAX_SHAPES (MAX_DEGREE + 1)
+#define MAX_POINTS (MAX_DEGREE + 4) /* Gauss points of an element */
 #define MAX_LOCAL (MAX_DEGREE + 9) /* unknowns of an element */
 
 typedef int64_t Int;
+
+/* Inner loops once more for processors with wider vectors, where the compiler can choose at run time. Without contraction
+ * (-std=c99) results are the same. */
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
+#define FAST __attribute__((target_clones("arch=haswell", "default")))
+#else
+#define FAST
+#endif
 
 /* Fields of 8 bytes: `march.py` fills a row of int64 with counts and addresses. e elements, q points, k attachments. */
 typedef struct {
@@ -16,11 +25,13 @@ typedef struct {
     Int ramp;    /* the drive is the share of what is constant; the drive proper rests */
     Int follows; /* some load turns with its node: the tangent is unsymmetric */
     const double *angle, *weight, *rigidity, *axial, *shear, *ahead; /* (e, q) */
-    const double *length, *line, *gap, *bend; /* (e), (e, 2, 2), (e, 2), (e, shapes, shapes): int EI N_i' N_j' */
+    const double *length, *line, *gap, *bend; /* (e), (e, 2, 2), (e, 2), (e, triangle): int EI N_i' N_j' */
     const Int *unknowns, *ends;               /* (e, degree + 9), (e, 2) */
     const Int *places;                        /* (k, 4) */
     const double *arm, *origin, *frame;       /* (k, 2) */
     const double *values, *slopes;            /* (q, shapes) */
+    const double *values_by_shape, *slopes_by_shape; /* (shapes, q) */
+    const double *products;                   /* (q, triangle): N_i N_j, rows of the lower triangle */
     const Int *slot;                          /* (size): number among the free unknowns, -1 if held */
     const Int *leaves;                        /* (free): the last element that holds an unknown, -1 if none does */
     const double *base, *rate;                /* (size) */
@@ -64,6 +75,7 @@ void factors_begin(Factors *f);
 int factors_add(Factors *f, const Int *at, Int count, const double *matrix);
 int factors_eliminate(Factors *f, const Int *leaves, Int element);
 int factors_finish(Factors *f, int unsymmetric);
+void factors_solve_two(const Factors *f, int unsymmetric, double *x, double *y);
 void factors_solve(const Factors *f, int unsymmetric, double *x);
 
 typedef struct Work Work;
@@ -74,6 +86,8 @@ int linearise(const Model *m, const double *x, double way, double *residual, dou
 int resolve(const Model *m, const double *x, double way, double *right, Int count, Int *unstable);
 int solve(const Model *m, double *x, double *way, const double *border, double level, const double *push, double tolerance,
           int quick, double *rate, double *found);
+int solve_many(const Model *m, double *x, double *way, Int count, double tolerance, int quick, double *rate, double *found);
+double soften(const Model *m, const double *x, double way, Int rounds, double *vector);
 
 /* Of a march: numbers of 8 bytes, too. */
 typedef struct {

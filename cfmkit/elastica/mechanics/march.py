@@ -6,15 +6,19 @@ addresses, so that an array of rows is many designs; what the addresses point to
 
 from __future__ import annotations
 
+import itertools
 import os
+from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
+from cfmkit.elastica.mechanics.discretise import BeamElements
 from cfmkit.elastica.mechanics.equations import (
     FORCE_CHANGE,
     LinearEquations,
@@ -23,6 +27,7 @@ from cfmkit.elastica.mechanics.equations import (
     MarchState,
     NaturalMarch,
     NumpyEquations,
+    SolvedStates,
     begin,
 )
 from cfmkit.elastica.mechanics.polynomials import basis
@@ -45,10 +50,12 @@ KNOWN = (LineSpring, SlideSpring, TorsionSpring, PointLoad)
 COUNTS = ("elements", "points", "degree", "size", "free", "springs", "loads", "ramp", "follows")
 ADDRESSES = (
     "angle", "weight", "rigidity", "axial", "shear", "ahead", "length", "line", "gap", "bend", "unknowns", "ends",
-    "places", "arm", "origin", "frame", "values", "slopes", "slot", "leaves", "base", "rate", "unit", "spring_at",
-    "spring", "load_at", "load", "rest", "curl", "hindrance",
+    "places", "arm", "origin", "frame", "values", "slopes", "values_by_shape", "slopes_by_shape", "products", "slot",
+    "leaves", "base", "rate", "unit", "spring_at", "spring", "load_at", "load", "rest", "curl", "hindrance",
 )  # fmt: skip
 """Fields of `Model` in march.h, in its order."""
+OF_ELEMENTS = tuple(name for name in BeamElements._fields if name in ADDRESSES)
+WHOLE_NUMBERS = frozenset(("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at"))
 
 
 @cache
@@ -80,9 +87,12 @@ def equations(network: Discretisation, ramp: bool = False) -> NumpyEquations:
     ramp : bool
         Whether the way is the share of what is constant instead of the drive.
     """
-    kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
-    plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
-    return CompiledEquations(network, ramp) if plain and compiled() is not None else NumpyEquations(network, ramp)
+    key = equations, ramp, compiled() is not None
+    if key not in network.known:
+        kinds = {type(attached.item) for attached in (*network.springs, *network.loads)}
+        plain = kinds <= set(KNOWN) and network.degree <= MAX_DEGREE
+        network.known[key] = (CompiledEquations if plain and key[2] else NumpyEquations)(network, ramp)
+    return network.known[key]  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +107,19 @@ class CompiledEquations(NumpyEquations):
         super().__post_init__()
         arrays = model_arrays(self)
         counts = model_counts(self.network, self.ramp)
-        addresses = (arrays[name].ctypes.data if name in arrays else 0 for name in ADDRESSES)
-        row = np.array([*counts.values(), *addresses], np.int64)
+        row = np.array([*counts.values(), *(0 for _ in ADDRESSES)], np.int64)
+        compiled().place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
+
+    def stiffen(self, network: Discretisation) -> CompiledEquations:
+        """Return the equations of the same network with another flexibility along its beams."""
+        stiff, axial = copy(self), np.ascontiguousarray(network.elements.axial, float)
+        object.__setattr__(stiff, "network", network)
+        object.__setattr__(stiff, "arrays", {**self.arrays, "axial": axial})
+        object.__setattr__(stiff, "row", self.row.copy())
+        compiled().place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
+        return stiff
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -159,6 +178,24 @@ class CompiledEquations(NumpyEquations):
         way = float(at[0])
         return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
 
+    def solve_each(
+        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+    ) -> SolvedStates:
+        """Return the equilibria near k guesses."""
+        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        rate, found = np.empty(x.shape), np.zeros((len(x), 3))
+        if compiled().solve_many(self.row, x, ways, rate, found, tolerance, quick):
+            raise MemoryError
+        converged, unstable = found[:, 0] == 0, found[:, 1].astype(np.int64)
+        for k in np.flatnonzero(converged & (unstable < 0)):
+            unstable[k] = self._unstable(x[k], float(ways[k]), int(unstable[k]))
+        return SolvedStates(converged, x, rate, unstable, found[:, 2])
+
+    def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+        """Return flexibility and shape of the softest mode."""
+        shape = np.array(vector, float)
+        return compiled().soften(self.row, np.ascontiguousarray(free, float), shape, way, rounds), shape
+
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
         n, goals = self.n, np.ascontiguousarray(targets, float)
@@ -169,10 +206,10 @@ class CompiledEquations(NumpyEquations):
         known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
         here = np.concatenate([start.free, start.rate, [start.way]])
         code = compiled().march(self.row, given, here, known, goals, rows, stored)
-        states = tuple(
-            MarchState(row[:n], float(row[2 * n]), row[n : 2 * n], int(row[-2]), float(row[-3]), int(row[-1]))
-            for row in rows[: stored[0]].copy()
-        )
+        rows = rows[: stored[0]].copy()
+        way, effort, told, target = rows[:, 2 * n :].T.tolist()
+        given_states = zip(rows[:, :n], way, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True)
+        states = tuple(itertools.starmap(MarchState, given_states))
         march = NaturalMarch(states, MarchCode(code), float(given[0]))
         return self._counted(march, start.unstable) if self.follows else march
 
@@ -182,7 +219,7 @@ class CompiledEquations(NumpyEquations):
         for state in march.states:
             if self._unstable(state.free, state.way, state.unstable) != unstable:
                 return NaturalMarch(tuple(states), MarchCode.STABILITY_CHANGES, march.step)
-            states.append(replace(state, unstable=unstable))
+            states.append(state._replace(unstable=unstable))
         return replace(march, states=tuple(states))
 
 
@@ -244,16 +281,15 @@ def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: 
 
 def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
-    rule, tables = basis(own.network.degree), designs.tables
+    rule, tables, products = basis(own.network.degree), designs.tables, slope_products(own.network.degree)
     found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
     bend = tables["weight"] * tables["rigidity"]
     if designs.each:
-        found["bend"] = (rule.slopes.T * bend[:, :, None, :]) @ rule.slopes
+        found["bend"] = bend @ products
         found["spring"] = np.array([[_spring(one, spring)[1] for spring in one.springs] for one in designs.each])
         found["load"] = np.array([[_load(one, load)[1] for load in one.loads] for one in designs.each])
     else:  # the same along an element, but for the weights
-        whole = (rule.slopes.T * rule.weights) @ rule.slopes
-        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None, None] * whole
+        found["bend"] = (bend[..., 0] / rule.weights[0])[..., None] * (rule.weights @ products)
     if designs.base is not None:
         found["base"] = np.ascontiguousarray(designs.base, float)
     return found
@@ -278,32 +314,45 @@ def model_counts(network: Discretisation, ramp: bool) -> dict[str, int]:
 
 def model_arrays(of: NumpyEquations) -> dict[str, Any]:
     """Return the arrays of a `Model` in C order."""
-    network, rule = of.network, basis(of.network.degree)
+    network = of.network
     e, a = network.elements, network.attachments
     slot = np.full(network.size, -1, np.int64)
     slot[network.free] = np.arange(len(network.free))
-    bend = (rule.slopes.T * (e.weight * e.rigidity)[:, None, :]) @ rule.slopes
+    bend = (e.weight * e.rigidity) @ slope_products(network.degree)
     springs, loads = [_spring(network, s) for s in network.springs], [_load(network, load) for load in network.loads]
-    given: dict[str, Any] = {name: getattr(e, name) for name in e._fields if name in ADDRESSES}
+    given: dict[str, Any] = {name: getattr(e, name) for name in OF_ELEMENTS}
     given |= {"places": a.unknowns, "arm": a.arm, "origin": a.origin, "frame": a.frame}
-    given |= {"values": rule.values, "slopes": rule.slopes, "base": network.base, "rate": network.rate}
-    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network, slot), "unit": of.unit}
+    given |= _shape_tables(network.degree) | {"base": network.base, "rate": network.rate}
+    given |= {"bend": bend, "slot": slot, "leaves": _leaves(network), "unit": of.unit}
     given |= {"spring_at": [at for at, _ in springs], "spring": [values for _, values in springs]}
     given |= {"load_at": [at for at, _ in loads], "load": [values for _, values in loads]}
-    whole = ("unknowns", "ends", "places", "slot", "leaves", "spring_at", "load_at")
     return {
-        name: np.ascontiguousarray(given[name], np.int64 if name in whole else np.float64)
-        for name in ADDRESSES
-        if given[name] is not None
+        name: np.ascontiguousarray(values, np.int64 if name in WHOLE_NUMBERS else np.float64)
+        for name, values in given.items()
+        if values is not None
     }
 
 
-def _leaves(network: Discretisation, slot: Any) -> Any:
+@lru_cache(maxsize=64)
+def _shape_tables(degree: int) -> dict[str, Any]:
+    rule, (i, j) = basis(degree), np.tril_indices(degree + 1)
+    tables = {"values": rule.values, "slopes": rule.slopes, "values_by_shape": rule.values.T}
+    tables |= {"slopes_by_shape": rule.slopes.T, "products": rule.values[:, i] * rule.values[:, j]}
+    return {name: np.ascontiguousarray(table) for name, table in tables.items()}
+
+
+@lru_cache(maxsize=64)
+def slope_products(degree: int) -> FloatArray:
+    """Return the products of the slopes of two shape functions at the Gauss points, (q, triangle), by rows of it."""
+    slopes, (i, j) = basis(degree).slopes, np.tril_indices(degree + 1)
+    return read_only(slopes[:, i] * slopes[:, j])
+
+
+def _leaves(network: Discretisation) -> Any:
     """Return the last element that holds each free unknown, -1 if none does."""
-    last = np.full(network.size, -1, np.int64)
-    for number, unknowns in enumerate(network.elements.unknowns):
-        last[unknowns] = number
-    return last[slot >= 0]
+    last, unknowns = np.full(network.size, -1, np.int64), network.elements.unknowns
+    last[unknowns.ravel()] = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])  # of several values the last stays
+    return last[network.free]
 
 
 def _spring(network: Discretisation, attached: Attached) -> tuple[tuple[int, int, int], tuple[float, ...]]:

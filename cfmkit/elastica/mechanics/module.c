@@ -96,6 +96,57 @@ static PyObject *py_solve(PyObject *self, PyObject *arguments) {
     return PyLong_FromLong(code);
 }
 
+/* solve_many(model, x, ways, rates, found, tolerance, quick) -> code */
+static PyObject *py_solve_many(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double tolerance, quick;
+    int code;
+    (void)self;
+    if (!number(arguments, 5, &tolerance) || !number(arguments, 6, &quick) || !take(arguments, 0, 5, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    const Int count = b.view[2].len / (Int)sizeof(double);
+    code = solve_many(at(&b, 0), at(&b, 1), at(&b, 2), count, tolerance, quick != 0.0, at(&b, 3), at(&b, 4));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyLong_FromLong(code);
+}
+
+/* soften(model, x, vector, way, rounds) -> flexibility */
+static PyObject *py_soften(PyObject *self, PyObject *arguments) {
+    Buffers b;
+    double way, rounds, flexibility;
+    (void)self;
+    if (!number(arguments, 3, &way) || !number(arguments, 4, &rounds) || !take(arguments, 0, 3, &b)) return NULL;
+    Py_BEGIN_ALLOW_THREADS
+    flexibility = soften(at(&b, 0), at(&b, 1), way, (Int)rounds, at(&b, 2));
+    Py_END_ALLOW_THREADS
+    release(&b);
+    return PyFloat_FromDouble(flexibility);
+}
+
+/* place(row, first, arrays): put the addresses of arrays, 0 for None, into a row of int64 from a place on. */
+static PyObject *py_place(PyObject *self, PyObject *arguments) {
+    Buffers row, one;
+    double first;
+    (void)self;
+    if (!number(arguments, 1, &first) || !take(arguments, 0, 1, &row)) return NULL;
+    PyObject *arrays = PyTuple_GetItem(arguments, 2);
+    const Py_ssize_t count = arrays ? PyTuple_Size(arrays) : -1;
+    Int *cell = (Int *)at(&row, 0) + (Int)first;
+    int good = count >= 0;
+    for (Py_ssize_t k = 0; good && k < count; k++) {
+        PyObject *array = PyTuple_GetItem(arrays, k);
+        cell[k] = 0;
+        if (array == Py_None) continue;
+        good = take(arrays, k, k + 1, &one);
+        if (good) { cell[k] = (Int)(intptr_t)at(&one, 0); release(&one); }
+    }
+    release(&row);
+    if (!good) return NULL;
+    Py_INCREF(Py_None);
+    return Py_None;
+}
+
 /* march(model, plan, x_rate_way, before, targets, rows, stored) -> code */
 static PyObject *py_march(PyObject *self, PyObject *arguments) {
     Buffers b;
@@ -131,6 +182,8 @@ static PyObject *py_march_many(PyObject *self, PyObject *arguments) {
 static PyMethodDef methods[] = {
     {"evaluate", py_evaluate, METH_VARARGS, NULL}, {"linearise", py_linearise, METH_VARARGS, NULL},
     {"resolve", py_resolve, METH_VARARGS, NULL},   {"solve", py_solve, METH_VARARGS, NULL},
+    {"solve_many", py_solve_many, METH_VARARGS, NULL}, {"soften", py_soften, METH_VARARGS, NULL},
+    {"place", py_place, METH_VARARGS, NULL},
     {"march", py_march, METH_VARARGS, NULL},       {"march_many", py_march_many, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

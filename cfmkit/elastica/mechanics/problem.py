@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 0.99  # share of the largest part of a mode from which on an earlier part is taken as the largest
 ROOM = 50  # states of a march besides two for each requested value, until it is looked at again
+FIRST_POWERS, N_POWERS, STIFF_SHARE = 8, 3, 1e-2
+"""Powers by which the softest mode is estimated, and its flexibility as a share of a critical one's that is none."""
+MIX = 0.1  # of any vector, that is added to a mode which may have no share of the one looked for
 NO_MOTION = 1e-3  # share of a mode's largest part below which the nodes do not move
 
 
@@ -112,6 +115,27 @@ class NetworkProblem:
         order = np.argsort(-np.abs(inverse))[: min(count, flexible)]
         return 1 / inverse[order], flexibility @ vectors[:, order] / inverse[order]
 
+    def is_stiff(self, at: PathEquilibrium, stiffness: float) -> bool:
+        """Return True if no eigenvalue is as small as a stiffness by far: two powers of the flexibility say so."""
+        flexibility, _ = self.equations.soften(at.x, at.drive, self._any_vector, N_POWERS)
+        return 0 < abs(flexibility) * stiffness < STIFF_SHARE
+
+    def softest(self, at: PathEquilibrium, near: FloatArray | None = None) -> tuple[float, FloatArray | None]:
+        """Return the size of the smallest eigenvalue and its mode, better where another is known that is near."""
+        if self.follows:
+            return abs(float(self.modes(at, 1)[0][0])), None
+        vector = self._any_vector if near is None else near + MIX * self._any_vector
+        rounds = FIRST_POWERS if near is None else N_POWERS
+        flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
+        return (1 / abs(flexibility) if flexibility else 0.0), mode
+
+    @cached_property
+    def _any_vector(self) -> FloatArray:
+        """Unit vector that has a share of every mode."""
+        count = len(self.network.free)
+        vector = np.cos(np.arange(count) * np.arange(1, count + 1))
+        return np.asarray(vector / np.linalg.norm(vector))
+
     @cached_property
     def follows(self) -> bool:
         """True if a load turns with its node: the tangent is unsymmetric."""
@@ -158,11 +182,11 @@ class NetworkProblem:
 
 
 def _state(at: PathEquilibrium) -> MarchState:
-    return MarchState(at.x, at.drive, at.rate, at.unstable, at.effort)
+    return MarchState(*at)
 
 
 def _equilibrium(state: MarchState) -> PathEquilibrium:
-    return PathEquilibrium(state.free, state.way, state.rate, state.unstable, state.effort)
+    return PathEquilibrium(*state[:5])
 
 
 @dataclass(frozen=True, eq=False)

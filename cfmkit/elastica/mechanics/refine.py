@@ -7,39 +7,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, interpolation
+from cfmkit.elastica.mechanics.element_tables import element_tables
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
-DENSITIES = ("angle", "axial", "shear", "ahead")
-"""Tables that are functions along an element; `weight` and `rigidity` hold the speed of its parameter, too."""
-
 
 def raise_degree(network: Discretisation, degree: int) -> Discretisation:
-    """Return a network with the same elements and a higher degree of their rotations.
-
-    Its tables are the polynomials through the Gauss points of the old ones, so that it is bent, or without floors of
-    its compliance, as that is.
-    """
+    """Return a network with the same elements and a higher degree of their rotations, and with its floors."""
     if degree == network.degree:
         return network
-    e, old, new = network.elements, basis(network.degree), basis(degree)
-    to_new = interpolation(old.places, new.places).T
-    speed = (e.weight / old.weights) @ to_new
-    tables = {name: getattr(e, name) @ to_new for name in DENSITIES}
-    tables["weight"] = speed * new.weights
-    tables["rigidity"] = ((e.rigidity * (e.weight / old.weights) ** 2) @ to_new) / speed**2
-    if e.curl is not None:
-        tables["rest"], tables["hindrance"] = e.rest @ to_new, e.hindrance @ to_new
-        tables["curl"] = ((e.curl * (e.weight / old.weights) ** 2) @ to_new) / speed**2
+    e = network.elements
+    cuts = {name: [0.0] for name in network.fits}
+    for name, (_, end) in zip(e.beam, e.cuts.tolist(), strict=True):
+        cuts[name].append(end)
+    tables = element_tables(network.fits, network.scales, degree, cuts)
+    stretches = {name: beam.section.axial for name, beam in network.fits.network.beams.items()}
+    floors = np.where([stretches[name] for name in e.beam], 0.0, e.axial[:, 0])
+    if floors.any():
+        tables["axial"] = tables["axial"] + floors[:, None]
     count, ends = len(e.length), _n_end_motions(network)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)
     unknowns = np.hstack([e.unknowns[:, :8], bubbles, forces])
     size = ends + count * (degree + 1)
-    held = np.setdiff1d(np.arange(network.size), network.free)
-    free = np.setdiff1d(np.arange(size), held)
+    free = np.concatenate([network.free[network.free < ends], np.arange(ends, size)])
     base, rate = np.zeros(size, network.base.dtype), np.zeros(size)
     base[:ends], rate[:ends] = network.base[:ends], network.rate[:ends]
     elements = e._replace(**tables, unknowns=unknowns)

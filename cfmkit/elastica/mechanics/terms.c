@@ -2,6 +2,7 @@
  *
  * The formulas are those of energy.py and terms.py, which a test holds equal to these. */
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "march.h"
@@ -64,64 +65,87 @@ static void bending(const Model *m, Int o, double curvature, double *moment, dou
     *stiffness = rigidity * (stiff + 2.0 * curvature * rising + 0.5 * curvature * curvature * curved);
 }
 
-/* Sums over the Gauss points of an element. */
+/* Sums over the Gauss points of an element; stiffness: lower triangle of the rotations' Hessian, by rows. */
 typedef struct {
     double rotation[MAX_SHAPES], change[MAX_SHAPES], by_x[MAX_SHAPES], by_y[MAX_SHAPES];
     double reach[2], reach_change[2], xx, yy, xy;
+    double stiffness[MAX_SHAPES * (MAX_SHAPES + 1) / 2];
 } Sums;
 
-/* Add one point: rotations and section forces there, and what they give. h: lower triangle of the rotations' Hessian. */
-static void gauss_point(const Model *m, Int o, const double *N, const double *S, const double *phi, const double *n1,
-                        const double *load, const double *growth, Sums *sum, double *h, int ld) {
-    const Int shapes = m->degree + 1;
-    double turn = m->angle[o], curvature = 0.0;
-    for (Int k = 0; k < shapes; k++) { turn += N[k] * phi[k]; curvature += S[k] * phi[k]; }
-    const double c = cos(turn), s = sin(turn), w = m->weight[o], a = m->axial[o], b = m->shear[o], ahead = m->ahead[o];
-    const double nx = n1[0] + load[0] * ahead, ny = n1[1] + load[1] * ahead;
-    const double normal = nx * c + ny * s, shear = ny * c - nx * s;
-    const double f = 1.0 + (a - b) * normal, g = (a - b) * shear;
-    sum->reach[0] += w * ((1.0 + a * normal) * c - b * shear * s);
-    sum->reach[1] += w * ((1.0 + a * normal) * s + b * shear * c);
-    double moment, stiffness;
-    bending(m, o, curvature, &moment, &stiffness);
-    const double bent = w * moment, turned = w * shear * f;
+/* Rotations and their slopes at the Gauss points. */
+FAST static void rotations(const Model *m, Int e, const double *restrict phi, double *restrict turn, double *restrict curvature) {
+    const Int points = m->points;
+    memcpy(turn, m->angle + e * points, (size_t)points * sizeof(double));
+    memset(curvature, 0, (size_t)points * sizeof(double));
+    for (Int k = 0; k <= m->degree; k++) {
+        const double *restrict N = m->values_by_shape + k * points, *restrict S = m->slopes_by_shape + k * points;
+        for (Int q = 0; q < points; q++) {
+            turn[q] += phi[k] * N[q];
+            curvature[q] += phi[k] * S[q];
+        }
+    }
+}
+
+/* Add what one point gives to the rotations: bending and shear, and to their Hessian unless `triangle` is 0. */
+FAST static void add_point(Int shapes, Int triangle, const double *restrict N, const double *restrict S,
+                           const double *restrict products, double bent, double turned, double stiff, double ux, double uy,
+                           Sums *restrict sum) {
     for (Int k = 0; k < shapes; k++) sum->rotation[k] += bent * S[k] - turned * N[k];
-    const double gx = growth[0] * ahead, gy = growth[1] * ahead;
-    if (gx != 0.0 || gy != 0.0) {
-        const double more_normal = gx * c + gy * s, more_shear = gy * c - gx * s;
-        const double more = w * (more_shear * f + g * more_normal);
-        for (Int k = 0; k < shapes; k++) sum->change[k] -= more * N[k];
-        sum->reach_change[0] += w * (a * more_normal * c - b * more_shear * s);
-        sum->reach_change[1] += w * (a * more_normal * s + b * more_shear * c);
+    if (!triangle) return;
+    for (Int k = 0; k < shapes; k++) { sum->by_x[k] -= ux * N[k]; sum->by_y[k] -= uy * N[k]; }
+    for (Int k = 0; k < triangle; k++) sum->stiffness[k] += stiff * products[k];
+}
+
+static void gauss_points(const Model *m, Int e, const double *phi, const double *n1, const double *load,
+                         const double *growth, Sums *sum, int with_hessian) {
+    const Int shapes = m->degree + 1, triangle = with_hessian ? shapes * (shapes + 1) / 2 : 0;
+    const int grows = growth[0] != 0.0 || growth[1] != 0.0;
+    double turn[MAX_POINTS], curvature[MAX_POINTS];
+    rotations(m, e, phi, turn, curvature);
+    for (Int q = 0, o = e * m->points; q < m->points; q++, o++) {
+        const double *N = m->values + q * shapes, *S = m->slopes + q * shapes;
+        const double c = cos(turn[q]), s = sin(turn[q]), w = m->weight[o], a = m->axial[o], b = m->shear[o];
+        const double ahead = m->ahead[o], nx = n1[0] + load[0] * ahead, ny = n1[1] + load[1] * ahead;
+        const double normal = nx * c + ny * s, shear = ny * c - nx * s;
+        const double f = 1.0 + (a - b) * normal, g = (a - b) * shear;
+        double moment, stiffness;
+        bending(m, o, curvature[q], &moment, &stiffness);
+        sum->reach[0] += w * ((1.0 + a * normal) * c - b * shear * s);
+        sum->reach[1] += w * ((1.0 + a * normal) * s + b * shear * c);
+        add_point(shapes, triangle, N, S, m->products + q * triangle, w * moment, w * shear * f,
+                  w * (normal * f - g * shear), w * (g * c - f * s), w * (g * s + f * c), sum);
+        if (grows) {
+            const double gx = growth[0] * ahead, gy = growth[1] * ahead;
+            const double more_normal = gx * c + gy * s, more_shear = gy * c - gx * s;
+            const double more = w * (more_shear * f + g * more_normal);
+            for (Int k = 0; k < shapes; k++) sum->change[k] -= more * N[k];
+            sum->reach_change[0] += w * (a * more_normal * c - b * more_shear * s);
+            sum->reach_change[1] += w * (a * more_normal * s + b * more_shear * c);
+        }
+        if (!with_hessian) continue;
+        const double stiffer = w * (stiffness - m->rigidity[o]);
+        double *row = sum->stiffness;
+        for (Int i = 0; stiffer != 0.0 && i < shapes; row += ++i)
+            for (Int j = 0; j <= i; j++) row[j] += stiffer * S[i] * S[j];
+        sum->xx -= w * (a * c * c + b * s * s);
+        sum->yy -= w * (a * s * s + b * c * c);
+        sum->xy -= w * (a - b) * c * s;
     }
-    if (!h) return;
-    const double stiff = w * (normal * f - g * shear), stiffer = w * (stiffness - m->rigidity[o]);
-    const double ux = w * (g * c - f * s), uy = w * (g * s + f * c);
-    for (Int i = 0; i < shapes; i++) {
-        const double own = stiff * N[i];
-        double *row = h + i * ld;
-        for (Int j = 0; j <= i; j++) row[j] += own * N[j];
-        if (stiffer != 0.0) for (Int j = 0; j <= i; j++) row[j] += stiffer * S[i] * S[j];
-        sum->by_x[i] -= ux * N[i];
-        sum->by_y[i] -= uy * N[i];
-    }
-    sum->xx -= w * (a * c * c + b * s * s);
-    sum->yy -= w * (a * s * s + b * c * c);
-    sum->xy -= w * (a - b) * c * s;
 }
 
 static Int local(Int shape) { return shape < 2 ? 3 + 4 * shape : 6 + shape; } /* unknown of an element's shape function */
 
 static void element_hessian(const Model *m, const Pose *ends, const double *first, const double *last,
-                            const Sums *sum, const double *rotations, Term *t) {
+                            const Sums *sum, Term *t) {
     const Int shapes = m->degree + 1, count = t->count, fx = count - 2, fy = count - 1;
     double *h = t->hessian;
     memset(h, 0, (size_t)(count * count) * sizeof(double));
-    for (Int i = 0; i < shapes; i++) {
+    const double *row = sum->stiffness;
+    for (Int i = 0; i < shapes; row += ++i) {
         const Int a = local(i);
         for (Int j = 0; j <= i; j++) {
             const Int b = local(j);
-            h[a * count + b] = h[b * count + a] = rotations[i * MAX_SHAPES + j];
+            h[a * count + b] = h[b * count + a] = row[j];
         }
         h[a * count + fx] = h[fx * count + a] = sum->by_x[i];
         h[a * count + fy] = h[fy * count + a] = sum->by_y[i];
@@ -148,16 +172,13 @@ static void element(const Model *m, Int e, const double *z, Stage at, int with_h
     const Pose ends[2] = {pose(m, z, m->ends[2 * e]), pose(m, z, m->ends[2 * e + 1])};
     const double last[2] = {z[own[count - 2]], z[own[count - 1]]};
     const double first[2] = {last[0] + load[0] * length, last[1] + load[1] * length};
-    double phi[MAX_SHAPES], rotations[MAX_SHAPES * MAX_SHAPES];
+    const Int triangle = shapes * (shapes + 1) / 2;
+    double phi[MAX_SHAPES];
     Sums sum;
-    memset(&sum, 0, sizeof sum);
+    memset(&sum, 0, offsetof(Sums, stiffness));
     for (Int k = 0; k < shapes; k++) phi[k] = z[own[local(k)]];
-    if (with_hessian)
-        for (Int i = 0; i < shapes; i++)
-            memcpy(rotations + i * MAX_SHAPES, m->bend + (e * shapes + i) * shapes, (size_t)(i + 1) * sizeof(double));
-    for (Int q = 0; q < m->points; q++)
-        gauss_point(m, e * m->points + q, m->values + q * shapes, m->slopes + q * shapes, phi, last, load, growth, &sum,
-                    with_hessian ? rotations : NULL, MAX_SHAPES);
+    if (with_hessian) memcpy(sum.stiffness, m->bend + e * triangle, (size_t)triangle * sizeof(double));
+    gauss_points(m, e, phi, last, load, growth, &sum, with_hessian);
     t->count = count;
     memcpy(t->at, own, (size_t)count * sizeof(Int));
     memset(t->gradient, 0, (size_t)count * sizeof(double));
@@ -173,7 +194,7 @@ static void element(const Model *m, Int e, const double *z, Stage at, int with_h
         t->gradient[count - 2 + k] = ends[1].place[k] - ends[0].place[k] - sum.reach[k] - (1.0 - at.share) * gap;
         t->change[count - 2 + k] = at.by_share * gap - sum.reach_change[k];
     }
-    if (with_hessian) element_hessian(m, ends, first, last, &sum, rotations, t);
+    if (with_hessian) element_hessian(m, ends, first, last, &sum, t);
 }
 
 static void line_spring(const double *value, const Pose *ends, int both, Stage at, Term *t) {

@@ -7,10 +7,9 @@ that it does, and reports by how much; "raw" keeps shape and length and forces t
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
-from numbers import Number
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -199,26 +198,11 @@ def fit(beam: Beam, reach: Any, known: Fit | None = None) -> Fit:
     return _in_place(Fit(rotation, scale, gap, length * scale, course), beam, known)
 
 
-def same_value(one: Any, other: Any) -> bool:
-    """Tell whether two values are equal to the last bit; records by their fields, arrays by their entries."""
-    if one is other:
-        return True
-    if isinstance(one, Number) and isinstance(other, Number):
-        return bool(one == other)
-    if type(one) is not type(other):
-        return False
-    if is_dataclass(one):
-        return all(same_value(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
-    if isinstance(one, tuple):
-        return len(one) == len(other) and all(map(same_value, one, other))
-    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
-
-
 def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
-    A grid has its edges there (`cfmkit.elastica.equilibrium.mesh`). A station keeps its fraction u of the arc length:
-    where the arc length changes along the shape's own parameter t, or u does, it moves there by
+    Elements end there (`cfmkit.elastica.mechanics.discretise`). A station keeps its fraction u of the arc length: where
+    the arc length changes along the shape's own parameter t, or u does, it moves there by
     dt = (du - d(arc)) / (d(arc)/dt).
     """
     thickness = beam.section.thickness

@@ -1,7 +1,7 @@
 """What a planar network of slender beams is: nodes with their supports, beams, rigid links, springs, constant loads.
 
 Values only, in SI; what is done to a network is a `cfmkit.elastica.model.drive`, what comes out a
-`cfmkit.elastica.outcome.path.Path`.
+`cfmkit.elastica.results.path.EquilibriumPath`.
 
 Assumes: plane bending, linear elastic material, rigid joints and links, conservative springs.
 """
@@ -255,3 +255,9 @@ def same_direction(one: float, other: float) -> bool:
     """Tell whether two directions [rad] are parallel, in either sense."""
     between = one.real - other.real
     return math.isfinite(between) and abs(math.sin(between)) < 1e-12
+
+
+def apart(network: Network, node: str) -> bool:
+    """Return True if a node is away from its master."""
+    one, other = network.nodes[node], network.nodes[network.master_of(node)]
+    return bool(one.x != other.x or one.y != other.y)

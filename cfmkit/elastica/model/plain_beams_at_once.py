@@ -1,7 +1,7 @@
-"""All beams of a network at once: shapes fitted between their ends, tables of the compiled code.
+"""All plain beams of a network at once: shapes fitted between their ends.
 
 Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams. The
-others are fitted and tabulated one by one (`cfmkit.elastica.model.beam`, `cfmkit.elastica.equilibrium.mesh`).
+others are fitted one by one (`cfmkit.elastica.model.beam`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section
@@ -44,7 +43,6 @@ class Bundle:
         self.names, self.beams = list(network.beams), list(network.beams.values())
         plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
         self.plain = plain
-        self._compliances: Any = None
         self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
         if plain:
             self._fit_plain(ends, beam_end if not self.others else beam_end[plain])
@@ -88,16 +86,6 @@ class Bundle:
         self._set_rigidities()
 
     @property
-    def wide(self) -> bool:
-        """Whether any beam is a wide strip: all tables then have the columns that those need."""
-        return any(self.beams[k].section.wide for k in self.others)
-
-    @property
-    def curved(self) -> bool:
-        """Whether any beam is known not to be straight before it is loaded, or may not be."""
-        return bool(self.others) or self.coefficients.shape[1] > 1
-
-    @property
     def gap(self) -> Any:
         """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
         first, cx, cy = self.drawn
@@ -108,15 +96,6 @@ class Bundle:
         sections = [self.beams[k].section for k in self.plain]
         known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
         self.bending, self.stretch, self.slip = np.array([known[id(section)] for section in sections]).T
-
-    @property
-    def sections(self) -> Any:
-        """Young's modulus, width, thickness, axial, shear, Poisson's ratio and shear factor, (7, plain)."""
-        values = [
-            (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
-            for s in (self.beams[k].section for k in self.plain)
-        ]
-        return np.array(values).T
 
     def _check(self, distance: Any, own: Any) -> None:
         """Refuse beams without length, and shapes that return to their start."""
@@ -140,31 +119,6 @@ class Bundle:
         shape: Any = self.beams[number].shape
         chord = self.length[k] / self.scale[k]
         return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
-
-    def sizes(self, fits: dict[str, Fit] | None) -> tuple[Any, Any]:
-        """Return the lengths of all beams and the bending rigidities at their middles, real."""
-        lengths, middles = (self.length.real, self.bending.real) if self.plain else (np.empty(0), np.empty(0))
-        if fits is None:
-            return lengths, middles
-        others = [self.beams[k] for k in self.others]
-        far = [float(np.real(fits[self.names[k]].length)) for k in self.others]
-        stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
-        return np.append(lengths, far), np.append(middles, stiff)
-
-    def table(self, powers: Any, shares: Any, units: FloatArray) -> Any:
-        """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
-
-        powers (m, n), shares (n, 5): see `cfmkit.elastica.equilibrium.mesh.Grid.rows`; what the table holds:
-        `cfmkit.elastica.kernels.network_array_types.DiscreteNetwork`.
-        """
-        if self._compliances is None:
-            g = self.length
-            self._compliances = np.array([g, g / self.bending, g * self.stretch, g * self.slip, g]).T * units
-        kind = (self.coefficients if self.coefficients.dtype.kind == "c" else self._compliances).dtype
-        out = np.empty((len(self.plain), powers.shape[1], 6), dtype=kind)
-        np.matmul(self.coefficients, powers, out=out[:, :, 0])
-        np.multiply(self._compliances[:, None], shares, out=out[:, :, 1:])
-        return out
 
 
 def is_plain(beam: Beam) -> bool:

@@ -77,7 +77,7 @@ class Section:
     shear_factor : float
         Share of the area that carries shear [1]; 5/6 for a rectangle.
     wide : bool
-        Whether it stiffens as its curling across the width is hindered: see `cfmkit.elastica.kernels.wide_strip`.
+        Whether it stiffens as its curling across the width is hindered: see `cfmkit.elastica.mechanics.wide_strip`.
     """
 
     youngs_modulus: float
@@ -133,17 +133,9 @@ class Section:
         """Return what says how far curling is hindered: th^4/K^2 [m2] and nu^2/(1 - nu^2), none unless it is wide."""
         return curling(self.width, thickness, self.poisson_ratio) if self.wide else (0.0 * thickness, 0.0)
 
-    def mean_compliance(self, start: Any, end: Any, inside: float) -> Any:
-        """Return the mean of 1/EI [1/(N m2)] over the arc between places on the piece that holds `inside`.
-
-        With a thickness that is linear between a and b the mean of 1/t^3 is (a + b) / (2 a^2 b^2).
-        """
-        a, b = self.thickness_at(start, inside), self.thickness_at(end, inside)
-        return 6 * (a + b) / (self.youngs_modulus * self.width * (a * b) ** 2)
-
 
 def curling(width: Any, thickness: Any, poisson_ratio: Any) -> tuple[Any, Any]:
-    """Return th^4/K^2 [m2] and nu^2/(1 - nu^2) of a wide strip: see `cfmkit.elastica.kernels.wide_strip`."""
+    """Return th^4/K^2 [m2] and nu^2/(1 - nu^2) of a wide strip: see `cfmkit.elastica.mechanics.wide_strip`."""
     plane = 1 - poisson_ratio**2
     return 3 * plane * (width**2 / thickness) ** 2, poisson_ratio**2 / plane
 
@@ -178,7 +170,7 @@ def hindered_share(width: Any, thickness: Any, poisson_ratio: Any, curvature: An
 def curl_hindered(z: Any) -> Any:
     """Return the share 1 - g of its curling that a wide strip cannot do, 0 to 1, at z = th^4 (an array).
 
-    The function g and its argument: `cfmkit.elastica.kernels.wide_strip`, which has the law for the compiled code.
+    The function g and its argument: `cfmkit.elastica.mechanics.wide_strip`, which has the law for the compiled code.
 
     Examples
     --------

@@ -1,11 +1,13 @@
 """Positions, rotations and section forces at any places of a beam, from the unknowns of its elements.
 
-The rotation is the polynomial of the element. The force on a section is that on the element's end plus the line load
-ahead; positions and the bending moment are integrals along the element, of polynomials through its Gauss points,
+The force on a section is that on the element's end plus the line load ahead; positions, the bending moment and, from
+it, the rotation are integrals along the element, of polynomials through its Gauss points,
 
-    X(s) = X0 + int dX/ds ds,    M(s) = M0 - int Q (1 + (1/EA - 1/GA) N) ds,    M0 = -dP/d(rotation of the start):
+    X(s) = X0 + int dX/ds ds,    M(s) = M0 - int Q (1 + (1/EA - 1/GA) N) ds,    M0 = -dP/d(rotation of the start),
+    phi(s) = phi0 + int M/EI ds:
 
-by equilibrium the moment is as accurate as the force; EI times the change of curvature is one order worse.
+by equilibrium the moment is as accurate as the force; EI times the change of curvature is one order worse, and so is
+the polynomial of the rotation between its ends. Of wide strips, whose law is not inverted, the rotation is that.
 """
 
 from __future__ import annotations
@@ -16,13 +18,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.polynomials import basis, integrals, interpolation, shape_functions
+from cfmkit.elastica.mechanics.designs import CURLING
+from cfmkit.elastica.mechanics.polynomials import basis, integrals, integrals_to_points, interpolation, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
     from cfmkit.elastica.model.network import Network
 
 
@@ -68,43 +71,70 @@ def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamState
 
 def element_states(net: Network, at: Equilibria, beam: str, element: int, fractions: Any) -> BeamStates:
     """Return states at fractions (k,) of one element."""
-    network, scales, given = at.network, at.network.scales, tuple(np.asarray(fractions, float).tolist())
+    network, scales, given = at.network, at.network.scales, np.asarray(fractions, float)
     rule, e, fitted = basis(network.degree), network.elements, network.fits[beam]
-    values, cumulated, through = _matrices(network.degree, given)
-    one = _one_element(network, element)
-    fields = energy.fields(one, at.z, at.drive)
-    speed = (e.weight[element] / rule.weights)[None]
-    own = at.z[:, e.unknowns[element]]
+    values, cumulated, through = _matrices(network.degree, tuple(given.tolist()))
+    speed, own = e.weight[element] / rule.weights, at.z[:, e.unknowns[element]]
     rotation = own[:, energy.rotation_columns(network.degree)]
-    start = poses(network.attachments, at.z, e.ends[element, :1]).place[:, 0]
-    slope_x, slope_y, normal, shear, curvature = (
-        getattr(fields, name)[:, 0] for name in ("slope_x", "slope_y", "normal", "shear", "curvature")
-    )
-    softer = e.axial[element] - e.shear[element]
-    turning = shear * (1 + softer * normal)
-    first = e.weight[element] * bending(one.elements, curvature[:, None]).moment[:, 0]
-    moment = -(first @ rule.slopes[:, 0] - (e.weight[element] * turning) @ rule.values[:, 0])
     load = energy.line_load(network, at.drive)[..., element, :]
-    ahead = e.length[element] - cumulated @ speed[0]
+    fields = _fields(e, element, own, load, rotation @ rule.values.T)
+    first = e.weight[element] * _bending_moment(e, element, rotation @ rule.slopes.T)
+    moment = -(first @ rule.slopes[:, 0] - (e.weight[element] * fields.turning) @ rule.values[:, 0])[:, None]
+    turn = rotation @ values.T
+    if e.curl is None:
+        inside = integrals_to_points(network.degree)
+        for places, within in ((rule.places, inside), (given, cumulated)):
+            curvature = (moment - (fields.turning * speed) @ inside.T) / (e.rigidity[element] * speed)
+            missed = rotation[:, 1] - rotation[:, 0] - curvature @ rule.weights
+            turn = rotation[:, :1] + curvature @ within.T + missed[:, None] * places
+            if within is inside:
+                fields = _fields(e, element, own, load, turn)
+    ahead = e.length[element] - cumulated @ speed
     force = own[:, None, -2:] + load[:, None, :] * ahead[:, None]
-    left, right = network.elements.cuts[element]
-    t, inside = left + (right - left) * np.array(given), 0.5 * (left + right)
+    left, right = e.cuts[element]
+    t, middle = left + (right - left) * given, 0.5 * (left + right)
     known = left + (right - left) * rule.places
-    bent = e.angle[element] - (fitted.angle(known, inside) + 0.0 * known)  # an imperfection
-    angle = fitted.angle(t, inside) + 0.0 * t + through @ bent
+    added = e.angle[element] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
     place = fitted.arc(t)
-    thickness = net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(inside)))) + 0.0 * t
+    start = poses(network.attachments, at.z, e.ends[element, :1]).place[:, 0]
     return BeamStates(
         place,
-        (start[:, :1] + (slope_x * speed) @ cumulated.T) * scales.length,
-        (start[:, 1:] + (slope_y * speed) @ cumulated.T) * scales.length,
-        rotation @ values.T,
-        angle,
+        (start[:, :1] + (fields.slope_x * speed) @ cumulated.T) * scales.length,
+        (start[:, 1:] + (fields.slope_y * speed) @ cumulated.T) * scales.length,
+        turn,
+        fitted.angle(t, middle) + 0.0 * t + through @ added,
         force[..., 0] * scales.force,
         force[..., 1] * scales.force,
-        (moment[:, None] - (turning * speed) @ cumulated.T) * scales.moment,
-        thickness,
+        (moment - (fields.turning * speed) @ cumulated.T) * scales.moment,
+        net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(middle)))) + 0.0 * t,
     )
+
+
+class _Fields(NamedTuple):
+    """What is integrated along an element, at its Gauss points (p, q)."""
+
+    slope_x: Any  # dX/ds
+    slope_y: Any
+    turning: Any  # -dM/ds
+
+
+def _fields(e: BeamElements, element: int, own: Any, load: Any, turn: Any) -> _Fields:
+    """Return the fields of an element from the rotations at its Gauss points, (p, q)."""
+    angle = e.angle[element] + turn
+    cos, sin = np.cos(angle), np.sin(angle)
+    h, v = (own[:, axis - 2, None] + load[:, axis, None] * e.ahead[element] for axis in (0, 1))
+    normal, shear = h * cos + v * sin, v * cos - h * sin
+    stretch, slip = 1 + e.axial[element] * normal, e.shear[element] * shear
+    softer = e.axial[element] - e.shear[element]
+    return _Fields(stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + softer * normal))
+
+
+def _bending_moment(e: BeamElements, element: int, curvature: Any) -> Any:
+    """Return the bending moment by the element's parameter at its Gauss points, (p, q)."""
+    if e.curl is None:
+        return e.rigidity[element] * curvature
+    one = {name: table[element] for name, table in e._asdict().items() if name in ("rigidity", *CURLING)}
+    return bending(e._replace(**one), curvature).moment
 
 
 @lru_cache(maxsize=64)
@@ -112,16 +142,6 @@ def _matrices(degree: int, fractions: tuple[float, ...]) -> tuple[Any, Any, Any]
     """Return shape functions at fractions, integrals up to them and interpolation to them from the Gauss points."""
     rule, ends = basis(degree), np.array(fractions)
     return shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
-
-
-def _one_element(network: Discretisation, element: int) -> Any:
-    """Return the network as `energy.fields` sees it, with one element."""
-    from dataclasses import replace
-
-    e = network.elements
-    one = slice(element, element + 1)
-    named = {name: table[one] for name, table in e._asdict().items() if table is not None}
-    return replace(network, elements=e._replace(**named))
 
 
 def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:

@@ -1,117 +1,65 @@
-"""A path of the functional at every place of its drive: equilibria between its points, and the extremes there.
+"""A traced path at every place of its drive: equilibria between its points, and the extremes that lie there.
 
-How places are chosen, corners passed and extremes found: `cfmkit.elastica.outcome.between_points`. Here an equilibrium
-is one of the functional, and stresses are cheap: they are known of all beams at all points.
+What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
+solved from the polynomial through the nearest four, on the branch that these are on. A stress takes longer, and is
+solved at its extremes and where it passes the allowable one; elsewhere the polynomial is taken, for each beam by
+itself, since the largest of all has a kink where it passes from one beam to another. At a bifurcation, where the path
+has a corner, everything is parted.
+
+Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
+an extreme there.
+
+Assumes: a path on which the drive, or under a load the motion, does not turn back.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import read_only
-from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.outcome.between_points import FEWEST, KNOWN, BetweenLoads, BetweenPoints
+from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
+from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations
     from cfmkit.elastica.results.path import EquilibriumPath
 
+FEWEST = 4
+"""Points of a path below which nothing is said of what lies between them: a cubic needs four."""
 
-class _Spot(NamedTuple):
-    """An equilibrium as `BetweenPoints` takes it: free unknowns, drive, unstable directions."""
+ROUNDS = 3
+"""Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
 
-    y: Any
-    drive: float
-    unstable: int
+NEARLY = 0.9
+"""Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
+STRAY, LEAST = 0.5, 1e-3
+"""How far a pose may be from its first guess, as a share of the change between the two points around it, and at least
+[rad or mean beam lengths]: beyond that another branch was found."""
 
-class _OfFunctional:
-    """Equilibria of the functional between points: what `BetweenPoints` needs of an `EquilibriumPath`."""
+ASIDE = 1e-6
+"""Share of the drive's range by which the knots next to a corner are beside it: no cubic goes across it but there."""
 
-    path: Any
-    axial: bool
-    _order: Any
-    _stresses: Any
+NEARER = (0.1, 0.01, 0.001)
+"""Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
 
-    @property
-    def _known_drives(self) -> FloatArray:
-        drives: FloatArray = self.path.at.drive
-        return drives
+AT_POINT = 1e-10
+"""Share of the drive's range within which a bifurcation is at a point of the path: it is not located better."""
 
-    @property
-    def _known_unknowns(self) -> FloatArray:
-        return np.asarray(self.path.at.z[:, self.path.network.free])
-
-    @property
-    def _known_unstable(self) -> Any:
-        return self.path.unstable
-
-    def _solve(self, y: FloatArray, drive: float, row: Any = None, goal: Any = None) -> Any:
-        own = self._equations()
-        state = own.solve(y, drive) if row is None else own.solve(y, drive, row, goal)
-        return None if state is None else _Spot(state.free, state.way, state.unstable)
-
-    def _equations(self) -> Any:
-        known = vars(self).get("_own_equations")
-        if known is None:
-            known = vars(self)["_own_equations"] = equations(self.path.network)
-        return known
-
-    def _path_of(self, y: FloatArray, loads: FloatArray, near: Any, accurate: Any) -> EquilibriumPath:
-        network = self.path.network
-        z = network.base + loads[:, None] * network.rate
-        z[:, network.free] = y
-        path: EquilibriumPath = replace(
-            self.path,
-            at=Equilibria(network, z, loads),
-            unstable=self.path.unstable[self._order][near],
-            requested=np.full(len(loads), -1),
-            branch=self.path.branch[self._order][near],
-            accurate=accurate,
-        )
-        return path
-
-    def _poses(self, changes: FloatArray) -> FloatArray:
-        moves = self.path.network.free < self.path.network.n_motions
-        return np.asarray(np.abs(changes[:, moves]).max(axis=1, initial=0.0))
-
-    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
-        """Return the largest stress in a window of the drive [Pa]."""
-        scale, ends = self._scale, np.array([low, high])  # type: ignore[attr-defined]
-        there = self.at(ends)  # type: ignore[attr-defined]
-        solved = np.max([there.beam_stress(name, self.axial)[0] for name in self.path.net.beams], axis=0)
-        known = self.stress(branch, ends)  # type: ignore[attr-defined]
-        tops = [
-            values[(places >= low) & (places <= high)]
-            for stretch, beams in self._stresses
-            for places, values in ((scale * stretch.drive(t), own) for t, own in beams)
-        ]
-        return float(np.max(np.concatenate([*tops, np.where(there.accurate, solved, known)])))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class BetweenStates(_OfFunctional, BetweenPoints):  # type: ignore[misc]
-    """The effort and the stress of a path under a motion at every place (a `cfmkit.results.ClosedForm`)."""
-
-    @property
-    def _scale(self) -> float:
-        scale: float = self.path.at.network.scales.drive  # type: ignore[attr-defined]
-        return scale
-
-
-@dataclass(frozen=True, eq=False)
-class BetweenLoadStates(_OfFunctional, BetweenLoads):  # type: ignore[misc]
-    """The same of a path under a load, over the motion of a node."""
+KNOWN = 1e-12
+"""Share of the drive's range within which a place is that of a point."""
 
 
 def between_points(
     path: EquilibriumPath, unit: float = 1.0, axial: bool = True, allowed: float | None = None
-) -> BetweenStates | None:
+) -> BetweenPoints | None:
     """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.
 
     Parameters
@@ -130,7 +78,371 @@ def between_points(
     steps = np.diff(path.at.drive)
     if not ((steps > 0).all() or (steps < 0).all()):
         return None
-    return BetweenStates(path, unit, axial, allowed)  # type: ignore[arg-type]
+    return BetweenPoints(path, unit, axial, allowed)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BetweenPoints(ShortRepr):
+    """The effort and the stress of a path at every place (a `cfmkit.results.ClosedForm`)."""
+
+    path: EquilibriumPath  # whose drive never turns back
+    unit: float  # what its effort is multiplied by
+    axial: bool  # whether the stress has its axial part
+    allowed: float | None  # stress that is solved for where it is passed [Pa]
+
+    @cached_property
+    def _order(self) -> Any:
+        """The points of the path in the order of an increasing drive."""
+        return slice(None) if self._motion[-1] > self._motion[0] else slice(None, None, -1)
+
+    @property
+    def _motion(self) -> FloatArray:
+        """The place of every point of the path [m or rad]."""
+        return self.path.drive
+
+    @property
+    def _scale(self) -> float:
+        """The unit of dimensionless places [m or rad]."""
+        return self.path.network.scales.drive
+
+    @property
+    def places(self) -> FloatArray:
+        """The points of the path, and extremes between them, increasing [m or rad]."""
+        return self.knots[0]
+
+    @cached_property
+    def _points(self) -> FloatArray:
+        """Where the path has points, increasing [m or rad]."""
+        return read_only(self._motion[self._order])
+
+    @cached_property
+    def _efforts(self) -> FloatArray:
+        return read_only(self.unit * self._effort_on(self.path)[self._order])
+
+    def _effort_on(self, path: EquilibriumPath) -> FloatArray:
+        """Return the effort at every point of a path [N or N m]."""
+        return path.effort
+
+    @cached_property
+    def peaks(self) -> FloatArray:
+        """Where the effort has an extreme between two points, or a corner, (m,) [m or rad]."""
+        beside = {*self._beside[:, [0, 2]].ravel().tolist()}
+        return read_only(sorted({*self.knots[0].tolist()} - {*self._points.tolist()} - beside))
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Where the path changes to another branch, so that the effort has a kink, (m,) [m or rad]."""
+        return read_only(self._scale * np.array([corner.drive for corner in self._corners.values()]))
+
+    @cached_property
+    def _beside(self) -> FloatArray:
+        """Of each corner a place just before it, the corner, and one behind, or itself at an end, (m, 3) [m or rad]."""
+        found, points = np.empty((len(self.corners), 3)), self._points
+        for number, corner in enumerate(self.corners):
+            before, behind = points[points < corner][-1:], points[points > corner][:1]
+            room = 0.5 * float(np.abs(np.concatenate([before, behind]) - corner).min())
+            aside = min(ASIDE * (points[-1] - points[0]), room)
+            found[number] = corner - aside * len(before), corner, corner + aside * len(behind)
+        return found
+
+    @cached_property
+    def knots(self) -> Several[FloatArray]:
+        """The points of the path, its corners, and extremes between: places, increasing, and efforts, (n,) each."""
+        x, effort = self._points, self._efforts
+        if len(self.corners):
+            beside = np.setdiff1d(self._beside, x)
+            x, effort = _inserted(x, effort, beside, self.effort("", beside))
+        for _ in range(ROUNDS):
+            more = inner_extremes(x, effort)
+            for low, _, high in self._beside.tolist():
+                more = more[(more < low) | (more > high)]
+            if not len(more):
+                break
+            x, effort = _inserted(x, effort, more, self.effort("", more))
+        return Several((read_only(x), read_only(effort)))
+
+    @cached_property
+    def _stresses(self) -> tuple[tuple[SmoothStretch, tuple[tuple[FloatArray, FloatArray], ...]], ...]:
+        """Of each stretch between corners, and there of each beam, smooth variables and stresses.
+
+        They are those of the path and its corners, extremes between them that may be the largest, and where the
+        allowable stress is passed.
+        """
+        corners = list(self._corners.values())
+        numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
+        names = list(self.path.net.beams)
+        at_points = np.array([self.path.beam_stress(name, self.axial)[0][self._order] for name in names])
+        at_corners = np.empty((0, len(names)))
+        if corners:
+            there = self.at(self.corners)
+            at_corners = np.array([there.beam_stress(name, self.axial)[0] for name in names]).T
+        found = []
+        for number in range(len(corners) + 1):
+            low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
+            stretch, own = SmoothStretch(low, high), numbers == number
+            ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
+            x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
+            found.append((stretch, self._with_tops(stretch, x, rows.T)))
+        return tuple(found)
+
+    def _with_tops(
+        self, stretch: SmoothStretch, x: FloatArray, rows: FloatArray
+    ) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Return smooth variables and stresses of each beam on a stretch, with the places that are solved for."""
+        t, largest, found = stretch.smooth(x), rows.max(axis=0), []
+        for name, row in zip(self.path.net.beams, rows, strict=True):
+            own, values = t, row
+            for _ in range(ROUNDS):
+                top = inner_extremes(own, values)
+                beside = np.searchsorted(own, top)
+                more = top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
+                if not len(more):
+                    break
+                own, values = _inserted(own, values, more, self._stress_at(name, stretch, more, own, values))
+            found.append(self._with_passes(name, stretch, own, values))
+        return tuple(found)
+
+    def _with_passes(
+        self, name: str, stretch: SmoothStretch, t: FloatArray, row: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same with the places where the stress of a beam passes the allowable one.
+
+        The last of some rounds only: knots that nearly coincide spoil a cubic.
+        """
+        own, values = t, row
+        for _ in range(ROUNDS if self.allowed is not None else 0):
+            passed = np.array(sorted({*crossings(own, values, self.allowed or 0.0)} - {*t.tolist()}))
+            if not len(passed):
+                break
+            own, values = _inserted(t, row, passed, self._stress_at(name, stretch, passed, own, values))
+        return own, values
+
+    def _stress_at(
+        self, name: str, stretch: SmoothStretch, places: FloatArray, t: FloatArray, row: FloatArray
+    ) -> FloatArray:
+        """Return the stress of a beam at places of a stretch [Pa]: solved, or on the cubic where that fails."""
+        there = self.at(self._scale * stretch.drive(places))
+        return np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(t, row, places))
+
+    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
+        flat = np.ravel(places)
+        solved = self._solved.get(flat.tobytes())
+        if solved is None:
+            there = self.at(flat)
+            effort = self._effort_on(there)
+            solved = np.where(there.accurate, self.unit * effort, np.interp(flat, self._points, self._efforts))
+            self._solved[flat.tobytes()] = solved
+        return np.array(solved.reshape(np.shape(places)))
+
+    @cached_property
+    def _solved(self) -> dict[bytes, FloatArray]:
+        """Efforts at places that were requested: page, files and requirements each ask for those of the metrics."""
+        return {}
+
+    def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of all beams at places of any shape [Pa]."""
+        flat = np.ravel(places)
+        wanted, largest = flat / self._scale, np.full(len(flat), np.nan)
+        number = np.searchsorted([corner.drive for corner in self._corners.values()], wanted)
+        for index, (stretch, beams) in enumerate(self._stresses):
+            own = number == index
+            t = stretch.smooth(wanted[own])
+            largest[own] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
+        return np.asarray(largest.reshape(np.shape(places)))
+
+    def largest_stress(self, branch: str, low: float, high: float, /) -> float:
+        """Return the largest stress in a window [Pa]."""
+        scale, ends = self._scale, np.array([low, high])
+        there = self.at(ends)
+        solved = np.max([there.beam_stress(name, self.axial)[0] for name in self.path.net.beams], axis=0)
+        known = self.stress(branch, ends)
+        tops = [
+            values[(places >= low) & (places <= high)]
+            for stretch, beams in self._stresses
+            for places, values in ((scale * stretch.drive(t), own) for t, own in beams)
+        ]
+        return float(np.max(np.concatenate([*tops, np.where(there.accurate, solved, known)])))
+
+    def at(self, places: FloatArray) -> EquilibriumPath:
+        """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
+        drive = self._drive
+        wanted = np.clip(places / self._scale, drive[0], drive[-1])
+        left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
+        near = self._nearest(wanted, left)
+        y = self._guesses(wanted, near)
+        loads = self._loads[near]
+        known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
+        y[known] = self._y[near[known]]
+        for corner in self._corners.values():
+            here = np.abs(wanted - corner.drive) <= KNOWN * (drive[-1] - drive[0])
+            y[here], loads[here], known = corner.y, corner.drive, known | here
+        found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
+        for number in np.flatnonzero(~known).tolist():
+            spot = self._spot(y[number], float(wanted[number]), float(loads[number]))
+            if spot is None or spot.unstable not in self._counts(near[number], left[number]):
+                continue
+            moved = float(self._poses((spot.free - y[number])[None])[0])
+            if moved <= max(LEAST, STRAY * float(changes[number])):
+                y[number], loads[number], found[number] = spot.free, spot.way, True
+        return self.path.with_states(self._numbers[near], y, loads, found)
+
+    def _spot(self, y: FloatArray, wanted: float, _near: float) -> MarchState | None:
+        """Return the equilibrium at a dimensionless place; `_near`: the drive at the nearest point."""
+        return self._solve(y, wanted)
+
+    @cached_property
+    def _equations(self) -> NumpyEquations:
+        return equations(self.path.network)
+
+    def _solve(
+        self, y: FloatArray, drive: float, row: FloatArray | None = None, goal: float = 0.0
+    ) -> MarchState | None:
+        """Return the equilibrium at a drive near some unknowns, or where row . (unknowns, drive) is a goal."""
+        return self._equations.solve(y, drive, row, goal)
+
+    def _poses(self, changes: FloatArray) -> FloatArray:
+        """Return the largest change of a motion in each of some changes of the unknowns, (n,)."""
+        network = self.path.network
+        return np.asarray(np.abs(changes[:, network.free < network.n_motions]).max(axis=1, initial=0.0))
+
+    def _counts(self, near: int, _left: int) -> tuple[int, ...]:
+        """Return how many unstable directions an equilibrium may have; `_left`: the point before it."""
+        return (int(self._unstable[near]),)
+
+    @cached_property
+    def _numbers(self) -> Any:
+        return np.arange(len(self.path))[self._order]
+
+    @cached_property
+    def _loads(self) -> FloatArray:
+        return np.asarray(self.path.at.drive[self._order])
+
+    @property
+    def _drive(self) -> FloatArray:
+        return self._loads
+
+    @cached_property
+    def _y(self) -> FloatArray:
+        return np.asarray(self.path.free[self._order])
+
+    @cached_property
+    def _unstable(self) -> Any:
+        return self.path.unstable[self._order]
+
+    @cached_property
+    def _stretch(self) -> Any:
+        """The number of the smooth stretch that each point is on: they are parted by bifurcations, (n,)."""
+        parted = np.zeros(len(self._drive), dtype=bool)
+        branch = self.path.branch[self._order]
+        parted[1:] = (branch[1:] != branch[:-1]) | (self._unstable[1:] != self._unstable[:-1])
+        return np.cumsum(parted)
+
+    @cached_property
+    def _events(self) -> FloatArray:
+        """Where the path bifurcates, dimensionless, increasing."""
+        scale = self.path.network.scales.drive
+        return np.sort([one.drive / scale for one in self.path.events if one.kind == "bifurcation"])
+
+    def _nearest(self, wanted: FloatArray, left: Any) -> Any:
+        """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
+        drive, events = self._drive, self._events
+        near = left + (wanted - drive[left] > drive[left + 1] - wanted)
+        for number in np.flatnonzero(self._stretch[left] != self._stretch[left + 1]).tolist():
+            here = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
+            if len(here):
+                near[number] = left[number] + bool(wanted[number] > here[0])
+        return near
+
+    @cached_property
+    def _corners(self) -> dict[int, Corner]:
+        """The corners of the path by the number of the stretch behind each, increasing."""
+        branch, stretches, drive = self.path.branch[self._order], self._stretch, self._drive
+        names, found = list(dict.fromkeys(self.path.branch.tolist())), {}
+        rounding = AT_POINT * (drive[-1] - drive[0])
+        for right in (np.flatnonzero(np.diff(stretches)) + 1).tolist():
+            before, behind = drive[right - 1], drive[right]
+            here = self._events[(self._events >= before - rounding) & (self._events <= behind + rounding)]
+            if len(here) != 1:
+                continue
+            ranks = [names.index(branch[right - 1]), names.index(branch[right])]
+            below, above = ranks[0] > ranks[1], ranks[1] > ranks[0]  # a branch that parts is named after the other
+            at = next((k for k in (right - 1, right) if abs(drive[k] - here[0]) <= rounding), None)
+            place = float(here[0] if at is None else drive[at])
+            y = self._corner(place, right if below else right - 1) if at is None else np.asarray(self._y[at])
+            if y is not None:
+                found[int(stretches[right])] = Corner(place, y, below, above)
+        return found
+
+    def _corner(self, place: float, point: int) -> FloatArray | None:
+        """Return the equilibrium at a bifurcation from the stretch that a point next to it is on, which goes through.
+
+        It is singular: ever nearer ones are solved for, and the polynomial taken on from there.
+        """
+        own, drive = np.flatnonzero(self._stretch == self._stretch[point]), self._drive
+        x, y = drive[own], self._y[own]
+        for share in NEARER:
+            near = place + share * (drive[point] - place)
+            spot = self._spot(values_at(x, y, np.array([near]))[0], near, near)
+            if spot is None or spot.unstable not in self._counts(point, point):
+                return None
+            at = int(np.searchsorted(x, near))
+            x, y = np.insert(x, at, near), np.insert(y, at, spot.free, axis=0)
+        return np.asarray(values_at(x, y, np.array([place]))[0])
+
+    def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
+        """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
+        found = np.empty((len(wanted), self._y.shape[1]))
+        for number in distinct(self._stretch[near]).tolist():
+            own, here = self._stretch == number, self._stretch[near] == number
+            stretch = SmoothStretch(self._corners.get(number), self._corners.get(number + 1))
+            ends = (None if corner is None else corner.y for corner in (stretch.low, stretch.high))
+            x, y = stretch.with_ends(self._drive[own], self._y[own], *ends)
+            found[here] = values_at(stretch.smooth(x), y, stretch.smooth(wanted[here]))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenLoads(BetweenPoints):
+    """The same of a path under a load, over the motion of a node that the load goes along with."""
+
+    row: FloatArray  # (n + 1,) what the free unknowns and the drive count for in the dimensionless motion
+    unit_of_motion: float  # [m or rad]
+    rest: float  # the motion where all unknowns are zero [m or rad]
+
+    @property
+    def _motion(self) -> FloatArray:
+        return np.asarray(self.unit_of_motion * (self.path.free @ self.row[:-1]) + self.rest)
+
+    @property
+    def _scale(self) -> float:
+        return self.unit_of_motion
+
+    def _effort_on(self, path: EquilibriumPath) -> FloatArray:
+        return path.drive
+
+    def _spot(self, y: FloatArray, wanted: float, near: float) -> MarchState | None:
+        goal = wanted - self.rest / self.unit_of_motion
+        first = self._solve(y, near, self.row, goal)
+        # the solver watches poses and forces: once more, so that the load is as exact as they are
+        return None if first is None else self._solve(first.free, first.way, self.row, goal)
+
+    def _counts(self, near: int, left: int) -> tuple[int, ...]:
+        return int(self._unstable[left]), int(self._unstable[left + 1])  # a largest load is between two of each kind
+
+    @cached_property
+    def _drive(self) -> FloatArray:
+        return self._points / self.unit_of_motion
+
+    @cached_property
+    def _stretch(self) -> Any:
+        """Parted by other branches only: at a largest load a path is smooth."""
+        branch = self.path.branch[self._order]
+        return np.cumsum(np.concatenate([[False], branch[1:] != branch[:-1]]))
+
+    @cached_property
+    def _events(self) -> FloatArray:
+        return np.empty(0)  # told by their loads, of which there may be several motions
 
 
 def between_loads(
@@ -140,7 +452,7 @@ def between_loads(
     unit: float = 1.0,
     axial: bool = True,
     allowed: float | None = None,
-) -> BetweenLoadStates | None:
+) -> BetweenLoads | None:
     """Return a path under loads at every place of a node's motion.
 
     None where the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
@@ -178,8 +490,14 @@ def between_loads(
             row[slots[unknown]] += share
     moved = path.motion(node)
     motion = moved[:, 2] if along is None else moved[:, 0] * np.cos(along) + moved[:, 1] * np.sin(along)
-    rest = motion - scale * (path.at.z[:, network.free] @ row[:-1])
+    rest = motion - scale * (path.free @ row[:-1])
     steps = np.diff(motion)
     if not row.any() or np.ptp(rest) > KNOWN * np.ptp(motion) or not ((steps > 0).all() or (steps < 0).all()):
         return None
-    return BetweenLoadStates(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))  # type: ignore[arg-type]
+    return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))
+
+
+def _inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return increasing places with some more among them, and their values."""
+    at = np.searchsorted(x, places)
+    return np.insert(x, at, places), np.insert(y, at, values)

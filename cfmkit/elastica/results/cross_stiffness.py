@@ -7,12 +7,14 @@ node across is taken away: the stiffness is that of beams and springs, not of th
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.march import equations
 
 if TYPE_CHECKING:
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.results.path import EquilibriumPath
 
+LARGEST = 1e13  # motion or force, dimensionless, that follows a unit motion: beyond it the tangent may be singular
+RANK = 1e-14  # share of the largest singular value below which one is rounding
 OPEN_FORCE = 1e-9  # dimensionless force that may be left where a force is open: rounding leaves 1e-14
 
 
@@ -77,6 +81,7 @@ def _blocks(
     old = network.attachments.frame[network.nodes[node]]
     frame[place] = np.cos(direction), np.sin(direction)
     loose = replace(network, attachments=network.attachments._replace(frame=frame))
+    loose = without_floor(loose, np.flatnonzero(network.floored))
     cos, sin = frame[place][0] @ old, old[0] * frame[place][0][1] - old[1] * frame[place][0][0]
     kept = np.setdiff1d(network.free, [x, y])
     own = equations(loose)
@@ -93,10 +98,11 @@ def _condensed(across: float, coupled: FloatArray, kept: FloatArray) -> float:
     So is that along a straight beam that cannot stretch and is held at both ends.
     """
     row, column = coupled
-    try:
-        return float(across - row @ np.linalg.solve(kept, column))
-    except np.linalg.LinAlgError:
-        follow, _, _, _ = np.linalg.lstsq(kept, column)
+    with contextlib.suppress(np.linalg.LinAlgError):
+        follow = np.linalg.solve(kept, column)
+        if np.abs(follow).max(initial=0.0) < LARGEST:
+            return float(across - row @ follow)
+    follow, _, _, _ = np.linalg.lstsq(kept, column, RANK)
     left = np.abs(kept @ follow - column).max(initial=0.0)
     is_open = left > OPEN_FORCE * max(1.0, float(np.abs(column).max(initial=0.0)))
     return float("nan") if is_open else float(across - row @ follow)

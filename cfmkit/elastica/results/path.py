@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,12 @@ import numpy as np
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, partials
-from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import PointLoad
-from cfmkit.elastica.outcome.path import PathStatus, StressPeak, most_stressed
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.errors import InputError
 
@@ -27,11 +27,49 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Fit
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
-    from cfmkit.elastica.model.network_under_drive import Layout
-    from cfmkit.elastica.outcome.path import Event
 
 N_PLACES = 17
 """Even places of every element at which states along a beam are handed out; neighbours share their ends."""
+
+
+TIED = 1e-9  # share by which stresses of two beams differ that are one but for rounding
+
+
+class PathStatus(Enum):
+    """How a path ended."""
+
+    COMPLETE = "all requested points were reached"
+    LIMIT_POINT = "the drive cannot go further: a limit point"
+    JUMPS = "stability is lost and no stable equilibrium is near"
+    LOST = "the path was lost: no step converged"
+    OUTSIDE = "the path left the range of the drive"
+    FULL = "the path has more points than allowed"
+    NO_START = "no equilibrium under the constant loads"
+    INACCURATE = "the tolerance could not be reached"
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something on the path: a limit point, a bifurcation, or a change of stability that was not resolved.
+
+    `drive` is where (SI); `before` and `after` count the unstable directions on both sides of the path that it lies on,
+    in the sense of travel: at the end of a branch, of the path that it joins. What is passed before the drive begins is
+    reported first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
+    """
+
+    kind: str
+    drive: float
+    before: int
+    after: int
+
+
+@dataclass(frozen=True)
+class StressPeak:
+    """The largest stress at every point [Pa], the beam that has it and the place on it (fraction of its length)."""
+
+    value: FloatArray
+    beam: Any
+    place: FloatArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,12 +98,64 @@ class EquilibriumPath(ShortRepr):
         """The arrays of the network."""
         return self.at.network
 
-    @cached_property
-    def layout(self) -> Layout:
-        """The network's nodes, scales and what is driven, as the families read them."""
-        from cfmkit.elastica.model.network_under_drive import Layout
+    @property
+    def free(self) -> FloatArray:
+        """Unknowns that were solved for at every point, (n, free); dimensionless."""
+        return np.asarray(self.at.z[:, self.network.free])
 
-        return Layout(self.net, self.given)
+    @property
+    def follows(self) -> bool:
+        """True if a load turns with its node."""
+        return any(load.item.follows for load in self.network.loads)
+
+    def take(self, points: Any) -> EquilibriumPath:
+        """Return some of the points: their indices, or True for each."""
+        return replace(
+            self,
+            at=Equilibria(self.network, self.at.z[points], self.at.drive[points]),
+            unstable=self.unstable[points],
+            requested=self.requested[points],
+            branch=self.branch[points],
+            accurate=self.accurate[points],
+        )
+
+    def joined(self, other: EquilibriumPath) -> EquilibriumPath:
+        """Return the points of this path, then those of another of the same network, as one."""
+        return replace(
+            self,
+            at=Equilibria(
+                self.network, np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
+            ),
+            unstable=read_only(np.concatenate([self.unstable, other.unstable]), np.int64),
+            requested=read_only(np.concatenate([self.requested, other.requested]), np.int64),
+            branch=read_only(np.concatenate([self.branch, other.branch]), np.str_),
+            accurate=read_only(np.concatenate([self.accurate, other.accurate]), np.bool_),
+        )
+
+    def with_states(self, near: Any, free: FloatArray, drive: FloatArray, accurate: Any = True) -> EquilibriumPath:
+        """Return other equilibria of the network as a path, none of them requested.
+
+        Parameters
+        ----------
+        near : (m,) int array
+            Points of this path whose branch and stability they share.
+        free, drive : (m, free) array, (m,) array
+            Unknowns and drive; dimensionless.
+        accurate : (m,) array of bool
+            False where there is no equilibrium.
+        """
+        network = self.network
+        z = network.base + drive[:, None] * network.rate
+        z[:, network.free] = free
+        count = len(drive)
+        return replace(
+            self,
+            at=Equilibria(network, z, drive),
+            unstable=self.unstable[near],
+            requested=read_only(np.full(count, -1), np.int64),
+            branch=self.branch[near],
+            accurate=read_only(np.broadcast_to(accurate, count), np.bool_),
+        )
 
     @cached_property
     def drive(self) -> FloatArray:
@@ -92,7 +182,7 @@ class EquilibriumPath(ShortRepr):
     @cached_property
     def residual(self) -> FloatArray:
         """Gradient of the functional by all unknowns at every point, (n, size): zero at free ones; dimensionless."""
-        return read_only(equations(self.network).gradients(self.at.z, self.at.drive))
+        return self.at.residual
 
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
@@ -106,8 +196,13 @@ class EquilibriumPath(ShortRepr):
         Raises
         ------
         cfmkit.errors.InputError
-            If a link moves the node.
+            If there is no such node, or a link moves it.
         """
+        if node not in self.net.nodes:
+            raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.net.nodes)}")
+        if self.net.moved(node):
+            master = self.net.master_of(node)
+            raise InputError(f"node {node!r} is moved by a link: what is held is its master, {master!r}")
         return read_only(node_reaction(self.at, node, self.residual))
 
     @cached_property
@@ -195,7 +290,14 @@ class EquilibriumPath(ShortRepr):
 
 
 Path = EquilibriumPath
-"""Its name once the shooting engine, which has a class of that name, is gone."""
+
+
+def most_stressed(values: FloatArray, places: FloatArray) -> Any:
+    """Return which beam (n,) has the largest of stresses (beams, n) at places (fractions of the length).
+
+    Beams that meet have one stress there, but for rounding: it is that of the beam that begins.
+    """
+    return np.where(values >= (1 - TIED) * values.max(axis=0), -places, -np.inf).argmax(axis=0)
 
 
 def node_motion(at: Equilibria, node: str) -> Any:
@@ -250,3 +352,12 @@ def strain_energy(at: Equilibria) -> Any:
             [term(at.network, spring, z, 1.0, drive).energy for z, drive in zip(at.z, at.drive, strict=True)]
         )
     return total
+
+
+def largest_force(at: Equilibria) -> float:
+    """Return the largest force or moment in a beam at any state, dimensionless."""
+    network, e = at.network, at.network.elements
+    own = at.z[:, e.unknowns]
+    curvature = own[..., energy.rotation_columns(network.degree)] @ basis(network.degree).slopes.T
+    moment = np.abs(e.rigidity * e.length[:, None] * curvature).max(initial=0.0)
+    return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))

@@ -25,6 +25,7 @@ N_MORE_PLACES = 8
 N_GRID, N_ZOOMS = 49, 5
 """Places of a grid between two ends, and how often the neighbours of its highest place become the ends of the next: the
 last grid is (2/48)^5 of an element wide, where a parabola's top is known to rounding."""
+AT_END = 1e-14  # fraction of an element within which a place is its end
 TIED = 1e-9  # share by which one element's stress must be higher than that of the one before it
 
 
@@ -72,7 +73,8 @@ def extremes(net: Network, at: Equilibria, beam: str, signs: FloatArray) -> tupl
         both = np.stack([seen.bending_stress, seen.axial_stress])
         series = np.einsum("cs,spk->pck", signs, both) @ to_series.T
         top, fraction = _top(series)
-        arc = legendre.legval(2 * fraction - 1, to_series @ found.place)
+        inner = legendre.legval(2 * fraction - 1, to_series @ found.place)
+        arc = np.where(fraction < AT_END, found.place[0], np.where(fraction > 1 - AT_END, found.place[-1], inner))
         better = top > np.where(best > 0, best * (1 + TIED), best)
         best, place = np.where(better, top, best), np.where(better, arc, place)
         chosen, where = np.where(better, number, chosen), np.where(better, fraction, where)
@@ -119,3 +121,33 @@ def largest_stress(net: Network, at: Equilibria, beam: str, axial: bool) -> tupl
     value, place, _, _ = extremes(net, at, beam, np.array(signs))
     best = value.argmax(axis=1)[:, None]
     return np.take_along_axis(value, best, 1)[:, 0], np.take_along_axis(place, best, 1)[:, 0]
+
+
+def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: Any, axial: bool) -> Any:
+    """Return the stress on both sides of a beam at places of its own for every point, (p, 2, n).
+
+    Parameters
+    ----------
+    net, at, beam : Network, Equilibria, str
+        As of `states`; with complex steps, too.
+    element, fraction : (p, 2, n) arrays
+        As of `SideExtremes`.
+    axial : bool
+        Whether the stress has its axial part.
+    """
+    fractions, to_series = places(at.network.degree + N_MORE_PLACES)
+    found = np.zeros(np.shape(fraction), at.z.dtype)
+    sides = np.array([1.0, -1.0])[:, None]
+    for number, own in enumerate(elements_of(at.network, beam)):
+        here = element == number
+        if not here.any():
+            continue
+        seen = sections(net, beam, element_states(net, at, beam, own, fractions))
+        bending, pull = (
+            np.moveaxis(legendre.legvander(2 * fraction - 1, len(fractions) - 1), -1, 0)
+            * np.moveaxis(values @ to_series.T, -1, 0)[:, :, None, None]
+            for values in (seen.bending_stress, seen.axial_stress)
+        )
+        stress = sides * bending.sum(axis=0) + (pull.sum(axis=0) if axial else 0.0)
+        found = np.where(here, stress, found)
+    return found

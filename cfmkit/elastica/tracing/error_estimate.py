@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.mechanics.refine import embed
-from cfmkit.numerics.continuation.correct import correct
-from cfmkit.numerics.continuation.problem import largest_motion
+from cfmkit.elastica.results.path import largest_force
+from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import Path
 
 DEGREES_MORE = 4
-MAX_POINTS = 10  # at which the degree is raised
+MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
-ROUNDING = 1e-13
+ROUNDING = 1e-13  # of a force, and of an error; dimensionless
 CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
+NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
 SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
 NO_FORCE, NO_EFFORT = 1e-12, 1e-6  # largest force, and effort as a share of it, that are none; dimensionless
@@ -41,28 +42,28 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     """
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
+    chosen, own = list(indices), path.at
     problem, scales = NetworkProblem(finer), path.network.scales
     n_bodies = int(path.network.elements.unknowns[:, 8].min())
-    guesses = embed(path.network, finer, path.at.z[list(indices)])
-    states, known = guesses.copy(), np.ones(len(indices), bool)
-    for row, index in enumerate(indices):
-        guess, drive = guesses[row, finer.free], float(path.at.drive[index])
-        near = correct(problem, guess, drive)
-        if near is None or largest_motion(problem, near.x - guess) > MAX_CHANGE:
-            known[row] = False
-            continue
-        states[row, finer.free] = near.x
-        if near.unstable != path.unstable[index]:
-            known[row] = abs(float(problem.modes(near, 1)[0][0])) < CRITICAL
-    at = Equilibria(finer, states, path.at.drive[list(indices)])
-    fine = replace(path, at=at)
-    efforts: Any = np.abs(fine.effort - path.effort[list(indices)])
-    forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[list(indices), :n_bodies]).max(axis=1)
-    moves: Any = np.abs(states[:, :n_bodies] - path.at.z[list(indices), :n_bodies]).max(axis=1)
-    load = max(_largest_force(path.at), NO_FORCE)
+    guesses, drives = embed(path.network, finer, own.z[chosen]), own.drive[chosen]
+    solved = problem.equations.solve_each(guesses[:, finer.free], drives, NEXT_CORRECTION, quick=True)
+    states = guesses.copy()
+    states[:, finer.free] = np.where(solved.converged[:, None], solved.free, guesses[:, finer.free])
+    moved = np.abs(states[:, : finer.n_motions] - guesses[:, : finer.n_motions]).max(axis=1)
+    known = solved.converged & (moved <= MAX_CHANGE)
+    for row in np.flatnonzero(known & (solved.unstable != path.unstable[chosen])):
+        at = PathEquilibrium(solved.free[row], float(drives[row]), solved.rate[row], int(solved.unstable[row]))
+        known[row] = abs(float(problem.modes(at, 1)[0][0])) < CRITICAL
+    fine = replace(path, at=Equilibria(finer, states, drives))
+    efforts: Any = np.abs(fine.effort - path.effort[chosen])
+    forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[chosen, :n_bodies]).max(axis=1)
+    moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
+    load = max(largest_force(fine.at), NO_FORCE)
     size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
-    reach = max(float(np.abs(path.at.z[:, :n_bodies]).max()), SMALL_MOTION)
-    relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
+    reach = max(float(np.abs(own.z[:, :n_bodies]).max()), SMALL_MOTION)
+    unloaded = (forces <= ROUNDING) & (efforts <= ROUNDING * scales.moment / scales.drive)
+    changes = np.where(unloaded, 0.0, np.maximum(efforts / size, forces / load))
+    relative = np.maximum(changes, moves / reach)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
 
 
@@ -72,21 +73,13 @@ def polish(path: Path) -> Path:
     A march leaves it when the next correction would be small if it converged quadratically: beside a bifurcation it
     does not.
     """
-    problem, z = NetworkProblem(path.network), path.at.z.copy()
-    free = path.network.free
-    for row, drive in zip(z, path.at.drive, strict=True):
-        near = correct(problem, row[free], float(drive))
-        if near is not None and largest_motion(problem, near.x - row[free]) < SAME_POINT:
-            row[free] = near.x
+    network, z = path.network, path.at.z.copy()
+    own = z[:, network.free]
+    solved = NetworkProblem(network).equations.solve_each(own, path.at.drive)
+    count = int((network.free < network.n_motions).sum())
+    near = solved.converged & (np.abs(solved.free[:, :count] - own[:, :count]).max(axis=1, initial=0.0) < SAME_POINT)
+    z[:, network.free] = np.where(near[:, None], solved.free, own)
     return replace(path, at=replace(path.at, z=z))
-
-
-def _largest_force(at: Equilibria) -> float:
-    """Return the largest force or moment in a beam at any state, dimensionless."""
-    e = at.network.elements
-    fields = energy.fields(at.network, at.z, at.drive)
-    moment = np.abs(e.rigidity * fields.curvature * e.length[:, None]).max(initial=0.0)
-    return float(max(moment, np.abs(fields.normal).max(initial=0.0), np.abs(fields.shear).max(initial=0.0)))
 
 
 def pick_points(path: Path) -> list[int]:
@@ -94,8 +87,16 @@ def pick_points(path: Path) -> list[int]:
     if not len(path):
         return []
     at = path.at_requested if len(path.at_requested) else np.arange(len(path))
-    chosen = {*at[np.linspace(0, len(at) - 1, min(len(at), MAX_POINTS - 1)).astype(int)].tolist()}
-    chosen.add(int(at[np.abs(path.effort[at]).argmax()]))
+    chosen = {int(at[np.abs(path.effort[at]).argmax()]), int(at[-1])}
+    if len(at) <= MAX_POINTS:
+        chosen.update(at.tolist())
+    else:
+        highest = path.at.z[at][:, path.network.elements.unknowns[:, -4:-2].ravel()]
+        left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
+        bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
+        chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))
+    if not path.events:
+        return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
     places = [event.drive for event in path.events]
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

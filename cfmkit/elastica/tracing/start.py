@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import without_floor
 from cfmkit.elastica.mechanics.problem import NetworkProblem
-from cfmkit.elastica.outcome.path import Event
+from cfmkit.elastica.results.path import Event
 from cfmkit.elastica.tracing.imperfection import Buckling
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
@@ -52,10 +52,12 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
     events: list[Event] = []
     branch: PathBranch | None = None
     first: Buckling | None = None
-    at = correct(NetworkProblem(_without_loads(network), ramp=True), np.zeros(len(network.free)), 0.0)
+    ramps = list(_ramps(network))
+    at_rest = NetworkProblem(_without_loads(network), ramp=True) if ramps else problem
+    at = correct(at_rest, np.zeros(len(network.free)), 0.0)
     if at is None:
         return DriveStart(problem, None, (), None, None, None)
-    for what, ramp in _ramps(network):
+    for what, ramp in ramps:
         options = Options(
             1.0, control.branch, control.sign, largest_motion=control.largest_turn, first_step=FIRST_SHARE
         )
@@ -74,8 +76,12 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
         if branch is not None and not branch.label:
             branch = branch._replace(label=what)
     # just at a bifurcation Newton's method fails where the way there has led
-    at = correct(problem, at.x, 0.0) or replace(at, drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
-    return DriveStart(*_remove_floors(problem, at), tuple(events), branch, first, None)
+    if ramps:
+        at = correct(problem, at.x, 0.0) or at._replace(drive=0.0, rate=np.zeros_like(at.x), effort=np.nan)
+    problem, at = _remove_floors(problem, at)
+    if not ramps:  # at rest nothing bears anything: forces that Newton's method leaves there are rounding
+        at = at._replace(x=np.zeros_like(at.x), effort=0.0)
+    return DriveStart(problem, at, tuple(events), branch, first, None)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:
@@ -117,12 +123,13 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
     slot = np.full(network.size, -1)
     slot[network.free] = np.arange(len(network.free))
     rows = slot[network.elements.unknowns[elements, -2:]]
-    unit = np.zeros((len(network.free), rows.size))
-    unit[rows.ravel(), np.arange(rows.size)] = 1.0
-    inverse = problem.linearise(at.x, at.drive).solve(unit)
-    if inverse is None:
+    unit = np.zeros((rows.size, len(network.free)))
+    unit[np.arange(rows.size), rows.ravel()] = 1.0
+    try:
+        inverse, _ = problem.equations.resolve(at.x, at.drive, unit)
+    except np.linalg.LinAlgError:
         return problem, at
-    share = np.abs(inverse[rows.ravel(), np.arange(rows.size)]).reshape(rows.shape).max(axis=1)
+    share = np.abs(inverse[np.arange(rows.size), rows.ravel()]).reshape(rows.shape).max(axis=1)
     share *= network.elements.axial[elements].max(axis=1) * network.elements.length[elements]
     needless = elements[share < FLOOR_SHARE]
     if not needless.size:

@@ -3,40 +3,51 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise, without_floor
+from cfmkit.elastica.mechanics.discretise import TAUT, Discretisation, discretise
+from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Control
-from cfmkit.elastica.outcome.path import Event, PathStatus
-from cfmkit.elastica.results.path import Path
+from cfmkit.elastica.model.plain_beams_at_once import coils
+from cfmkit.elastica.results.path import Event, Path, PathStatus
 from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, pick_points, point_errors, polish
 from cfmkit.elastica.tracing.imperfection import Buckling, bend
 from cfmkit.elastica.tracing.start import DriveStart, find_start, is_stretched
+from cfmkit.numerics.continuation.events import relocate
 from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathBranch, PathEvent, PathStop, Point, WhyStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.problem import NetworkProblem
+    from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 FIRST_STEP = 0.05  # share of the range, unless a requested value is nearer
 DEGREES = 5, 14  # with which a path is tried first, by its tolerance
 DEGREE_OF_MODES = 16  # where the first mode of buckling is looked for
 MAX_DEGREE = 20
 DEGREE_OF_PIECES = 14  # where beams are cut
+DEGREE_OF_LAYERS = 10  # at least, where taut ones are
 MAX_PIECES = 4
 MAX_ROUNDS = 6
-FAR_OFF = 1e2  # tolerances of error from which on the degree is raised by four at once
+FEW_BEAMS = {1: 4, 2: 2, 3: 2}  # degrees more to begin with
+SLOWEST_FALL = 0.9  # of coefficients from one degree to the next that a forecast is made from
+MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
+"""Error of a path, and motion of its points, up to which it is raised to a higher degree as it is."""
 NEARLY = 1e3  # tolerances of error up to which points may be at fault that Newton's method left too early
 MAX_TENSION_ROUNDS = 4
 MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
-MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam that is not cut: it locks
+MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: it locks
 WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
 SAME_END = 1e-3  # share of the range within which two paths end alike
@@ -51,14 +62,9 @@ class DegreeAndPieces:
     pieces: int = 1
     tension: Mapping[str, float] | None = None
 
-    def arrays(self, network: Network, drive: Drive, more: int = 0) -> Discretisation:
-        """Return the arrays of a network, with a higher degree by `more`."""
-        return discretise(network, drive, self.degree + more, self.pieces, self.tension)
-
-    def finer(self, path: Path) -> Discretisation:
-        """Return the arrays of a higher degree by which errors are estimated, with the same floors."""
-        fine = self.arrays(path.net, path.given, DEGREES_MORE)
-        return without_floor(fine, np.flatnonzero(fine.floored & ~path.network.floored))
+    def arrays(self, network: Network, drive: Drive, fits: BeamFits | None = None) -> Discretisation:
+        """Return the arrays of a network, whose beams may be fitted already."""
+        return discretise(network, drive, self.degree, self.pieces, self.tension, fits=fits)
 
 
 class TraceAttempt(NamedTuple):
@@ -66,7 +72,10 @@ class TraceAttempt(NamedTuple):
 
     path: Path
     mesh: DegreeAndPieces
+    start: DriveStart
     first: Buckling | None  # first loss of stability
+    events: tuple[PathEvent, ...]  # along the drive
+    branches: tuple[PathBranch | None, ...]  # that the points are on
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
@@ -100,7 +109,10 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
         return replace(nothing, events=(), status=PathStatus.NO_START, message=RIGID)
     if path.error <= tolerance or not len(path):
         return path
-    accurate = point_errors(path, attempt.mesh.finer(path), range(len(path))) <= tolerance
+    accurate = (
+        point_errors(path, raise_degree(path.network, path.network.degree + DEGREES_MORE), range(len(path)))
+        <= tolerance
+    )
     text = f"the tolerance of {tolerance:.3g} was not reached: error {path.error:.3g}, "
     text += f"{(~accurate).sum()} of {len(path)} points"
     complete = path.status is PathStatus.COMPLETE
@@ -113,26 +125,30 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceAttempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    degree = int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
-    mesh, best, before = DegreeAndPieces(degree), None, None
+    mesh, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
+    attempt: TraceAttempt | None = None  # raised from the one before
+    fits: BeamFits | None = None
     for count in range(MAX_ROUNDS):
-        attempt = trace_on(network, drive, control, mesh)
+        attempt = attempt or trace_on(network, drive, control, mesh, fits=fits)
+        fits = attempt.path.network.fits
         path = attempt.path
         if is_stretched(path.network, path.at.z):
             return attempt
         taut = _tension(path, mesh.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
-            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=max(mesh.degree, 10))
-            best = attempt
+            degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
+            mesh = replace(mesh, tension={**(mesh.tension or {}), **taut}, degree=degree)
+            best, attempt = attempt, None
             continue
-        path = _with_error(path, mesh)
+        finer = _finer(path)
+        path = _with_error(path, finer)
         if tolerance < path.error < NEARLY * tolerance:
-            path = _with_error(polish(path), mesh)
+            path = _with_error(polish(path), finer)
         attempt = attempt._replace(path=path)
         if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
-        settled = _are_settled(path, before, control)
-        if path.error <= tolerance and settled and path.status in (PathStatus.COMPLETE, PathStatus.FULL):
+        reached = path.error <= tolerance and path.status in (PathStatus.COMPLETE, PathStatus.FULL)
+        if reached and _are_settled(attempt, finer, control, before):
             break
         if path.status is PathStatus.NO_START and count >= 2:
             break
@@ -140,18 +156,114 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             break
         before = path
         if mesh.degree < MAX_DEGREE:
-            mesh = replace(mesh, degree=min(MAX_DEGREE, mesh.degree + (4 if path.error > FAR_OFF * tolerance else 2)))
+            mesh = replace(mesh, degree=_next_degree(path, tolerance))
+            attempt = raise_attempt(attempt, mesh, control)
         elif mesh.pieces < MAX_PIECES:
-            mesh = replace(mesh, pieces=2 * mesh.pieces, degree=DEGREE_OF_PIECES)
+            mesh, attempt = replace(mesh, pieces=2 * mesh.pieces, degree=DEGREE_OF_PIECES), None
         else:
             break
     assert best is not None
     return best
 
 
-def _with_error(path: Path, mesh: DegreeAndPieces) -> Path:
-    errors = point_errors(path, mesh.finer(path), pick_points(path))
-    return replace(path, error=float(errors.max(initial=0.0)))
+def _first_degree(network: Network, tolerance: float) -> int:
+    """Return the degree to begin with: a higher one costs little where there are few beams, which often buckle."""
+    beams = len(network.beams)
+    more = FEW_BEAMS[beams] if beams in FEW_BEAMS and not any(coils(beam) for beam in network.beams.values()) else 0
+    return _plain_degree(tolerance) + more
+
+
+def _plain_degree(tolerance: float) -> int:
+    return int(np.clip(np.ceil(1 - np.log10(tolerance)), *DEGREES))
+
+
+def _next_degree(path: Path, tolerance: float) -> int:
+    """Return the degree with which a path should reach a tolerance.
+
+    The error of forces falls as the square of the last coefficients of the rotation.
+    """
+    degree, e = path.network.degree, path.network.elements
+    last = np.abs(path.at.z[:, e.unknowns[:, -6:-2]]).max(axis=(0, 1)) if len(path) else np.ones(4)
+    fall = float(np.sqrt(last[2:].max() / max(last[:2].max(), 1e-300)))  # from one degree to the next
+    if not (np.isfinite(path.error) and 0 < fall < 1):
+        return min(MAX_DEGREE, degree + 4)
+    more = np.log(path.error / tolerance) / (-2 * np.log(min(fall, SLOWEST_FALL)))
+    return int(min(MAX_DEGREE, degree + np.clip(2 * np.ceil(0.5 * more), 2, 8)))
+
+
+def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control) -> TraceAttempt | None:
+    """Return a path with a higher degree, its points and events found from what they were.
+
+    None if it is another path then.
+    """
+    path, start, span = attempt.path, attempt.start, _span(attempt.path)
+    if path.status is not PathStatus.COMPLETE or start.events or not path.error < MAX_RAISED_ERROR or not span:
+        return None
+    fine = raise_degree(path.network, mesh.degree)
+    problem = replace(start.problem, network=fine)
+    z = embed(path.network, fine, path.at.z)
+    guess = z[:, fine.free]
+    solved = problem.equations.solve_each(guess, path.at.drive)
+    moved = np.abs(solved.free - guess)[:, problem.motions].max(initial=0.0)
+    if not solved.converged.all() or (solved.unstable != path.unstable).any() or not moved < MAX_RAISED_MOTION:
+        return None
+    z[:, fine.free] = solved.free
+    drives = _relocate(attempt, problem)
+    if drives is None:
+        return None
+    moved_to = {event.drive: drive for event, drive in zip(attempt.events, drives, strict=True)}
+    branches = tuple(
+        branch if branch is None else branch._replace(drive=moved_to.get(branch.drive, branch.drive))
+        for branch in attempt.branches
+    )
+    unit = path.network.scales.drive
+    events = tuple(replace(event, drive=drive * unit) for event, drive in zip(path.events, drives, strict=True))
+    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=events)
+    lifted = tuple(_lift(event, drive, path.network, fine) for event, drive in zip(attempt.events, drives, strict=True))
+    started = start._replace(problem=problem)
+    return attempt._replace(path=raised, mesh=mesh, start=started, branches=branches, events=lifted)
+
+
+def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
+    """Return the drives of the events of a path on a finer mesh, None if one of them is not there."""
+    path, fine = attempt.path, problem.network
+    span = _span(path) / path.network.scales.drive
+    lift = partial(_lift_free, path.network, fine)
+    drives = []
+    for event in attempt.events:
+        drive = relocate(problem, event, lift, span)
+        if drive is None:
+            return None
+        drives.append(drive)
+    return drives
+
+
+def _lift_free(network: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
+    z = np.zeros(network.size)
+    z[network.free] = x
+    return np.asarray(embed(network, fine, z)[fine.free])
+
+
+def _lift(event: PathEvent, drive: float, network: Discretisation, fine: Discretisation) -> PathEvent:
+    def lift(at: PathEquilibrium | None) -> Any:
+        if at is None:
+            return None
+        return at._replace(x=_lift_free(network, fine, at.x), rate=_lift_free(network, fine, at.rate))
+
+    within = None if event.within is None else (lift(event.within[0]), lift(event.within[1]))
+    return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
+
+
+def _finer(path: Path) -> Discretisation:
+    """Return the arrays by which errors are estimated."""
+    return raise_degree(path.network, path.network.degree + DEGREES_MORE)
+
+
+def _with_error(path: Path, finer: Discretisation) -> Path:
+    errors = point_errors(path, finer, pick_points(path))
+    told = replace(path, error=float(errors.max(initial=0.0)))
+    vars(told)["effort"] = path.effort  # is known
+    return told
 
 
 def _end_alike(path: Path, before: Path) -> bool:
@@ -175,11 +287,12 @@ def trace_on(
     mesh: DegreeAndPieces,
     first_only: bool = False,
     limit: int | None = None,
+    fits: BeamFits | None = None,
 ) -> TraceAttempt:
     """Return the path on one discretisation: with `first_only` up to the first loss of stability, or `limit` points."""
-    arrays = mesh.arrays(network, drive)
+    arrays = mesh.arrays(network, drive, fits)
     start = find_start(arrays, control)
-    events, first, points = [*start.events], start.first, list[Point]()
+    events, first, points = list[PathEvent](), start.first, list[Point]()
     ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
@@ -187,7 +300,7 @@ def trace_on(
             if isinstance(item, Point):
                 points.append(item)
             elif isinstance(item, PathEvent):
-                events.append(Event(item.kind, item.drive * unit, item.before, item.after))
+                events.append(item)
                 if first is None and item.modes is not None:
                     first = Buckling(start.problem, item, "")
                     if first_only:
@@ -197,12 +310,15 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    return TraceAttempt(_path(network, drive, start, points, tuple(events), status, message), mesh, first)
+    told = (*start.events, *(Event(event.kind, event.drive * unit, event.before, event.after) for event in events))
+    path = _without_locked_points(_path(network, drive, start, points, told, status, message))
+    branches = tuple(point.branch for point in points[: len(path)])
+    return TraceAttempt(path, mesh, start, first, tuple(events), branches)
 
 
 def _options(drive: Drive, control: Control, unit: float) -> Options:
     targets = drive.points / unit
-    span = float(np.ptp(np.append(targets, 0.0)))
+    span = max(float(targets.max()), 0.0) - min(float(targets.min()), 0.0)
     nearest = abs(float(targets[0])) / span or FIRST_STEP
     return Options(
         span, control.branch, control.sign, control.through_folds, control.largest_turn,
@@ -218,15 +334,19 @@ def _path(
     drives = np.array([point.at.drive for point in points])
     z: Any = arrays.base + drives[:, None] * arrays.rate
     z[:, arrays.free] = np.array([point.at.x for point in points]).reshape(len(points), len(arrays.free))
-    names = [_name_branch(point.branch, arrays.scales.drive) for point in points]
     return Path(
         network, drive, Equilibria(arrays, z, drives),
         unstable=read_only(np.array([point.at.unstable for point in points]), np.int64),
         requested=read_only(np.array([point.target for point in points]), np.int64),
-        branch=read_only(np.array(names, np.str_), np.str_),
+        branch=_name_branches([point.branch for point in points], arrays.scales.drive),
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
     )  # fmt: skip
+
+
+def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
+    names = {id(branch): _name_branch(branch, unit) for branch in branches}
+    return read_only(np.array([names[id(branch)] for branch in branches], np.str_), np.str_)
 
 
 def _name_branch(branch: PathBranch | None, unit: float) -> str:
@@ -257,38 +377,57 @@ def _explain(start: DriveStart, ending: PathStop, unit: float) -> tuple[PathStat
     return status, text
 
 
-def _are_settled(path: Path, before: Path | None, control: Control) -> bool:
-    """Return True if limit points, and bifurcations of the primary path, lie where they do at another degree.
+def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control, before: Path | None) -> bool:
+    """Return True if limit points, and bifurcations of the primary path, lie where they do at a higher degree.
 
     The path itself says little about their error: a straight column has none, while its high modes have waves.
     """
-    places = [event.drive for event in path.events]
-    folds = any(event.kind == "limit point" for event in path.events)
-    if not places or not (folds or control.branch == "primary"):
+    path = attempt.path
+    folds = any(event.kind == "limit point" for event in attempt.events)
+    if not attempt.events or not (folds or control.branch == "primary"):
         return True
-    if before is None or len(before.events) != len(places):
+    limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
+    drives = _relocate(attempt, replace(attempt.start.problem, network=finer))
+    if drives is not None:
+        places = np.array([event.drive for event in attempt.events])
+        return bool(np.abs(places - drives).max() * path.network.scales.drive <= limit)
+    if before is None or len(before.events) != len(path.events):
         return False
-    shift = np.abs(np.array(places) - [event.drive for event in before.events]).max()
-    return bool(shift <= max(EVENT_TOLERANCE, control.tolerance) * _span(path))
+    shifts = [abs(one.drive - other.drive) for one, other in zip(path.events, before.events, strict=True)]
+    return max(shifts) <= limit
 
 
 def _span(path: Path) -> float:
-    return float(np.ptp(np.append(path.given.points, 0.0)))
+    points = path.given.points
+    return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)
 
 
 def _tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e = path.network.elements
+    e, found = path.network.elements, dict[str, float]()
     if not len(path):
         return {}
-    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=(0, 2))
+    whole = _tautness(path)
+    resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
+    for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
+        if right - left > WHOLE and resolved[number] * (right - left) > TAUT:
+            found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
+    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
+
+
+def _tautness(path: Path) -> FloatArray:
+    """Return L sqrt(N/EI) at every point with the length of an element's beam, (n, e)."""
+    e = path.network.elements
+    force = np.abs(path.at.z[:, e.unknowns[:, -2:]]).max(axis=2)
     bending = (e.rigidity * e.weight).sum(axis=1) * e.length
-    tautness = np.sqrt(force / bending) * e.length
-    whole: dict[str, float] = {}
-    for beam, length in zip(e.beam, e.length, strict=True):
-        whole[beam] = whole.get(beam, 0.0) + length
-    found: dict[str, float] = {}
-    for beam, value, length, (left, right) in zip(e.beam, tautness, e.length, e.cuts, strict=True):
-        if value > TAUT and right - left > WHOLE:
-            found[beam] = max(found.get(beam, 0.0), float(value / length * whole[beam]))
-    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value < MAX_TENSION}
+    lengths = {beam: e.length[[other == beam for other in e.beam]].sum() for beam in set(e.beam)}
+    return np.asarray(np.sqrt(force / bending) * [lengths[beam] for beam in e.beam])
+
+
+def _without_locked_points(path: Path) -> Path:
+    """Return a path that ends early up to where a beam that does not stretch is pulled straight: there forces soar."""
+    rigid = ~path.network.elements.axial.any(axis=1)
+    if path.status is PathStatus.COMPLETE or not len(path) or not rigid.any():
+        return path
+    locked = (_tautness(path)[:, rigid] > MAX_TENSION).any(axis=1)
+    return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

@@ -1,10 +1,10 @@
-"""A second opinion on equilibria: corotational two-node elements, which share nothing with the shooting engine.
+"""A second opinion on equilibria: corotational two-node elements, which share nothing with the functional.
 
 The engine integrates Reissner's theory along the beams; here a beam is a chain of straight elements that are linear
 in a frame which moves with them (Timoshenko, section constant in the element). Equilibrium is a stationary point of
 the total energy, its gradient written out, its Hessian by complex steps. The error falls with the square of the
 element length: two meshes and Richardson's extrapolation remove it. The path checked gives a first guess, no more.
-Wide strips have the energy of `cfmkit.elastica.kernels.wide_strip` [A], at the mean curvature of an element.
+Wide strips have the energy of `cfmkit.elastica.mechanics.wide_strip` [A], at the mean curvature of an element.
 
 References
 ----------
@@ -21,11 +21,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.model.beam_fits import beam_end_at
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.results import beam_states
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.outcome.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath as Path
 
 _STEP = 1e-30
 """Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
@@ -37,6 +40,8 @@ steps are cut to 0.3 rad, so that forty reach 12 rad: nearly two revolutions."""
 _CONVERGED = 1e-9
 """Largest last step, in lengths and radians: a step of 1e-5 is followed by one of 1e-9 there, so the next one, which is
 not taken, would be at rounding."""
+
+N_PLACES = 33  # of an element of the functional, between which a first guess is interpolated
 
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
@@ -80,8 +85,10 @@ def recheck(path: Path, points: Any = None, elements: int = 48) -> Recheck:
     cfmkit.errors.InputError
         If the network has pins, springs or loads, or is driven by a load.
     """
-    layout = path.layout
-    if layout.driven is None or layout.pin_dof or layout.spring_rows or layout.load_rows or layout.line_load.any():
+    net = path.net
+    joints = {joint for beam in net.beams.values() for joint in (beam.start_joint, beam.end_joint)}
+    pinned = "pin" in joints or not all(link.turns for link in net.links)
+    if isinstance(path.given, Loading) or pinned or net.springs or net.loads or path.given.loads:
         raise InputError("the check by elements is for beams, links and supports under a displacement or rotation only")
     chosen = path.at_requested if points is None else np.asarray(points)
     meshes = [_Elements(path, elements, split) for split in (1, 2)]
@@ -108,14 +115,15 @@ class _Elements:
 
     def __init__(self, path: Path, count: int, split: int) -> None:
         """Cut the beams at corners, stations and evenly between, and every element into `split`."""
-        self.layout, self.split = path.layout, split
-        total = sum(float(np.real(fit.length)) for fit in self.layout.fits.values())
-        self.size = 3 * len(self.layout.masters)
+        self.path, self.net, self.fits, self.split = path, path.net, path.fits, split
+        total = sum(float(np.real(fit.length)) for fit in self.fits.values())
+        self.first = {name: 3 * k for k, name in enumerate(path.network.bodies)}
+        self.size = 3 * len(self.first)
         dofs: list[tuple[int, int]] = []
         arms: list[tuple[Any, Any]] = []
         places: list[tuple[int, float, float]] = []
         self.inner: list[tuple[int, float]] = []  # beam and parameter of every node inside a beam
-        for number, name in enumerate(self.layout.fits):
+        for number, name in enumerate(self.fits):
             marks = self._marks(name, total / count)
             ends = [self._end(name, side) for side in (0, 1)]
             nodes = [ends[0]]
@@ -133,7 +141,7 @@ class _Elements:
 
     def _marks(self, name: str, longest: float) -> list[float]:
         """Return the parameters of a beam's nodes."""
-        fit, section = self.layout.fits[name], self.layout.network.beams[name].section
+        fit, section = self.fits[name], self.net.beams[name].section
         stations = [fit.parameter(float(u)) for u in section.stations[1:-1]]
         breaks = np.unique(np.round(np.concatenate([fit.course.breaks, stations]), 13))
         marks = [0.0]
@@ -145,18 +153,17 @@ class _Elements:
 
     def _end(self, name: str, side: int) -> tuple[int, FloatArray]:
         """Return the first degree of freedom of the node that moves a beam's end, and the arm between them."""
-        beam = self.layout.network.beams[name]
-        node = self.layout.network.master_of((beam.start, beam.end)[side])
-        x, y = self.layout.beam_end_at(name, side)
-        mx, my = self.layout.position(node)
-        return self.layout.first[node], np.array([x - mx, y - my], dtype=float)
+        beam = self.net.beams[name]
+        master = self.net.master_of((beam.start, beam.end)[side])
+        (x, y), node = beam_end_at(self.net, name, side), self.net.nodes[master]
+        return self.first[master], np.array([x - node.x, y - node.y], dtype=float)
 
     def _sections(self, places: list[tuple[int, float, float]]) -> None:
         """Set reference chords, rigidities at mid-length and thicknesses at the ends of the elements."""
-        names = list(self.layout.network.beams)
+        names = list(self.net.beams)
         rows = []
         for number, a, b in places:
-            fit, section = self.layout.fits[names[number]], self.layout.network.beams[names[number]].section
+            fit, section = self.fits[names[number]], self.net.beams[names[number]].section
             t, weight = 0.5 * (a + b) + 0.5 * (b - a) * _GAUSS[0], 0.5 * (b - a) * _GAUSS[1]
             middle = 0.5 * (a + b)
             run, angle = np.real(fit.speed(t, middle)) * weight, np.real(fit.angle(t, middle))
@@ -265,31 +272,36 @@ class _Elements:
         from scipy.sparse import lil_array
 
         turn, free = lil_array((self.size, self.size)), np.ones(self.size, dtype=bool)
+        driven = 0, 0.0
         turn.setdiag(1.0)
-        for name in self.layout.masters:
-            first, angle = self.layout.first[name], self.layout.direction[name]
-            c, s = np.cos(angle), np.sin(angle)
+        arrays = self.path.network
+        for name, unknowns in arrays.bodies.items():
+            first, (c, s) = self.first[name], arrays.attachments.frame[arrays.nodes[name]]
             turn[first : first + 2, first : first + 2] = np.array([[c, -s], [s, c]])
-            free[first : first + 3] = self.layout.free[first : first + 3]
-        return turn.tocsc(), np.flatnonzero(free), self.layout.driven  # type: ignore[return-value]
+            free[first : first + 3] = np.isin(unknowns, arrays.free)
+            for local, rate in enumerate(arrays.rate[list(unknowns)].tolist()):
+                if rate:
+                    driven = first + local, rate
+        return turn.tocsc(), np.flatnonzero(free), driven
 
     def _guess(self, path: Path, index: int) -> FloatArray:
         """Return the path's own motions: exact at the nodes of the network, interpolated inside the beams."""
         u = np.zeros(self.size)
-        for name in self.layout.masters:
-            u[self.layout.first[name] : self.layout.first[name] + 3] = path.motion(name)[index]
-        sampler, scale = path.sampler, self.layout.scales.length
-        rest = np.empty((1, *sampler.states.shape[1:]))
-        from cfmkit.elastica.kernels import compiled
-
-        compiled.states(sampler.model, path.solver.n_free, path.solver.unstressed()[None], np.zeros(1), rest)
-        moved = sampler.states[index] - rest[0]
-        first = 3 * len(self.layout.masters)
+        for name, first in self.first.items():
+            u[first : first + 3] = path.motion(name)[index]
+        names, at, share = list(self.net.beams), path.take(np.array([index])).at, np.linspace(0.0, 1.0, N_PLACES)
+        moved = {}
+        for number in {beam for beam, _ in self.inner}:
+            name, cuts = names[number], path.network.elements.cuts
+            own = beam_states.elements_of(path.network, name)
+            now = beam_states.states(self.net, at, name, share)
+            rest = beam_states.unloaded(self.net, at, name, share)
+            known = np.concatenate([cuts[k, 0] + (cuts[k, 1] - cuts[k, 0]) * share for k in own])
+            moved[number] = known, (now.x[0] - rest[:, 0], now.y[0] - rest[:, 1], now.turn[0])
+        first = 3 * len(self.first)
         for k, (beam, t) in enumerate(self.inner):
-            rows = sampler.rows(beam)
-            at = u[first + 3 * k : first + 3 * k + 3]
-            at[:] = [np.interp(t, rows.t, moved[rows.index, column]) for column in range(3)]
-            at[:2] *= scale
+            places, columns = moved[beam]
+            u[first + 3 * k : first + 3 * k + 3] = [np.interp(t, places, column) for column in columns]
         return u
 
     def _stress(self, u: FloatArray) -> float:

@@ -257,7 +257,7 @@ def _to_allowable_stress(spec: BeamSpec) -> tuple[BeamSpec | None, str]:
     end = _down(place)
     ended = _windowed(spec, 0.0, end)
     start = ranges(solve(ended))["range_start"]
-    return (ended if start is None else _windowed(ended, _up(start), end)), ""
+    return (ended if start is None or abs(_up(start)) >= abs(end) else _windowed(ended, _up(start), end)), ""
 
 
 def _reaches_allowable_stress(spec: BeamSpec) -> tuple[float | None, str]:

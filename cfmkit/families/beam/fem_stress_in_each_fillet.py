@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.families.beam.network_from_spec import mirror_axis, thinnest_of
 from cfmkit.families.beam.strips_and_gaps import mirrored, strips
 from cfmkit.families.fem_results import FilletRow, with_nominal
@@ -53,7 +53,7 @@ def _described(assembly: Assembly, points: FloatArray) -> FloatArray:
 def _named(assembly: Assembly) -> tuple[dict[str, list[FloatArray]], dict[str, FloatArray]]:
     """Return the polygons of the beams and the places of the nodes, of both halves, by name [m]."""
     network, axis = assembly.network, mirror_axis(assembly)
-    fits = Layout(network, assembly.drive()).fits
+    fits = BeamFits(network)
     exact = EXACT * min(thinnest_of(beam.section) for beam in network.beams.values())
     beams = {
         name: [polygon for strip in strips(network, fits, name, exact) for polygon in strip.polygons]

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import PathStatus, hindered_curling
+from cfmkit.elastica.mechanics.discretise import discretise, without_floor
+from cfmkit.elastica.mechanics.march import equations
 from cfmkit.families.beam.curve_along_its_motion import window_of
 from cfmkit.families.beam.largest_in_window import largest
 from cfmkit.families.beam.network_from_spec import known_allowable_stresses, thickest_of, thinnest_of
@@ -158,11 +160,8 @@ def _in_the_way(solution: Solution) -> str:
         reported = f"inextensible beams between places that do not move ({', '.join(tied)}) hold the network rigid"
         return f"{said}; {reported}: leave one out, or set 'mechanism.axial: true'"
     if along:
-        held = (
-            f"inextensible beams that lie straight along the drive ({', '.join(along)}) do not move until they buckle"
-        )
-        bent = "or bend them by analysis.imperfection, by at least 1e-8 of their length"
-        return f"{said}; {held}: set 'mechanism.axial: true', {bent}"
+        held = f"inextensible beams lie straight along the drive ({', '.join(along)})"
+        return f"{said}; {held}: let them stretch by 'mechanism.axial: true'"
     return f"{said}; beams are inextensible: 'mechanism.axial: true' lets them stretch"
 
 
@@ -171,15 +170,18 @@ def _over_determined(solution: Solution) -> list[str]:
 
     They are what the null vectors of the tangent have, where these move nothing.
     """
-    solver = solution.path.solver
-    tangent, _ = solver.tangent_at(solver.unstressed(), 0.0)
+    arrays = discretise(solution.path.net, solution.path.given)
+    arrays = without_floor(arrays, np.flatnonzero(arrays.floored))
+    tangent = equations(arrays).linearise(np.zeros(len(arrays.free)), 0.0).tangent
     _, sizes, rows = np.linalg.svd(tangent)
-    null = rows[sizes <= _SINGULAR * sizes[0]]
-    if not len(null) or np.abs(null[:, : solver.n_free]).max(initial=0.0) > _STILL:
+    null = np.zeros((len(rows), arrays.size))
+    null[:, arrays.free] = rows
+    null = null[sizes <= _SINGULAR * sizes[0]]
+    if not len(null) or np.abs(null[:, : arrays.n_motions]).max(initial=0.0) > _STILL:
         return []
-    forces = np.abs(null[:, solver.n_free :]).reshape(len(null), -1, 3).max(axis=(0, 2))
-    names = list(solution.path.layout.network.beams)
-    return [name for name, force in zip(names, forces.tolist(), strict=True) if force > _STILL]
+    forces = np.abs(null[:, arrays.elements.unknowns[:, -2:]]).max(axis=(0, 2))
+    names = [name for name, force in zip(arrays.elements.beam, forces.tolist(), strict=True) if force > _STILL]
+    return list(dict.fromkeys(names))
 
 
 _SINGULAR, _STILL = 1e-10, 1e-6  # of the largest singular value; motion or force of a null vector of length 1
@@ -231,7 +233,7 @@ def _closure(solution: Solution) -> Iterator[Finding]:
         guided = [one.split(" ")[0] for one in moved if nodes[one.split(" ")[0]].support in ("guided", "roller")]
         if guided:
             yield finding("closure_adjusted", f"the guides of moved nodes were moved with them: {', '.join(guided)}")
-    beams = solution.path.layout.network.beams
+    beams = solution.path.net.beams
     fits = {
         name: one
         for name, one in solution.path.fits.items()
@@ -265,10 +267,10 @@ def _moved(solution: Solution) -> list[str]:
     """Return the nodes that the closure "chain" moved, each with how far."""
     if solution.spec.mechanism.closure != "chain":
         return []
-    layout, found = solution.path.layout, []
+    network, found = solution.path.net, []
     for name, node in solution.spec.mechanism.nodes.items():
-        way = float(np.hypot(*(np.real(np.array(layout.position(name))) - node.at)))
-        if way > NEGLIGIBLE * layout.scales.length:
+        way = float(np.hypot(*(np.real([network.nodes[name].x, network.nodes[name].y]) - node.at)))
+        if way > NEGLIGIBLE * solution.path.network.scales.length:
             found.append(f"{name} by {format_short(way, 'length')}")
     return found
 
@@ -348,7 +350,7 @@ def _imperfection(solution: Solution) -> Iterator[Finding]:
 def _stress(solution: Solution) -> Iterator[Finding]:
     """Say where the stress in the window is too large, between points, too; of the beams whose strength is known."""
     known = known_allowable_stresses(solution.spec)
-    names = [name for name in solution.path.layout.network.beams if name.split(".")[0] in known]
+    names = [name for name in solution.path.net.beams if name.split(".")[0] in known]
     if not names or len(solution.keep) < 2:
         return
     allowable, axial, window = min(known.values()), solution.spec.stress == "total", window_of(solution)
@@ -374,7 +376,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
 
 
 def _slenderness(solution: Solution) -> Iterator[Finding]:
-    beams, fits = solution.path.layout.network.beams, solution.path.fits
+    beams, fits = solution.path.net.beams, solution.path.fits
     for name, beam in beams.items():
         thickest = thickest_of(beam.section)
         length = float(np.real(fits[name].length))
@@ -419,7 +421,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
         )
     made = (part.process and part.process.thinnest) or 0.0
     made = max(made, part.min_feature)
-    for name, beam in solution.path.layout.network.beams.items():
+    for name, beam in solution.path.net.beams.items():
         thinnest = thinnest_of(beam.section)
         if thinnest < made * (1 - NEGLIGIBLE):
             yield finding(

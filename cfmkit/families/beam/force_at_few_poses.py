@@ -50,7 +50,7 @@ def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
         return None
     assembly, path, at = found
     axial = spec.stress == "total"
-    stress = [path.beam_stress(name, axial)[0][at] for name in path.layout.network.beams]
+    stress = [path.beam_stress(name, axial)[0][at] for name in path.net.beams]
     return Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress))
 
 
@@ -88,7 +88,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
         slopes = gradient(path, build, np.array([spec.at(one) for one in known]), at)
         axial = spec.stress == "total"
         stress, by_stress = [], []
-        for name in path.layout.network.beams:
+        for name in path.net.beams:
             extremes = path.stress_extremes(name, axial).value[at].reshape(len(at), 4)
             worst = np.abs(extremes).argmax(axis=1)
             pick = np.arange(len(at)), worst

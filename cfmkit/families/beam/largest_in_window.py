@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.elastica.outcome.folding_path_between_points import AlongTheWay
+    from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.families.beam.solution import Solution
 
 ROUNDS = 4

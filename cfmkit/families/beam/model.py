@@ -20,7 +20,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.elastica.model.plain_beams_at_once import coils
 from cfmkit.errors import InputError
 from cfmkit.families.beam.curve_along_its_motion import travel_of
@@ -116,7 +116,7 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
     """
     network = assembly.network
     wound = [name for name, beam in network.beams.items() if coils(beam)]
-    fits = Layout(network, assembly.drive()).fits if wound else {}
+    fits = BeamFits(network) if wound else {}
     for name in wound:
         turns = np.abs(np.diff(fits[name].angle(_ALONG, 0.5))) / np.diff(_ALONG)
         radius, thick = float(fits[name].length / turns.max()), thickest_of(network.beams[name].section)
@@ -141,7 +141,7 @@ def _refuse_torn_beams(assembly: Assembly) -> None:
     straight = {name: distance(network, beam.start, beam.end) for name, beam in network.beams.items()}
     if abs(spec.extent) <= most * _way_to_support(network, drive.node, straight):
         return
-    lengths = {name: fit.length for name, fit in Layout(network, assembly.drive()).fits.items()}
+    lengths = {name: fit.length for name, fit in BeamFits(network).items()}
     way = _way_to_support(network, drive.node, lengths)
     if abs(spec.extent) > most * way:
         raise InputError(
@@ -187,7 +187,7 @@ def _curve(solution: Solution) -> Curve:
         "stress_place": Column(solution.stress_at[1], "ratio"),
         "path": Column(_branches(solution), "text"),
     }
-    for name in path.layout.network.beams:
+    for name in path.net.beams:
         x, y, moment = solution.beam_force(name).T
         extra |= {
             f"{name}_force_x": Column(x, "force"),

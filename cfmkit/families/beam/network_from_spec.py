@@ -27,7 +27,6 @@ from cfmkit import elastica as engine
 from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
-from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 from cfmkit.families.beam.network_elements_spec import HELD
 from cfmkit.specs.units import between
 
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
+    from cfmkit.elastica.vibration import NetworkMasses
     from cfmkit.families.beam.mechanism_spec import Mechanism
     from cfmkit.families.beam.network_elements_spec import (
         LoadSpec,
@@ -143,6 +143,8 @@ class Assembly(ShortRepr):
         density = {name: one.density for name, one in materials.items() if one.density is not None}
         if len(density) < len(materials):
             return None
+        from cfmkit.elastica.vibration import NetworkMasses
+
         nodes = {name: mechanism.nodes[name.split(".")[0]] for name in self.network.nodes}
         return NetworkMasses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica import PointLoad
-from cfmkit.elastica.model.network_under_drive import Layout
+from cfmkit.elastica.model.beam_fits import BeamFits
 from cfmkit.export.contours import (
     Contour,
     Curve2D,
@@ -125,7 +125,7 @@ def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, 
 def _strips(assembly: Assembly, tolerance: float = np.inf) -> dict[str, list[BeamStrip]]:
     """Return every beam in smooth pieces, as exact as a drawing of some tolerance [m] needs them."""
     network = assembly.network
-    fits = Layout(network, assembly.drive()).fits
+    fits = BeamFits(network)
     return {name: strips(network, fits, name, SPARSE * tolerance) for name in network.beams}
 
 
@@ -316,7 +316,7 @@ def _swept(assembly: Assembly, places: tuple[HeldPlace, ...]) -> Any:
     points = [int(solution.keep[one]) for one in chosen] if len(solution.keep) else []
     rest = list(itertools.chain.from_iterable(_strips(assembly).values()))
     lines = [one.points for one in rest]
-    lines += [path.shape(name, point) for point in points for name in path.layout.network.beams]
+    lines += [path.shape(name, point) for point in points for name in path.net.beams]
     shapes = []
     for place in places:
         motion = path.motion(place.node)

@@ -213,8 +213,8 @@ def strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAN
 
 def _closure(solution: Solution) -> dict[str, float | None]:
     fits = solution.path.fits
-    own = [name for name, beam in solution.path.layout.network.beams.items() if getattr(beam.shape, "length", None)]
-    beams = solution.path.layout.network.beams
+    own = [name for name, beam in solution.path.net.beams.items() if getattr(beam.shape, "length", None)]
+    beams = solution.path.net.beams
     return {
         "closure_rotation_max": max((abs(float(np.real(fits[name].rotation))) for name in own), default=0.0),
         "closure_scale_max": max((abs(float(np.real(fits[name].scale)) - 1) for name in own), default=0.0),
@@ -235,7 +235,7 @@ def _across(solution: Solution) -> dict[str, float | None]:
     Of drives that turn it, only the stress.
     """
     drive, window, node = solution.spec.mechanism.drive, window_of(solution), solution.assembly.driven
-    names = list(solution.path.layout.network.beams)
+    names = list(solution.path.net.beams)
 
     def stresses(path: Path) -> FloatArray:
         return np.array([path.beam_stress(name, True)[0] for name in names])
@@ -270,7 +270,7 @@ def _passes_pole(solution: Solution, direction: float, window: tuple[float, floa
 
     Such is that of a node without a guide, on a part of the path where even a guide would not make it stable.
     """
-    from cfmkit.elastica.outcome.crosswise_stiffness import poles
+    from cfmkit.elastica.results.cross_stiffness import poles
 
     path, node = solution.path, solution.assembly.driven
     x, y, _ = path.motion(node).T

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
-from cfmkit.elastica.outcome.between_points import between_loads, between_points
-from cfmkit.elastica.outcome.folding_path_between_points import along_the_way
-from cfmkit.elastica.outcome.member_efforts import effort_error, largest_member_efforts
-from cfmkit.elastica.outcome.path import most_stressed
+from cfmkit.elastica.results.between_points import between_loads, between_points
+from cfmkit.elastica.results.folding_path_between_points import along_the_way
+from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
+from cfmkit.elastica.results.path import most_stressed
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips_and_gaps import BeamGap, mirrored, smallest_gap
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
-    from cfmkit.elastica.outcome.between_points import BetweenPoints
-    from cfmkit.elastica.outcome.folding_path_between_points import AlongTheWay
+    from cfmkit.elastica.results.between_points import BetweenPoints
+    from cfmkit.elastica.results.folding_path_between_points import AlongTheWay
     from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.beam.spec import BeamSpec
 
@@ -156,7 +156,7 @@ class Solution(ShortRepr):
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
         axial, keep = self.spec.stress == "total", self.keep
-        found = {name: self.path.beam_stress(name, axial) for name in self.path.layout.network.beams}
+        found = {name: self.path.beam_stress(name, axial) for name in self.path.net.beams}
         return Named({name: Several((value[keep], place[keep])) for name, (value, place) in found.items()})
 
     @cached_property
@@ -190,7 +190,7 @@ class Solution(ShortRepr):
     @cached_property
     def follows(self) -> bool:
         """Whether a load turns with its node: stability may then be lost by flutter."""
-        return bool(self.path.solver.model.load_follows.any())
+        return self.path.follows
 
     @cached_property
     def frequencies(self) -> Frequencies | None:
@@ -211,7 +211,7 @@ class Solution(ShortRepr):
         """
         if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
             return read_only(np.full(len(self.keep), np.nan))
-        from cfmkit.elastica.outcome.crosswise_stiffness import cross_stiffness
+        from cfmkit.elastica.results.cross_stiffness import cross_stiffness
 
         found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
         known = self.accurate & np.isfinite(found)
@@ -226,7 +226,7 @@ class Solution(ShortRepr):
         return found[0], moving
 
     def _gap(self, point: int) -> BeamGap | None:
-        network = self.path.layout.network
+        network = self.path.net
         lines = {name: self.path.shape(name, point) for name in network.beams}
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
         axis = mirror_axis(self.assembly)

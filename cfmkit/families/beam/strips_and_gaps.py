@@ -252,7 +252,10 @@ def _away(line: FloatArray, end: int, length: float) -> FloatArray:
         return line
     ordered = line if end == 0 else line[::-1]
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ordered, axis=0).T))])
-    kept = ordered[way >= length]
+    if way[-1] <= length:
+        return ordered[:0]
+    first = [np.interp(length, way, column) for column in ordered.T]
+    kept = np.vstack([first, ordered[way > length]])
     return kept if end == 0 else kept[::-1]
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.outcome.between_points import BetweenPoints
+    from cfmkit.elastica.results.between_points import BetweenPoints
     from cfmkit.families.beam.solution import OnCurve
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding

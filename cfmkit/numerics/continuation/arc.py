@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 MISSED_SHARE = 0.4  # of a step by which the tangent may miss
 GOOD_MISS = 0.05  # below which the next step is longer
 GROWTH = 1.6
+LONGEST_BEND = 2.0  # times the step before, up to which the cubic through its ends says where the next one leads
+N_HALVINGS = 12  # until a guess within a step lies at its drive
 TURN_COSINE = 0.7  # between the tangents at both ends of a step: at least
 SHORTEST_SHARE, SHORTEST = 1e-9, 1e-12  # of the first step, and at all
 
@@ -34,22 +37,35 @@ class ArcStep(NamedTuple):
 
 def unit_tangent(problem: ContinuationProblem, at: PathEquilibrium, along: FloatArray, span: float) -> FloatArray:
     """Return d(x, drive) of unit arc length at an equilibrium, in the sense of another direction, (n + 1,)."""
-    weights, tangent = arc_weights(problem, span), np.append(at.rate, 1.0)
-    tangent /= np.sqrt(weights @ tangent**2)
-    return tangent if (weights * along) @ tangent >= 0 else -tangent
+    weights, tangent = arc_weights(problem, span), np.empty(len(at.x) + 1)
+    tangent[:-1], tangent[-1] = at.rate, 1.0
+    weighted = weights * tangent
+    return tangent * (math.copysign(1.0, weighted @ along) / math.sqrt(weighted @ tangent))
 
 
 def step_along(
-    problem: ContinuationProblem, here: PathEquilibrium, tangent: FloatArray, length: float, span: float
+    problem: ContinuationProblem,
+    here: PathEquilibrium,
+    tangent: FloatArray,
+    length: float,
+    span: float,
+    bend: FloatArray | None = None,
 ) -> ArcStep | None:
-    """Return the equilibrium at a length along the unit tangent from here."""
-    weights, place = arc_weights(problem, span), np.append(here.x, here.drive)
+    """Return the equilibrium at a length along the unit tangent from here; `bend` is added to the first guess."""
+    weights, place = arc_weights(problem, span), _place(here)
     guess, row = place + length * tangent, weights * tangent
-    new = correct(problem, guess[:-1], float(guess[-1]), Border(row, float(row @ place) + length))
+    first = guess if bend is None else guess + bend
+    new = correct(problem, first[:-1], float(first[-1]), Border(row, float(row @ place) + length))
     if new is None:
         return None
-    missed = np.sqrt(weights @ (np.append(new.x, new.drive) - guess) ** 2)
-    return ArcStep(new, unit_tangent(problem, new, tangent, span), float(missed))
+    missed = _place(new) - guess
+    return ArcStep(new, unit_tangent(problem, new, tangent, span), math.sqrt(weights @ (missed * missed)))
+
+
+def _place(at: PathEquilibrium) -> FloatArray:
+    place = np.empty(len(at.x) + 1)
+    place[:-1], place[-1] = at.x, at.drive
+    return place
 
 
 class ArcMove(NamedTuple):
@@ -61,10 +77,34 @@ class ArcMove(NamedTuple):
     tangent: FloatArray
     length: float
 
+    def between(self, goal: float) -> FloatArray:
+        """Return the unknowns at a drive between its ends by the cubic in the arc length through them."""
+        first, last = _place(self.old), _place(self.new)
+        starts, ends = self.length * self.tangent_before, self.length * self.tangent
+        low, high, rising = 0.0, 1.0, self.new.drive > self.old.drive
+        for _ in range(N_HALVINGS):
+            s = 0.5 * (low + high)
+            drive = _cubic(first[-1], last[-1], starts[-1], ends[-1], s)
+            low, high = (s, high) if (drive < goal) == rising else (low, s)
+        return np.asarray(_cubic(first[:-1], last[:-1], starts[:-1], ends[:-1], 0.5 * (low + high)))
+
+    def bend(self, length: float) -> FloatArray:
+        """Return by how much the cubic through both ends leaves the last tangent at a length behind them."""
+        share = length / self.length
+        first, last = _place(self.old), _place(self.new)
+        starts, ends = self.length * self.tangent_before, self.length * self.tangent
+        return np.asarray(_cubic(first, last, starts, ends, 1 + share) - last - length * self.tangent)
+
     @property
     def folds(self) -> bool:
         """True if the drive turns back within the step."""
         return bool(self.tangent[-1] * self.tangent_before[-1] < 0)
+
+
+def _cubic(first: Any, last: Any, slope_first: Any, slope_last: Any, s: float) -> Any:
+    """Return the cubic with these values and slopes at 0 and 1."""
+    r = 1 - s
+    return r * r * ((1 + 2 * s) * first + s * slope_first) + s * s * ((1 + 2 * r) * last - r * slope_last)
 
 
 def follow_arc(
@@ -72,8 +112,10 @@ def follow_arc(
 ) -> Iterator[ArcMove]:
     """Yield accepted steps along the arc from an equilibrium, until none is found."""
     first, weights = length, arc_weights(problem, options.span)
+    before: ArcMove | None = None
     while length > max(SHORTEST_SHARE * first, SHORTEST):
-        step = step_along(problem, here, tangent, length, options.span)
+        bend = before.bend(length) if before is not None and length <= LONGEST_BEND * before.length else None
+        step = step_along(problem, here, tangent, length, options.span, bend)
         if (
             step is None
             or not _accept(problem, here, step, tangent, length, options)
@@ -81,7 +123,8 @@ def follow_arc(
         ):
             length *= 0.5
             continue
-        yield ArcMove(here, step.new, tangent, step.tangent, length)
+        before = ArcMove(here, step.new, tangent, step.tangent, length)
+        yield before
         here, tangent = step.new, step.tangent
         if step.missed < GOOD_MISS * length:
             length *= GROWTH

@@ -22,6 +22,7 @@ LOOK_AHEAD = 1e-5, 1e-4, 1e-3, 1e-2, 1e-6, 1e-7
 LOOK_BACK = 1.0, 3.0, 10.0, 30.0, 100.0
 """Times these, before the fold, at which that path must be less stable."""
 SAME_PLACE = 1e-7  # motion, with a share of the step
+SHORT_STEP = 1e-6  # share of the range: after so short steps on a branch it is asked whether it has ended
 IN_DOUBT = 0.05, 0.02
 """Motions of a step that are halved if going back fails, or comes to a path that is no less stable."""
 
@@ -38,13 +39,26 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     if back is None:
         return "unsure" if moved > IN_DOUBT[0] else None
     if walk.moved(back) < SAME_PLACE + 1e-3 * moved:
-        return None
+        return _find_end_at(walk, new)
     if back.unstable <= new.unstable:
         return "unsure" if moved > IN_DOUBT[1] else None
     found = locate_stability_change(problem, back, new)
     if found is None:
         return "unsure"
-    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near)
+    return PathEvent("bifurcation", found.drive, back.unstable, new.unstable, found.near, within=found.within)
+
+
+def _find_end_at(walk: Walk, new: PathEquilibrium) -> PathEvent | None:
+    """Return the event at the end of a branch if the last step came to just behind it: the next ones are short then."""
+    problem, here = walk.problem, walk.here
+    if abs(new.drive - here.drive) > SHORT_STEP * walk.options.span:
+        return None
+    for share in LOOK_AHEAD:
+        prior = _least_stable_before(walk, here.drive, new, walk.sense * share * walk.options.span)
+        found = None if prior is None else locate_stability_change(problem, prior, new)
+        if prior is not None and found is not None:
+            return PathEvent("bifurcation", found.drive, prior.unstable, new.unstable, found.near, within=found.within)
+    return None
 
 
 def primary_slope(problem: ContinuationProblem, at: PathEquilibrium, modes: FloatArray) -> FloatArray:
@@ -70,20 +84,23 @@ def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[PathEqui
             continue
         if largest_motion(problem, beyond.x - guess) > 0.05 + 2 * abs(ahead) * largest_motion(problem, slope):
             continue
-        before = _count_before(walk, fold.drive, beyond, ahead)
-        if before > beyond.unstable:
-            return beyond, PathEvent("bifurcation", fold.drive, before, beyond.unstable, fold.near, modes)
+        before = _least_stable_before(walk, fold.drive, beyond, ahead)
+        if before is not None:
+            within = before, beyond
+            event = PathEvent("bifurcation", fold.drive, before.unstable, beyond.unstable, fold.near, modes, within)
+            return beyond, event
     return None
 
 
-def _count_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahead: float) -> int:
-    """Return the unstable directions of the path through `beyond` a little before a drive."""
-    at, most = beyond, beyond.unstable
+def _least_stable_before(walk: Walk, drive: float, beyond: PathEquilibrium, ahead: float) -> PathEquilibrium | None:
+    """Return an equilibrium a little before a drive on the path through `beyond`, as far as it is less stable there."""
+    at, least = beyond, None
     for factor in LOOK_BACK:
-        if most - beyond.unstable >= walk.modes:
+        if least is not None and least.unstable - beyond.unstable >= walk.modes:
             break
         goal = drive - factor * ahead
         prior = correct(walk.problem, at.x + (goal - at.drive) * at.rate, goal)
         if prior is not None and prior.unstable > beyond.unstable:
-            at, most = prior, max(most, prior.unstable)
-    return most
+            least = prior if least is None or prior.unstable > least.unstable else least
+            at = prior
+    return least

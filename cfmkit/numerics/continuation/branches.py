@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,7 +62,7 @@ def descend(problem: ContinuationProblem, saddle: PathEquilibrium, sign: int) ->
         newton = here.solve(-here.residual[:, None])
         if newton is None or not np.isfinite(newton).all():
             return None
-        values, modes = problem.modes(replace(saddle, x=x), len(x))
+        values, modes = problem.modes(saddle._replace(x=x), len(x))
         falling = modes[:, values < 0]
         step = newton[:, 0] - 2 * falling @ (falling[problem.motions].T @ newton[problem.motions, 0])
         if largest_motion(problem, step) < STILL:
@@ -111,5 +110,5 @@ def find_beside(
             break
         share *= float(np.sqrt(part / reached))
     if at is None:
-        return replace(entered, x=x, drive=goal, unstable=unstable, effort=math.nan)
-    return replace(at, drive=goal, unstable=min(at.unstable, unstable), effort=math.nan)
+        return entered._replace(x=x, drive=goal, unstable=unstable, effort=math.nan)
+    return at._replace(drive=goal, unstable=min(at.unstable, unstable), effort=math.nan)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.numerics.continuation.events import Located
     from cfmkit.numerics.continuation.losses import Items
+    from cfmkit.numerics.continuation.problem import ContinuationProblem
 
 LIMIT_POINT = "the drive cannot go on at {place}: a limit point; follow the path by its arc length (through_folds)"
 TOO_SHARP = "the drive cannot go on at {place}: it locks, or turns too sharply to follow"
@@ -86,8 +87,7 @@ def _pass_targets(walk: Walk, move: ArcMove) -> Generator[Point, None, Walk | No
     """Yield the requested values within a step; return the walk with the next one, or None if one is not found."""
     for number in walk.targets_up_to(move.new.drive):
         goal = float(walk.targets[number])
-        share = (goal - move.old.drive) / (move.new.drive - move.old.drive)
-        at = correct(walk.problem, move.old.x + share * (move.new.x - move.old.x), goal)
+        at = correct(walk.problem, move.between(goal), goal)
         if at is None:
             return None
         yield Point(at, number, walk.branch)
@@ -108,10 +108,16 @@ def _end_at_fold(
         again = walk.restart(move.old, walk.step, same_piece=True)
         return (yield from follow_by_arc(again, 0.1 * fineness))
     for number in walk.targets_up_to(fold.drive):
-        goal = float(walk.targets[number])
+        goal, turns = float(walk.targets[number]), walk.turns_at(fold.drive)
         beside = find_beside(walk.problem, fold.x, fold.drive, move.old, goal, begin.unstable)
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
+        if turns:
+            return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
+    if walk.turns_at(fold.drive):
+        yield Point(fold.near._replace(drive=float(walk.targets[walk.number])), walk.number, walk.branch)
+        walk = replace(walk, number=walk.number + 1)
+        return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if joined is None:
         return PathStop(WhyStopped.LOST, fold.drive, "the end of a branch at {place} leads nowhere")
     beyond, event = joined
@@ -132,7 +138,8 @@ def _end_at_fold(
 
 def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:
     """Yield what is left before a limit point of the drive, where the path ends."""
-    problem, last, sense = walk.problem, fold.before, walk.sense
+    problem, sense = walk.problem, walk.sense
+    last = _last_before(problem, begin, fold, sense)
     for number in walk.targets_up_to(fold.drive):
         goal = float(walk.targets[number])
         share = (goal - begin.drive) / (last.drive - begin.drive)
@@ -143,3 +150,15 @@ def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> I
     if (last.drive - begin.drive) * sense > 0:
         yield Point(last, -1, walk.branch)
     return PathStop(WhyStopped.LIMIT_POINT, fold.drive, LIMIT_POINT)
+
+
+def _last_before(problem: ContinuationProblem, begin: PathEquilibrium, fold: Located, sense: float) -> PathEquilibrium:
+    """Return the equilibrium nearest to a limit point, on the side that the path comes from.
+
+    A location may close in from behind: then it is the other one at that drive.
+    """
+    near: PathEquilibrium | None = fold.near
+    if fold.near.unstable > begin.unstable:
+        near = correct(problem, 2 * fold.x - fold.near.x, fold.near.drive)
+    known = near is not None and near.unstable == begin.unstable and (near.drive - fold.before.drive) * sense > 0
+    return near if near is not None and known else fold.before

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.arc import ArcMove
-    from cfmkit.numerics.continuation.path import Walk
+    from cfmkit.numerics.continuation.path import PathEvent, Walk
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
-CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 1e-7
-"""Shares of the first values at which a location ends: beside a pitchfork rounding acts as an imperfection does."""
+CLOSE_TO_BIFURCATION, CLOSE_TO_FOLD = 1e-6, 3e-4
+"""Shares of the first values at which a location ends: beside a pitchfork rounding acts as an imperfection does, and
+the drive of a fold is better known than its place, by the square."""
 MAX_SAMPLES = 40
+JUST_BEFORE = 1e-4  # of a step: how far the last equilibrium before a fold lies from it
 SAME_PATH_VALUE = 0.03  # share of the first values below which a sample comes on one path
 SAME_PATH_WIDTH = 5.0  # times its width by which the ends of a bracket may lie apart on one path
 HALVINGS = 40  # until only one direction changes its stability
@@ -37,6 +39,7 @@ class Located(NamedTuple):
     before: PathEquilibrium  # on both sides
     behind: PathEquilibrium
     share: float  # of the way between the first two
+    within: tuple[PathEquilibrium, PathEquilibrium]  # the first two
 
 
 class _Sample(NamedTuple):
@@ -86,10 +89,16 @@ def locate(
     apart = largest_motion(problem, high.at.x - low.at.x)
     if width < 0.2 and apart > SAME_PATH_WIDTH * width * largest_motion(problem, last.x - first.x) + 1e-5:
         return None
-    return _interpolate(samples, low, high, SAME_PATH_VALUE * goal / close)
+    return _interpolate(samples, low, high, (first, last), SAME_PATH_VALUE * goal / close)
 
 
-def _interpolate(samples: list[_Sample], low: _Sample, high: _Sample, largest: float) -> Located | None:
+def _interpolate(
+    samples: list[_Sample],
+    low: _Sample,
+    high: _Sample,
+    within: tuple[PathEquilibrium, PathEquilibrium],
+    largest: float,
+) -> Located | None:
     """Return the place where the value vanishes by Lagrange's formula through the three smallest values."""
     near = sorted(samples, key=lambda sample: abs(sample.value))[:3]
     if abs(near[0].value) > largest:
@@ -102,15 +111,22 @@ def _interpolate(samples: list[_Sample], low: _Sample, high: _Sample, largest: f
     x = np.array(weights) @ np.array([sample.at.x for sample in near])
     drive = float(np.dot(weights, [sample.at.drive for sample in near]))
     share = float(np.dot(weights, [sample.share for sample in near]))
-    return Located(x, drive, near[0].at, low.at, high.at, share)
+    return Located(x, drive, near[0].at, low.at, high.at, share, within)
 
 
 def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
     """Return a function that vanishes where the number of unstable directions leaves that of an equilibrium."""
 
+    softest: Callable[..., Any] | None = getattr(problem, "softest", None)
+    mode: Any = None
+
     def value(at: PathEquilibrium) -> float:
-        size = abs(float(problem.modes(at, 1)[0][0]))
-        return size if at.unstable == reference.unstable else -size
+        nonlocal mode
+        if softest is not None:
+            size, mode = softest(at, mode)
+        else:
+            size = abs(float(problem.modes(at, 1)[0][0]))
+        return float(size if at.unstable == reference.unstable else -size)
 
     return value
 
@@ -141,6 +157,32 @@ def locate_stability_change(
         return correct(problem, hermite(first, last, drive), drive)
 
     return locate(problem, first, last, solve, stability_value(problem, first), CLOSE_TO_BIFURCATION)
+
+
+def relocate(
+    problem: ContinuationProblem, event: PathEvent, lift: Callable[[FloatArray], FloatArray], span: float
+) -> float | None:
+    """Return the drive of an event of a path on a finer mesh, into whose unknowns `lift` takes those of the path.
+
+    None if it is not there: the path is another then.
+    """
+    if event.kind == "limit point" and event.near is not None:
+        near = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
+        weights = arc_weights(problem, span)
+        place, along = np.append(near.x, near.drive), np.append(near.rate, 1.0)
+        row = weights * along / np.linalg.norm(along)
+        found = correct(problem, near.x, near.drive, Border(row, float(row @ place)))
+        return None if found is None else event.drive + found.drive - near.drive
+    if event.within is None:
+        return None
+    first, last = (correct(problem, lift(at.x), at.drive) for at in event.within)
+    if first is None or last is None:
+        return None
+    if (first.unstable, last.unstable) != tuple(at.unstable for at in event.within):
+        return None
+    # of several changes next to each other it is that to the stable side
+    located = locate_stability_change(problem, *((first, last) if event.before < event.after else (last, first)))
+    return None if located is None else located.drive
 
 
 def locate_stability_change_on_arc(problem: ContinuationProblem, move: ArcMove, span: float) -> Located | None:
@@ -175,5 +217,8 @@ def locate_fold(problem: ContinuationProblem, move: ArcMove, span: float) -> tup
     fold = locate(problem, move.old, move.new, solve, value, CLOSE_TO_FOLD)
     if fold is None:
         return None
+    just_before = solve(fold.share - JUST_BEFORE)
+    if just_before is not None and just_before.unstable == move.old.unstable and value(just_before) * value(move.old) > 0:
+        fold = fold._replace(before=just_before)
     past = solve(fold.share + 0.3 * (1 - fold.share))
     return fold, move.new.unstable if past is None or past.unstable == move.old.unstable else past.unstable

@@ -95,8 +95,7 @@ def _limits(walk: Walk) -> tuple[float, float]:
 def _guess(step: ArcMove, fold: Located | None, side: int, goal: float) -> FloatArray:
     """Return the unknowns at a drive within a step, before (0) or behind (1) a fold, where they go like a root."""
     if fold is None:
-        share = (goal - step.old.drive) / (step.new.drive - step.old.drive)
-        return np.asarray(step.old.x + share * (step.new.x - step.old.x))
+        return step.between(goal)
     end = step.new if side else step.old
     share = np.sqrt(abs((goal - fold.drive) / (end.drive - fold.drive)))
     return np.asarray(fold.x + share * (end.x - fold.x))
@@ -105,10 +104,10 @@ def _guess(step: ArcMove, fold: Located | None, side: int, goal: float) -> Float
 def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) -> Iterator[Point]:
     """Yield requested values within a step, on both sides of a fold in it, up to the last of a run."""
     turns = [step.old.drive, *([fold.drive] if fold else []), step.new.drive]
-    room = largest_motion(walk.problem, step.new.x - step.old.x)
+    room, targets = largest_motion(walk.problem, step.new.x - step.old.x), walk.targets[run.start : run.stop]
     for side, (low, high) in enumerate(itertools.pairwise(turns)):
-        inside = [j for j in run if (walk.targets[j] - low) * (walk.targets[j] - high) <= 0 and walk.targets[j] != low]
-        for number in sorted(inside, key=lambda j: abs(walk.targets[j] - low)):
+        inside = np.flatnonzero(((targets - low) * (targets - high) <= 0) & (targets != low))
+        for number in (run.start + inside[np.abs(targets[inside] - low).argsort(kind="stable")]).tolist():
             guess = _guess(step, fold, side, float(walk.targets[number]))
             at = correct(walk.problem, guess, float(walk.targets[number]))
             if at is not None and largest_motion(walk.problem, at.x - guess) <= room:

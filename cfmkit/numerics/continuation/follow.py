@@ -11,7 +11,7 @@ from cfmkit.numerics.continuation.branch_ends import find_passed_end
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
-from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.path import AT_EVENT, PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
 from cfmkit.numerics.continuation.steps import advance
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
     from cfmkit.numerics.continuation.steps import Trial
 
+NEARLY_CRITICAL = 1e-5  # stiffness of a mode; one a hundred times as large says that no bifurcation is very near
 LANDING = 1.3  # steps by which a step may be stretched to land on a requested value
 GROWTH, GOOD_MISFIT = 1.6, 0.1  # of the step, after predictions that good
 SHRINK, POOR_MISFIT = 0.8, 0.25
@@ -98,19 +99,40 @@ def _items(
             yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
             return
         walk = moved
-    march = getattr(problem, "march", None)
+    outcome = yield from _walk_on(walk)
+    if isinstance(outcome, PathStop):
+        yield outcome
+        return
+    yield from _look_ahead(outcome)
+    yield PathStop(WhyStopped.COMPLETE, outcome.here.drive)
+
+
+def _walk_on(walk: Walk) -> Generator[Point | PathEvent, None, Walk | PathStop]:
+    """Yield the points and events up to the last requested value; return the walk there, or why it ended before."""
+    march = getattr(walk.problem, "march", None)
     while not walk.done:
         if march is not None and walk.rejections == 0:
             walk = yield from _march(walk, march)
             if walk.done:
                 break
         outcome = yield from _step(walk)
-        if isinstance(outcome, PathStop):
-            yield outcome
-            return
-        assert outcome is not None
+        if outcome is None or isinstance(outcome, PathStop):
+            return outcome or PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}")
         walk = outcome
-    yield PathStop(WhyStopped.COMPLETE, walk.here.drive)
+    return walk
+
+
+def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
+    """Yield a bifurcation that the last requested value is at: it may be found only from a little further on."""
+    here, problem = walk.here, walk.problem
+    is_stiff = getattr(problem, "is_stiff", None)
+    if walk.before is None or (is_stiff is not None and is_stiff(here, NEARLY_CRITICAL)):
+        return
+    sense = 1.0 if here.drive >= walk.before.drive else -1.0
+    beyond = np.append(walk.targets, here.drive + sense * AT_EVENT * walk.options.span)
+    for item in _walk_on(replace(walk, targets=beyond, rejections=0)):
+        if isinstance(item, PathEvent) and item.kind == "bifurcation":
+            yield item
 
 
 def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[Point, None, Walk]:
@@ -172,11 +194,15 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         drive, near = (found.drive, found.near) if found else (new.drive, None)
         lost = new.unstable - here.unstable
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
-        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes)
+        within = found.within if found else None
+        yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes, within)
     elif walk.branch is not None:
         end = find_passed_end(walk, new)
         if end == "unsure":
             return replace(walk.shorten(0.5 * step), before=None)
+        if end is not None and lands and walk.turns_at(end.drive):
+            yield Point(new, walk.number, walk.branch)
+            return replace(walk, number=walk.number + 1, before=None)
         if end is not None:
             yield end
             walk = replace(walk, branch=None)

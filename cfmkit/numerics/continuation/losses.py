@@ -62,7 +62,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     modes, after = problem.modes(found.near, 1)[1], here.unstable + 1
     if options.branch == "primary":
         modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
-        yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes)
+        yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes, found.within)
         walk = yield from _reach_bifurcation(walk, found, far, slope)
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
@@ -77,7 +77,7 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
         if onto is not None:
             break
-    yield PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes)
+    yield PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes, found.within)
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
         return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
@@ -171,6 +171,9 @@ def start_critical(walk: Walk) -> Walk | None:
     Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
     """
     problem, start = walk.problem, walk.here
+    is_stiff = getattr(problem, "is_stiff", None)
+    if is_stiff is not None and is_stiff(start, CRITICAL):
+        return None
     values, modes = problem.modes(start, 1)
     if abs(values[0]) > CRITICAL:
         return None

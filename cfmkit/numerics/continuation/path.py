@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 
+AT_EVENT = 3e-7
+"""Share of the range within which a requested value at which the drive turns back is at an event: nothing happens."""
+
+
 class PathBranch(NamedTuple):
     """The branch that a path has been on since a bifurcation."""
 
@@ -36,8 +40,7 @@ class Options:
     cluster: float = 1e-3  # share of the range within which bifurcations may be one
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
+class Point(NamedTuple):
     """An equilibrium of a path."""
 
     at: PathEquilibrium
@@ -55,6 +58,7 @@ class PathEvent:
     after: int
     near: PathEquilibrium | None = None
     modes: Any = None  # (n, k) critical ones, if they were computed
+    within: tuple[PathEquilibrium, PathEquilibrium] | None = None  # equilibria on both sides, of one path
 
 
 class WhyStopped(Enum):
@@ -126,6 +130,13 @@ class Walk:
         """Return the walk with a shorter step after a rejected one."""
         keep = self.before is not None and step >= 0.25 * abs(self.here.drive - self.before.drive)
         return replace(self, step=step, before=self.before if keep else None, rejections=self.rejections + penalty)
+
+    def turns_at(self, drive: float) -> bool:
+        """Return True if the drive turns back at the next requested value and that lies at a drive."""
+        if self.number + 1 >= len(self.targets):
+            return False
+        goal, after = self.targets[self.number : self.number + 2]
+        return bool((after - goal) * self.sense < 0 and abs(goal - drive) <= AT_EVENT * self.options.span)
 
     def targets_up_to(self, drive: float) -> range:
         """Return the numbers of the next requested values up to a drive, as far as they go one way."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -39,6 +39,9 @@ class ContinuationProblem(Protocol):
     A mode is a direction in which the structure gives way, a column of n.
     """
 
+    def __hash__(self) -> int:
+        """Return a number for this very object."""
+
     @property
     def unit(self) -> FloatArray:
         """Natural sizes of the unknowns, (n,): 1 for motions."""
@@ -57,8 +60,7 @@ class ContinuationProblem(Protocol):
         """Return one combination of modes, with the same side whatever spans them."""
 
 
-@dataclass(frozen=True, eq=False)
-class PathEquilibrium:
+class PathEquilibrium(NamedTuple):
     """A converged place on a path."""
 
     x: FloatArray  # (n,)
@@ -75,6 +77,7 @@ class Border(NamedTuple):
     level: float
 
 
+@lru_cache(maxsize=2)
 def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
     """Return the weights of the squares of (x, drive) in the arc length, (n + 1,)."""
     return np.append(np.where(problem.motions, 1.0, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
-from cfmkit.elastica.outcome.sections import MOMENT, X, Y
+from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
+from cfmkit.elastica.results import beam_states
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.variables import Length, has_vanished_beam, lengths
 from cfmkit.numerics.quadrature import clenshaw_curtis
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
-    from cfmkit.elastica.sensitivity.output_derivatives import Gradient
+    from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+    from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
     from cfmkit.specs.evaluable_target_curve import TargetCurve
@@ -139,16 +140,16 @@ class RowsOfBeam:
     ----------
     place : (r,) array
         Fraction of the arc length.
+    fractions : (n,) array
+        The same places on each of its elements.
     row, index : (r,) array
         Which of the beam's rows, and of all rows, they are.
-    stress : (r,) array
-        Bending stress on the left side per dimensionless moment [Pa].
     """
 
     place: FloatArray
+    fractions: FloatArray
     row: Any
     index: Any
-    stress: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,30 +172,34 @@ class Response:
 
     @cached_property
     def rows(self) -> dict[str, RowsOfBeam]:
-        """How each beam is sampled; the ends of segments occur twice there, and once here."""
-        sampler, scales = self.path.sampler, self.path.layout.scales
-        found = {}
-        for number, (name, beam) in enumerate(self.variables.task.network.beams.items()):
-            rows = sampler.rows(number)
-            place = sampler.place(number, rows.t)
-            once = np.flatnonzero(np.append(True, np.diff(place) > 0))
-            index = rows.index[once]
-            stress = _stress_of_moment(beam.section, place[once]) * scales.moment
-            found[name] = RowsOfBeam(place[once], once, index, stress)
+        """How each beam is sampled; the ends of elements occur twice there, and once here."""
+        found, first = {}, 0
+        for name, states in self.states.items():
+            once = np.flatnonzero(np.append(True, np.diff(states.place) > 0))
+            found[name] = RowsOfBeam(states.place[once], self._fractions(name), once, first + once)
+            first += len(states.place)
         return found
+
+    def _fractions(self, beam: str) -> FloatArray:
+        elements = len(beam_states.elements_of(self.path.network, beam))
+        return np.linspace(0.0, 1.0, -(-_PLACES // elements) + 1)
+
+    @cached_property
+    def states(self) -> dict[str, beam_states.BeamStates]:
+        """States at all rows of every beam at the poses."""
+        path = self.path.take(self.keep)
+        return {name: beam_states.states(path.net, path.at, name, self._fractions(name)) for name in path.net.beams}
 
     @cached_property
     def state(self) -> NetworkAtPoses:
         """Force and beams."""
-        states, length = self.path.sampler.states[self.keep], self.path.layout.scales.length
         lines = {}
         for name, at in self.rows.items():
-            own = states[:, at.index]
-            pull = None
-            if self.variables.task.total_stress:
-                pull = self.path.sections(name).axial_stress[np.ix_(self.keep, at.row)]
-            x, y = own[..., X] * length, own[..., Y] * length
-            lines[name] = BeamAtPoses(at.place, x, y, own[..., MOMENT] * at.stress, pull)
+            states = self.states[name]
+            sections = beam_states.sections(self.path.net, name, states)
+            pull = sections.axial_stress[:, at.row] if self.variables.task.total_stress else None
+            bending = sections.bending_stress[:, at.row]
+            lines[name] = BeamAtPoses(at.place, states.x[:, at.row], states.y[:, at.row], bending, pull)
         return NetworkAtPoses(self.path.effort[self.keep] * self.variables.task.copies, lines)
 
     @cached_property
@@ -218,18 +223,34 @@ class Response:
         return self._gradient.effort * self.variables.task.copies
 
     def slopes_at(self, spots: Iterable[Spots]) -> SlopesAtSpots:
-        """Return the derivatives of the state at some spots: the engine computes them in segments of beams.
+        """Return the derivatives of the state at some spots.
 
         Raises
         ------
         NoAnswer
             Where the engine has none.
         """
-        sampler = self.path.sampler
-        wanted = np.zeros((len(self.keep), len(sampler.cut.segment_step) - 1), dtype=np.bool_)
-        for one in spots:
-            wanted[one.pose, one.row // sampler.per_segment] = True
-        return SlopesAtSpots(self, self._gradient, self._gradient.rows_of(wanted))
+        if any(len(one.row) for one in spots):
+            _ = self._gradient
+        return SlopesAtSpots(self)
+
+    def slopes_along(self, beam: str) -> tuple[FloatArray, ...]:
+        """Return the derivatives of x, y, bending and axial stress at all rows of a beam, (p, r, k) each."""
+        known = self._slopes.get(beam)
+        if known is None:
+            fractions = self._fractions(beam)
+
+            def output(net: Network, at: Equilibria) -> FloatArray:
+                states = beam_states.states(net, at, beam, fractions)
+                sections = beam_states.sections(net, beam, states)
+                return np.stack([states.x, states.y, sections.bending_stress, sections.axial_stress])
+
+            known = self._slopes[beam] = tuple(self._gradient.of(output))
+        return known
+
+    @cached_property
+    def _slopes(self) -> dict[str, tuple[FloatArray, ...]]:
+        return {}
 
 
 @dataclass(frozen=True)
@@ -242,35 +263,24 @@ class Spots:
 
 @dataclass(frozen=True, eq=False)
 class SlopesAtSpots:
-    """Derivatives of the state by the variables at the spots that they were requested for."""
+    """Derivatives of the state by the variables at spots on some beams."""
 
     response: Response
-    gradient: Gradient
-    found: FloatArray
 
     def of(self, what: str, spots: Spots) -> FloatArray:
         """Return the derivatives (n, k) of x, y, stress, or of the stress on the left or right (see `BeamAtPoses`)."""
-        if what in "xy":
-            return np.asarray(self._compiled(what, spots) * self.response.path.layout.scales.length)
-        bending = self._compiled("moment", spots) * self._stress[spots.row][:, None]
-        if what == "stress":
-            return np.asarray(bending)
-        axial = self.gradient.axial_stress_at(self.found, spots.pose, spots.row)
-        return np.asarray(axial + bending if what == "left" else axial - bending)
-
-    def _compiled(self, what: str, spots: Spots) -> Any:
-        return self.found[spots.pose, spots.row, _COMPILED[what]]
-
-    @cached_property
-    def _stress(self) -> FloatArray:
-        """Bending stress on the left side per dimensionless moment at all rows [Pa]."""
-        out = np.zeros(self.found.shape[1])
-        for rows in self.response.rows.values():
-            out[rows.index] = rows.stress
-        return out
-
-
-_COMPILED = {"moment": 1, "x": 2, "y": 3}  # components of `Gradient.rows_of`
+        found = np.empty((len(spots.row), len(self.response.x)))
+        first = 0
+        for name, states in self.response.states.items():
+            here = np.flatnonzero((spots.row >= first) & (spots.row < first + len(states.place)))
+            if len(here):
+                x, y, bending, axial = (
+                    part[spots.pose[here], spots.row[here] - first] for part in self.response.slopes_along(name)
+                )
+                by = {"x": x, "y": y, "stress": bending, "left": axial + bending, "right": axial - bending}
+                found[here] = by[what]
+            first += len(states.place)
+        return found
 
 
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
@@ -287,16 +297,7 @@ def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response 
         return None
     if path.status is not PathStatus.COMPLETE:
         return None
-    return Response(variables, x.copy(), path.sampled(-(-_PLACES // path.solver.mesh.segments)))
-
-
-def _stress_of_moment(section: Section, place: FloatArray) -> FloatArray:
-    """Return the bending stress at the surface per moment, 6 / (width thickness^2), at places along a beam [1/m3]."""
-    given = section.thickness
-    thickness = (
-        np.interp(place, given.stations, given.values) if isinstance(given, Taper) else np.full(len(place), given)
-    )
-    return np.asarray(6.0 / (section.width * thickness**2))
+    return Response(variables, x.copy(), path)
 
 
 @dataclass(frozen=True, eq=False)

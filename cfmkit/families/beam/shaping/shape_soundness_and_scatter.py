@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import Control, Displacement, PathStatus, trace
-from cfmkit.elastica.continuation.batch import trace_many
+from cfmkit.elastica.tracing.trace_many import trace_many
 from cfmkit.families.beam.network_from_spec import thickest_of
 from cfmkit.families.beam.shaping.limits import pairs
 

@@ -20,10 +20,9 @@ import numpy as np
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
-from cfmkit.elastica.equilibrium.network_solver import Points
-from cfmkit.elastica.kernels.status_codes import REQUESTED
-from cfmkit.elastica.outcome.between_points import between_points
-from cfmkit.elastica.sensitivity.neighbour import neighbouring
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.results.between_points import between_points
+from cfmkit.elastica.results.neighbour import neighbouring
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, kink, mirrored
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.elastica.equilibrium.network_solver import Spot
+    from cfmkit.elastica.mechanics.equations import MarchState
 
 
 FIRST_STEP = 1e-5
@@ -289,61 +288,45 @@ def _from_its_limit(path: Path, missing: FloatArray) -> Path:
     found = _followed_back(path)
     if not found:
         return path
-    back = Points.none(path.solver.size).joined(*(Points.of(spot, -1) for spot in reversed(found)))
-    longer = _with_points_before(path, back)
+    free, drive = np.array([spot.free for spot in found[::-1]]), np.array([spot.way for spot in found[::-1]])
+    back = path.with_states(np.zeros(len(found), np.int64), free, drive)
+    longer = back.joined(path)
     between, places = between_points(longer), missing[missing > longer.drive[0]]
     if between is None:
         return path
-    more = between.at(places)
-    number = len(missing) - len(places)
-    info = np.concatenate([back.info, more.points.info])
-    info[0, REQUESTED], info[len(back) :, REQUESTED] = number - 1, np.arange(number, len(missing))
-    drives, y = np.concatenate([back.drive, more.points.drive]), np.concatenate([back.y, more.points.y])
-    kept = np.concatenate([np.ones(len(back), dtype=bool), more.accurate])
-    order = [k for k in np.argsort(drives, kind="stable").tolist() if kept[k]]
-    return _with_points_before(path, Points(y[order], drives[order], info[order]))
+    number, more = len(missing) - len(places), between.at(places)
+    requested = np.full(len(back), -1)
+    requested[0] = number - 1
+    back = replace(back, requested=read_only(requested, np.int64))
+    more = replace(more, requested=read_only(np.arange(number, len(missing)), np.int64)).take(more.accurate)
+    before = back.joined(more)
+    return before.take(np.argsort(before.at.drive, kind="stable")).joined(path)
 
 
-def _followed_back(path: Path) -> list[Spot]:
+def _followed_back(path: Path) -> list[MarchState]:
     """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
-    solver, y, drive = path.solver, path.points.y[0], float(path.points.drive[0])
-    beside = solver.solve(y, drive * (1.0 + BESIDE))  # tells the slope
+    own, y, drive = equations(path.network), path.free[0], float(path.at.drive[0])
+    beside = own.solve(y, drive * (1.0 + BESIDE))  # tells the slope
     if beside is None:
         return []
-    before, last, step = beside.y, beside.drive, BESIDE * drive
-    unstable, found = int(path.points.unstable[0]), []
-    while step > NEAR_LIMIT * path.points.drive[0]:
+    before, last, step = beside.free, beside.way, BESIDE * drive
+    unstable, found, moves = int(path.unstable[0]), [], np.isinf(own.unit)
+    while step > NEAR_LIMIT * path.at.drive[0]:
         guess = y + (y - before) * (step / (last - drive))
-        spot = solver.solve(guess, drive - step)
-        off = np.inf if spot is None else np.abs(spot.y - guess).max()
-        if spot is None or spot.unstable > unstable or off > ASTRAY * np.abs(guess - y).max():
+        spot = own.solve(guess, drive - step)
+        off = np.inf if spot is None else np.abs(spot.free - guess)[moves].max()
+        if spot is None or spot.unstable > unstable or off > ASTRAY * np.abs(guess - y)[moves].max():
             step *= 0.5
             continue
-        y, before, drive, last = spot.y, y, spot.drive, drive
+        y, before, drive, last = spot.free, y, spot.way, drive
         found.append(spot)
         step = min(2.0 * step, 0.5 * drive)
     return found
 
 
-def _with_points_before(path: Path, points: Points) -> Path:
-    """Return a path with more points before its first."""
-    return replace(
-        path,
-        points=points.joined(path.points),
-        branch=np.concatenate([np.repeat(path.branch[:1], len(points)), path.branch]),
-        accurate=read_only(np.concatenate([np.ones(len(points), dtype=bool), path.accurate]), np.bool_),
-    )
-
-
 def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
     """Return some of the points of a path."""
-    return replace(
-        path,
-        points=path.points.take(keep),
-        branch=path.branch[keep],
-        accurate=path.accurate[keep],
-        status=PathStatus.COMPLETE,
-    )
+    return replace(path.take(keep), status=PathStatus.COMPLETE)
 
 
 def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
@@ -386,7 +369,7 @@ def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
 
 def _line(path: Path, index: int) -> FloatArray:
     """Return the line of a chain from its anchor to its slider, (n, 2) [m]."""
-    shapes = [path.shape(name, index) for name in path.layout.network.beams]
+    shapes = [path.shape(name, index) for name in path.net.beams]
     line: FloatArray = np.concatenate(shapes)
     return line
 

@@ -130,10 +130,10 @@ def part(result: Result) -> Figure:
 def _shapes(solution: Solution, index: int) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield centre lines and half thicknesses from the ground to the slider at one point of the path [m]."""
     path = solution.pressed.path
-    names, last = list(path.layout.network.beams), None
+    names, last = list(path.net.beams), None
     for name in names:
         points = path.shape(name, index)
-        thickness = path.layout.network.beams[name].section.thickness
+        thickness = path.net.beams[name].section.thickness
         place = path.places(name)
         if isinstance(thickness, float):
             half = np.full(len(points), 0.5 * thickness)
@@ -159,7 +159,7 @@ def _body(ax: Axes, points: FloatArray, half: FloatArray, solid: bool) -> None:
 
 def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along: float) -> FloatArray:
     """Return the point of a drawn shape at a length along the unloaded part [m]."""
-    names = list(solution.pressed.path.layout.network.beams)
+    names = list(solution.pressed.path.net.beams)
     if names == [STRIP]:
         points = shape[0][0]
         return np.asarray(points[round(along / _length(solution.chain.points) * (len(points) - 1))])

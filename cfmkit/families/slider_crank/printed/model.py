@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.elastica.outcome.between_points import between_points
+from cfmkit.elastica.results.between_points import between_points
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.findings import finding

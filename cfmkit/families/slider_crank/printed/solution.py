@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.arrays import ShortRepr
-from cfmkit.elastica.outcome.member_efforts import effort_error
+from cfmkit.elastica.results.member_efforts import effort_error
 from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.equilibrium_path import PressingEnd
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP
@@ -260,7 +260,7 @@ class Solution(ShortRepr):
         """Return places on beams as lengths along the chain [m]."""
         points = self.chain.points
         marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        names = list(self.pressed.path.layout.network.beams)
+        names = list(self.pressed.path.net.beams)
         if names == [STRIP]:
             return np.asarray(shares * marks[-1])
         first = {name: (marks[2 * k], marks[2 * k + 1]) for k, name in enumerate(names)}
@@ -308,7 +308,7 @@ class Solution(ShortRepr):
     def width_ratio(self) -> float:
         """Smallest width over thickness."""
         ratios = []
-        for beam in self.pressed.path.layout.network.beams.values():
+        for beam in self.pressed.path.net.beams.values():
             section = beam.section
             thickest = float(
                 np.max(section.thickness if isinstance(section.thickness, float) else section.thickness.values)
@@ -320,7 +320,7 @@ class Solution(ShortRepr):
     def thinnest(self) -> float:
         """Smallest thickness [m]."""
         values = []
-        for beam in self.pressed.path.layout.network.beams.values():
+        for beam in self.pressed.path.net.beams.values():
             given = beam.section.thickness
             values.append(float(np.min(given if isinstance(given, float) else given.values)))
         return min(values)

@@ -27,8 +27,8 @@ import numpy as np
 
 from cfmkit.designing.objective_and_constraints import DesignProgram, LimitRows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
-from cfmkit.elastica.outcome.largest_stress_along_beam import STENCIL
-from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.results.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.results.path import N_PLACES
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.printed.equilibrium_path import FIRST_STEP
 from cfmkit.families.slider_crank.printed.flexures_as_beam_network import SLIDER, STRIP, Strip, spread
@@ -397,6 +397,9 @@ def _traced(network: Network, drive: Displacement) -> Path | None:
 LAST, BETWEEN = 4, 13
 """Points at which the stress is computed, the last ones, and places from the first to the last of them."""
 
+STENCIL = 9
+"""Samples of a polynomial: more of them, evenly spaced, swing beyond its ends."""
+
 _NODES = np.arange(float(STENCIL))
 
 _SLOPE = differentiation(_NODES)
@@ -439,10 +442,10 @@ def watched(path: Path, spots: FloatArray) -> Watched:
         Places of these points in a variable in which the stress is smooth.
     """
     sections, last = path.sections(STRIP), path.at_requested[-LAST:]
-    beam = path.layout.network.beams[STRIP]
+    beam = path.net.beams[STRIP]
     breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]
-    place = sections.place[0].reshape(-1, path.sampler.per_segment)
+    place = sections.place[0].reshape(-1, N_PLACES)
     tops = [_tops(sections.bending_stress[k], sections.axial_stress[k], place, breaks) for k in last]
     between = interpolation(spots[-LAST:], np.linspace(spots[-LAST], spots[-1], BETWEEN))
     return Watched(np.array([one[0] for one in tops]), np.array([one[1] for one in tops]), between)

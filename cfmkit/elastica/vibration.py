@@ -16,33 +16,34 @@ References
 ----------
 [Me] L. Meirovitch, Principles and Techniques of Vibrations (1997): the eigenvalue problem.
 [Re] E. Reissner, J. Math. Phys. 29 (1950) 90: the mixed functional.
+[Be] M. Beck, Z. angew. Math. Phys. 3 (1952) 225: the column under a force that turns with its end.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isfinite
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from cfmkit.arrays import read_only
+from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.refine import embed, raise_degree
 from cfmkit.elastica.model.drive import Loading
-from cfmkit.elastica.vibration.natural_frequencies import Frequencies
 from cfmkit.errors import InputError
 from cfmkit.numerics.one_blas_thread import one_blas_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
-    from cfmkit.elastica.vibration.network_masses_type import NetworkMasses
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
@@ -54,6 +55,57 @@ NEUTRAL = 1e-9  # share of the shift within which the square of a frequency is z
 ROUNDING = 1e-10  # share of the largest flexibility below which a negative one is none
 COMPLEX_SHARE = 1e-5  # imaginary part of a square of a frequency from which on two have met, of its size
 N_RESOLVED = 3  # so many times the modes wanted are examined for flutter
+
+
+@dataclass(frozen=True)
+class NetworkMasses:
+    """Masses of a network.
+
+    Parameters
+    ----------
+    density : mapping
+        Of every beam, by its name [kg/m^3].
+    nodes : mapping
+        Mass [kg] and moment of inertia [kg m^2] of what is fixed to nodes, by their names.
+    """
+
+    density: Mapping[str, float]
+    nodes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze and check the values."""
+        for name, value in self.density.items():
+            if not (value > 0 and isfinite(value)):
+                raise InputError(f"the density of beam {name!r} must be positive, got {value}")
+        for name, values in self.nodes.items():
+            if not all(value >= 0 and isfinite(value) for value in values):
+                raise InputError(f"mass and inertia of node {name!r} must not be negative, got {values}")
+        object.__setattr__(self, "density", MappingProxyType(dict(self.density)))
+        object.__setattr__(self, "nodes", MappingProxyType(dict(self.nodes)))
+
+
+@dataclass(frozen=True, repr=False)
+class Frequencies(ShortRepr):
+    """Natural frequencies of a network about some equilibria.
+
+    Attributes
+    ----------
+    points : (p,) int array
+        Indices of the points of the path.
+    held, free : (p, n) arrays
+        The lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has no stiffness;
+        nan where the pose is unstable, and where a network has fewer.
+    flutters, diverges : (p,) bool arrays
+        Whether loads that turn with their node make motions grow that swing, or that do not: two squares of
+        frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if it is a load.
+        Other networks do not flutter, and whether they diverge is reported by the path.
+    """
+
+    points: Any
+    held: FloatArray
+    free: FloatArray
+    flutters: Any
+    diverges: Any
 
 
 @one_blas_thread

@@ -9,22 +9,22 @@ Assumes: points so dense that the path goes once through each of these planes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from cfmkit.arrays import distinct, read_only
-from cfmkit.elastica.equilibrium.network_solver import Points
-from cfmkit.elastica.outcome.between_points import FEWEST, LEAST, ROUNDS, STRAY
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.results.between_points import FEWEST, LEAST, ROUNDS, STRAY
 from cfmkit.numerics.cubic_interpolation import inner_extremes, values_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.outcome.path import Path
+    from cfmkit.elastica.results.path import EquilibriumPath
 
 
 class Observed(Protocol):
@@ -53,14 +53,14 @@ class AlongTheWay:
 
     Attributes
     ----------
-    path : Path
+    path : EquilibriumPath
         Of at least four accurate points.
     observe : callable
         Returns what is looked at on equilibria of this network.
     """
 
-    path: Path
-    observe: Callable[[Path], Observed]
+    path: EquilibriumPath
+    observe: Callable[[EquilibriumPath], Observed]
 
     @cached_property
     def _seen(self) -> Observed:
@@ -124,35 +124,34 @@ class AlongTheWay:
         stress[between] = np.where(there.accurate, self.observe(there).stress, stress[between])
         return np.asarray(stress.reshape(np.shape(ways)))
 
-    def at(self, ways: FloatArray) -> Path:
+    def at(self, ways: FloatArray) -> EquilibriumPath:
         """Return the equilibria at places of the way (n,); `accurate` is False where none was found."""
-        path, points = self.path, self.path.points
+        path, known_y, known_drive = self.path, self.path.free, self.path.at.drive
+        own = equations(path.network)
         left = np.clip(ways.astype(np.int64), 0, len(path) - 2)
         share = ways - left
         y, drive = self._guesses(left, share)
         near = np.where(share > 0.5, left + 1, left)
         known = (share == 0.0) | (share == 1.0)
-        y[known], drive[known] = points.y[near[known]], points.drive[near[known]]
+        y[known], drive[known] = known_y[near[known]], known_drive[near[known]]
         found = known.copy()
         for number in np.flatnonzero(~known).tolist():
             at = int(left[number])
             step = self._places[at + 1] - self._places[at]
             border = step * self._metric
             goal = float(border @ (self._places[at] + share[number] * step))
-            spot = path.solver.solve(y[number], float(drive[number]), border, goal)
-            if spot is None or spot.unstable not in points.unstable[at : at + 2].tolist():
+            spot = own.solve(y[number], float(drive[number]), border, goal)
+            if spot is None or spot.unstable not in path.unstable[at : at + 2].tolist():
                 continue
-            moved = _largest(path, spot.y - y[number])
-            if moved <= max(LEAST, STRAY * _largest(path, points.y[at + 1] - points.y[at])):
-                y[number], drive[number], found[number] = spot.y, spot.drive, True
-        solved = Points(y, drive, points.info[near])
-        return replace(path, points=solved, branch=path.branch[near], accurate=read_only(found, np.bool_))
+            moved = _largest(path, spot.free - y[number])
+            if moved <= max(LEAST, STRAY * _largest(path, known_y[at + 1] - known_y[at])):
+                y[number], drive[number], found[number] = spot.free, spot.way, True
+        return path.with_states(near, y, drive, found)
 
     @cached_property
     def _places(self) -> FloatArray:
         """Free unknowns and drive of every point, (n, free + 1)."""
-        points = self.path.points
-        return np.column_stack([points.y[:, : self.path.solver.n], points.drive])
+        return np.column_stack([self.path.free, self.path.at.drive])
 
     @cached_property
     def _metric(self) -> FloatArray:
@@ -178,7 +177,7 @@ class AlongTheWay:
         """Return the polynomials through up to four points of the branch at shares of the way behind some points."""
         near = np.where(share > 0.5, left + 1, left)
         arc = self.arc[left] + share * (self.arc[left + 1] - self.arc[left])
-        rows = np.column_stack([self.path.points.y, self.path.points.drive])
+        rows = self._places
         found = np.empty((len(left), rows.shape[1]))
         for number in distinct(self._stretch[near]).tolist():
             own, here = self._stretch == number, self._stretch[near] == number
@@ -186,13 +185,12 @@ class AlongTheWay:
         return found[:, :-1].copy(), found[:, -1].copy()
 
 
-def _largest(path: Path, change: FloatArray) -> float:
+def _largest(path: EquilibriumPath, change: FloatArray) -> float:
     """Return the largest change of positions and rotations in a change of the unknowns."""
-    solver = path.solver
-    inner = np.abs(change[solver.n :].reshape(solver.n_segments, 6)[:, :3])
-    return float(max(inner.max(initial=0.0), np.abs(change[: solver.n_free]).max(initial=0.0)))
+    network = path.network
+    return float(np.abs(change[network.free < network.n_motions]).max(initial=0.0))
 
 
-def along_the_way(path: Path, observe: Callable[[Path], Observed]) -> AlongTheWay | None:
+def along_the_way(path: EquilibriumPath, observe: Callable[[EquilibriumPath], Observed]) -> AlongTheWay | None:
     """Return a path at every place of its way; None of one that is too short, or misses its tolerance."""
     return AlongTheWay(path, observe) if len(path) >= FEWEST and np.all(path.accurate) else None

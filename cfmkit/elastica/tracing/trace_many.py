@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.continuation.trace_to_tolerance import trace
+from cfmkit.elastica.tracing.trace_by_energy import trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Control, Drive
     from cfmkit.elastica.model.network import Network
-    from cfmkit.elastica.outcome.path import Path
+    from cfmkit.elastica.results.path import Path
 
 _CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that are on their way
 

@@ -1,1 +1,0 @@
-"""Equilibrium on a mesh: segments and steps, unknowns, single solutions and marches."""

@@ -1,0 +1,49 @@
+"""How the beams of a network are fitted between their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.model.beam import Fit, fit
+from cfmkit.elastica.model.plain_beams_at_once import Bundle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.elastica.model.network import Network
+
+
+def beam_end_at(network: Network, name: str, side: int) -> tuple[Any, Any]:
+    """Return where the first (0) or the last (1) end of a beam is before any load [m]."""
+    beam = network.beams[name]
+    node = network.nodes[(beam.start, beam.end)[side]]
+    offset = (beam.start_offset, beam.end_offset)[side]
+    return node.x + offset[0], node.y + offset[1]
+
+
+class BeamFits(Mapping[str, Fit]):
+    """How each beam is fitted between its nodes, by its name, as they are requested."""
+
+    def __init__(self, network: Network) -> None:
+        """Fit the plain beams, all at once."""
+        ends = np.array([beam_end_at(network, name, side) for name in network.beams for side in (0, 1)])
+        self.network, self.bundle = network, Bundle(network, ends, np.arange(len(ends)).reshape(-1, 2))
+        self._known: dict[str, Fit] = {}
+
+    def __getitem__(self, name: str) -> Fit:
+        """Return the fit of a beam."""
+        if name not in self._known:
+            (xa, ya), (xb, yb) = (beam_end_at(self.network, name, side) for side in (0, 1))
+            self._known[name] = self.bundle.fit_of(name) or fit(self.network.beams[name], (xb - xa, yb - ya))
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self.network.beams)
+
+    def __len__(self) -> int:
+        """Return the number of beams."""
+        return len(self.network.beams)

@@ -1,0 +1,49 @@
+"""The node that a drive by a motion moves, and along which of its axes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica.model.drive import Loading, Rotation
+from cfmkit.elastica.model.network import same_direction
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network
+
+
+def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
+    """Return node, local degree of freedom and sense of what a drive moves; None for loads.
+
+    The local number is 0, 1 or 2 in the frame of the node's support, or 3 where the frame turns along the drive.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the node is moved by a link, or held where it is to move.
+    """
+    if isinstance(drive, Loading):
+        return None
+    if drive.node not in network.nodes or network.moved(drive.node):
+        known = ", ".join(name for name in network.nodes if not network.moved(name))
+        raise InputError(f"{drive.node!r} cannot be driven: nodes that are not moved by a link are {known}")
+    support = network.nodes[drive.node].support
+    if isinstance(drive, Rotation):
+        if support.rotation:
+            raise InputError(f"node {drive.node!r} cannot be turned: its rotation is held")
+        return drive.node, 2, 1.0
+    if not support.along and not support.across:
+        return drive.node, 3, 1.0
+    for held, other, offset, turn in (
+        (support.along, support.across, 0, 0.0),
+        (support.across, support.along, 1, np.pi / 2),
+    ):
+        if not held and other and same_direction(drive.direction, support.direction + turn):
+            along = math.cos(drive.direction.real - support.direction.real - turn)
+            return drive.node, offset, math.copysign(1.0, along)
+    direction = np.degrees(np.real(drive.direction))
+    raise InputError(f"node {drive.node!r} cannot be moved along {direction:.6g} deg: it is held")

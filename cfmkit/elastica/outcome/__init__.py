@@ -1,1 +1,0 @@
-"""What is known of a path of equilibria: motions, reactions, section forces, stresses."""

@@ -1,0 +1,72 @@
+"""By how much the curling of wide beams would stiffen a network that was solved without it.
+
+Assumes: curvatures are those of the solution, ends curl as freely as the middle does. The law, and its reference:
+`cfmkit.elastica.mechanics.wide_strip`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.polynomials import basis
+from cfmkit.elastica.model.section import curl_hindered, curling
+from cfmkit.elastica.results.beam_states import element_states, elements_of
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.results.path import EquilibriumPath
+
+_ROUNDING = 1e-24  # share of the largest energy below which there is none: squares of rounded moments
+
+_STEP = 1e-30
+"""Of a complex step: nothing is subtracted, so that its square may vanish beside one."""
+
+
+@dataclass(frozen=True)
+class HinderedCurling:
+    """What beams that are wide, but solved as narrow ones, are too soft by.
+
+    Attributes
+    ----------
+    share : (n,) array
+        Of the strain energy of bending of all beams, at every point [1].
+    beam : (n,) array of str
+        The beam that is too soft by most of that.
+    """
+
+    share: FloatArray
+    beam: Any
+
+
+def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
+    """Return by what share the energy of bending would be larger at every point of a path, if curling is hindered.
+
+    To first order that is the share of the force that is missing, too. Beams that are solved as wide strips miss
+    nothing.
+    """
+    network, names = path.network, list(path.net.beams)
+    places = basis(network.degree).places
+    energies, lost = (np.zeros((len(names), len(path))) for _ in range(2))
+    for number, name in enumerate(names):
+        section, fitted = path.net.beams[name].section, network.fits[name]
+        for element in elements_of(network, name):
+            found = element_states(path.net, path.at, name, element, places)
+            left, right = network.elements.cuts[element]
+            t, inside = left + (right - left) * places, 0.5 * (left + right)
+            rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))
+            rigidity = section.youngs_modulus * section.width * found.thickness**3 / 12
+            weights = network.elements.weight[element] * network.scales.length
+            density = 0.5 * found.moment**2 / rigidity * weights
+            energies[number] += density.sum(axis=1)
+            if not section.wide:
+                curl, plate = curling(section.width, found.thickness, section.poisson_ratio)
+                hindered = plate * curl_hindered(curl * (rest + found.moment / rigidity) ** 2)
+                lost[number] += (density * hindered).sum(axis=1)
+    total = energies.sum(axis=0)
+    bent = total > _ROUNDING * total.max(initial=0.0)
+    share = np.where(bent, lost.sum(axis=0) / np.where(bent, total, 1.0), 0.0)
+    return HinderedCurling(read_only(share), read_only(np.array(names)[lost.argmax(axis=0)], np.str_))

@@ -1,0 +1,117 @@
+"""How accurate the effort of a drive is, and what single beams and springs contribute to it along a path.
+
+The nodes do work on a member while the path goes on: on a beam with the forces on its two ends, on a spring by the
+change of its energy. Per unit of the drive's motion that is the member's effort; those of all members together, less
+what the loads do, are the effort of the drive.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.mechanics.terms import TERMS
+from cfmkit.elastica.results.path import largest_force
+from cfmkit.results import ROUND_OFF
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.discretise import Discretisation
+    from cfmkit.elastica.results.path import EquilibriumPath
+
+STEP = 1e-6
+"""Of the largest unknown along the path, to either side: the motion's difference is off by 1e-10."""
+
+ROUNDING = 30 * np.finfo(float).eps
+"""Share of the stiffest element's force for a unit motion that rounding of places leaves, with room."""
+
+
+def stiffest(network: Discretisation) -> float:
+    """Return the largest force on the end of an element that is moved by a unit length, dimensionless."""
+    e = network.elements
+    stretch = np.where(network.floored, 0.0, (e.weight * e.axial).sum(axis=1))
+    bent = 12.0 / (e.weight / e.rigidity).sum(axis=1)
+    return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
+
+
+def effort_error(path: EquilibriumPath, tolerance: float) -> float:
+    """Return the numerical error of a path's effort [N or N m] under a drive by a motion.
+
+    That is the estimated error of the forces, and what rounding makes of them: `ROUND_OFF` of the largest force in the
+    network, and `ROUNDING`.
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        With points.
+    tolerance : float
+        That its accurate points reach, relative to the largest force [1].
+    """
+    scales = path.network.scales
+    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + ROUNDING * stiffest(path.network)
+    return error * scales.moment / scales.drive
+
+
+def largest_member_efforts(
+    path: EquilibriumPath, points: Any, motion: Callable[[EquilibriumPath], FloatArray]
+) -> FloatArray:
+    """Return the largest effort of one beam or spring at points of a path, (k,) [N or N m].
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        The equilibria.
+    points : (k,) int array
+        Indices of points.
+    motion : callable
+        Returns the motion of the drive at the points of a path, (k,) [m or rad].
+    """
+    here = path.take(points)
+    free, drive = _ways(here)
+    ahead, behind = (
+        here.with_states(np.arange(len(here)), here.free + step * free, here.at.drive + step * drive)
+        for step in (STEP, -STEP)
+    )
+    with np.errstate(all="ignore"):
+        efforts = _works(here, free, drive) / ((motion(ahead) - motion(behind)) / (2 * STEP))
+    sizes = np.abs(efforts)
+    return np.asarray(sizes.max(axis=0, initial=0.0, where=np.isfinite(sizes)))
+
+
+def _ways(path: EquilibriumPath) -> tuple[FloatArray, FloatArray]:
+    """Return the directions of a path at its points, (n, free) and (n,): their largest motion or drive is one."""
+    own, moves = equations(path.network), path.network.free < path.network.n_motions
+    free, drive = np.empty_like(path.free), np.empty(len(path))
+    for k, (y, at) in enumerate(zip(path.free, path.at.drive.tolist(), strict=True)):
+        equation = own.linearise(y, at)
+        try:
+            rate = np.linalg.solve(equation.tangent, -equation.change)
+        except np.linalg.LinAlgError:  # at a bifurcation, or where a force is open
+            rate = np.linalg.lstsq(equation.tangent, -equation.change)[0]
+        size = max(1.0, float(np.abs(rate[moves]).max(initial=0.0)))
+        free[k], drive[k] = rate / size, 1.0 / size
+    return free, drive
+
+
+def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatArray:
+    """Return the work done on each beam, then on each spring, for a unit step of the way, (members, points) [J].
+
+    The gradient of a member's own energy times the motion of its ends: inside a beam it is in equilibrium.
+    """
+    network, names = path.network, list(path.net.beams)
+    z = drive[:, None] * network.rate
+    z[:, network.free] = free
+    found = np.zeros((len(names) + len(network.springs), len(path)))
+    beam = np.array([names.index(name) for name in network.elements.beam])
+    for k, (state, at) in enumerate(zip(path.at.z, path.at.drive.tolist(), strict=True)):
+        own, _ = energy.element_gradients(network, state, at, 1.0)
+        np.add.at(found[:, k], beam, (own * z[k][network.elements.unknowns]).sum(axis=1))
+        for number, spring in enumerate(network.springs):
+            part = TERMS[type(spring.item)](network, spring, state, 1.0, at)
+            found[len(names) + number, k] = part.gradient @ z[k][part.unknowns]
+    return found * network.scales.moment

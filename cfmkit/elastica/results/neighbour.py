@@ -1,0 +1,116 @@
+"""Equilibria of a network that differs little from one whose path is known: solved from there, not from rest.
+
+An optimiser's next design, or a branch that cannot be reached from rest, is found this way. Every point is judged by
+itself: what moved too far, or is less stable, counts as not found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria
+from cfmkit.elastica.mechanics.discretise import discretise_alike
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.results.path import PathStatus
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.results.path import EquilibriumPath
+
+
+def neighbouring(path: EquilibriumPath, network: Network, drive: Drive, largest_turn: float = 0.5) -> EquilibriumPath:
+    """Return the equilibria of `network` nearest to those of a path, one for each point of the drive.
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        Of a network with the same nodes, beams, corners and stations; its requested points correspond to those of
+        the drive, one by one.
+    network : Network
+        The other network.
+    drive : Displacement, Rotation or Loading
+        As many points as were requested and reached.
+    largest_turn : float
+        Largest change of a rotation, or of a position in mean beam lengths, from the known point [rad].
+
+    Returns
+    -------
+    EquilibriumPath
+        The points found, on the elements of the known path. LOST, with the first place, if any is missing.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the two networks are not of one kind, or the numbers of points differ.
+    """
+    arrays, known = discretise_alike(path.network, network, drive), path.at_requested
+    if not np.array_equal(arrays.free, path.network.free) or len(known) != len(drive.points):
+        raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
+    own, moves = equations(arrays), arrays.free < arrays.n_motions
+    guesses, wanted = path.free[known], drive.points / arrays.scales.drive
+    kept, states = [], []
+    for number, (guess, way) in enumerate(zip(guesses, wanted.tolist(), strict=True)):
+        state = own.solve(guess, way)
+        if state is None or state.unstable > int(path.unstable[known[number]]):
+            continue
+        if float(np.abs((state.free - guess)[moves]).max(initial=0.0)) <= largest_turn:
+            kept.append(number)
+            states.append(state.free)
+    status, message = PathStatus.COMPLETE, PathStatus.COMPLETE.value
+    missing = sorted({*range(len(wanted))} - {*kept})
+    if missing:
+        status, message = PathStatus.LOST, f"no equilibrium near the known one at {drive.points[missing[0]]:.6g}"
+    z: Any = arrays.base + wanted[kept, None] * arrays.rate
+    z[:, arrays.free] = np.array(states).reshape(len(kept), len(arrays.free))
+    return replace(
+        path,
+        net=network,
+        given=drive,
+        at=Equilibria(arrays, z, wanted[kept]),
+        unstable=read_only(path.unstable[known[kept]], np.int64),
+        requested=read_only(kept, np.int64),
+        branch=read_only(np.repeat("neighbour", len(kept)), np.str_),
+        status=status,
+        message=message,
+        events=(),
+        accurate=read_only(np.ones(len(kept), dtype=bool), np.bool_),
+        imperfection="",
+    )
+
+
+def drive_slope(path: EquilibriumPath, indices: Any = None) -> FloatArray:
+    """Return the derivative of the effort by the drive at points of a path [N/m, or N m/rad].
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        Under a displacement or rotation of a node.
+    indices : sequence of int, optional
+        Points; all those requested by default.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If loads drive, or a point is not an equilibrium.
+    """
+    if isinstance(path.given, Loading):
+        raise InputError("the slope of the effort needs a displacement or a rotation as the drive")
+    network, slopes = path.network, []
+    own, unit = equations(network), network.scales.moment / network.scales.drive**2
+    for index in (path.at_requested if indices is None else np.asarray(indices)).tolist():
+        drive = float(path.at.drive[index])
+        state = own.solve(path.free[index], drive)
+        if state is None:
+            raise InputError("the slope of the effort needs converged points")
+        moved = state.free + 1j * COMPLEX_STEP * state.rate
+        slopes.append(float(own.gradient(moved, drive + 1j * COMPLEX_STEP).imag @ network.rate) / COMPLEX_STEP)
+    return read_only(np.array(slopes) * unit)

@@ -1,0 +1,241 @@
+"""Exact derivatives of a path's outputs by design variables: complex steps of the function that builds the network.
+
+At an equilibrium the gradient of the functional vanishes, so that its unknowns change by dz/dx = -K^-1 d(grad P)/dx;
+what an output depends on besides has a complex step already, and is differentiated by computing it. Efforts of a drive
+by a motion need no solution: the slope of the path is the adjoint (`cfmkit.elastica.mechanics.design_derivatives`).
+Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
+and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
+
+SI, variables last; each output is computed when it is first needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.mechanics import energy
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria, effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.designs import design_of, set_up
+from cfmkit.elastica.mechanics.discretise import discretise_alike
+from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
+from cfmkit.elastica.mechanics.march import equations
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.results import beam_states, stress_extremes
+from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.mechanics.designs import NetworkDesigns
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.results.path import EquilibriumPath
+
+    Output = Callable[[Network, Equilibria], Any]
+
+SINGULAR = "the tangent is singular at a point of the path: no derivative there"
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivatives at p chosen points of a path by k design variables."""
+
+    path: EquilibriumPath  # the path that was differentiated
+    points: Any  # (p,) indices of the points
+    designs: NetworkDesigns  # a complex step in each variable
+
+    @cached_property
+    def at(self) -> Equilibria:
+        """The equilibria at the points."""
+        return Equilibria(self.path.network, self.path.at.z[self.points], self.path.at.drive[self.points])
+
+    @cached_property
+    def unknowns(self) -> FloatArray:
+        """Derivatives of everything that was solved for, held unknowns included, (p, k, size), dimensionless.
+
+        Raises
+        ------
+        cfmkit.errors.InputError
+            If the tangent is singular at a point.
+        """
+        try:
+            return unknown_slopes(self.at, self.designs)
+        except np.linalg.LinAlgError:
+            raise InputError(SINGULAR) from None
+
+    @cached_property
+    def stepped(self) -> tuple[Equilibria, ...]:
+        """The equilibria with a complex step in each variable."""
+        return tuple(
+            Equilibria(design_of(self.designs, k), self.at.z + 1j * COMPLEX_STEP * self.unknowns[:, k], self.at.drive)
+            for k in range(self.designs.count)
+        )
+
+    def of(self, output: Output) -> FloatArray:
+        """Return the derivatives (..., k) of an output (...) of a model and its equilibria, analytic in both."""
+        pairs = zip(self.designs.networks, self.stepped, strict=True)
+        return read_only(np.stack([np.imag(output(net, at)) / COMPLEX_STEP for (net, _), at in pairs], axis=-1))
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """Derivatives of `EquilibriumPath.effort`, (p, k)."""
+        if isinstance(self.path.given, Loading):
+            each = zip(self.designs.networks, self.stepped, strict=True)
+            columns = [load_displacement(at, drive) for (_, drive), at in each if isinstance(drive, Loading)]
+            return read_only(np.imag(np.stack(columns, axis=-1)) / COMPLEX_STEP)
+        try:
+            return read_only(effort_slopes(self.at, self.designs, self._rates))
+        except np.linalg.LinAlgError:
+            raise InputError(SINGULAR) from None
+
+    @cached_property
+    def _rates(self) -> FloatArray:
+        """Slopes of the free unknowns along the path at the points, (p, free)."""
+        own, free = equations(self.path.network), self.path.free[self.points]
+        states = [own.solve(y, drive) for y, drive in zip(free, self.at.drive.tolist(), strict=True)]
+        found = [np.full(own.n, np.nan) if state is None else state.rate for state in states]
+        rates = np.array(found).reshape(free.shape)
+        if not np.isfinite(rates).all():
+            raise InputError(SINGULAR)
+        return rates
+
+    @property
+    def motion(self) -> Mapping[str, FloatArray]:
+        """Node -> (p, 3, k) derivatives of `EquilibriumPath.motion`, of linked nodes too."""
+        return _Lookup(self, lambda node: self.of(lambda _, at: node_motion(at, node)))
+
+    @property
+    def reaction(self) -> Mapping[str, FloatArray]:
+        """Node -> (p, 3, k) derivatives of `EquilibriumPath.reaction`."""
+        return _Lookup(self, lambda node: self.of(lambda _, at: node_reaction(at, node, _residual(at))))
+
+    def end_force(self, beam: str, end: int) -> FloatArray:
+        """Return the derivatives of `EquilibriumPath.end_force`, (p, 3, k)."""
+
+        def output(net: Network, at: Equilibria) -> Any:
+            element = beam_states.elements_of(at.network, beam)[-1 if end else 0]
+            found = beam_states.element_states(net, at, beam, element, np.array([float(end)]))
+            return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
+
+        return self.of(output)
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Derivatives of `EquilibriumPath.energy`, (p, k)."""
+        moment = self.path.network.scales.moment
+        return self.of(lambda _, at: strain_energy(at) * moment)
+
+    def shape(self, beam: str) -> FloatArray:
+        """Return the derivatives of `EquilibriumPath.shape`, (p, n, 2, k): of material points of the beam."""
+        states = self.states(beam)
+        return read_only(np.stack([states.x, states.y], axis=2))
+
+    def states(self, beam: str, fractions: Any = None) -> beam_states.BeamStates:
+        """Return the derivatives of states at fractions of every element of a beam; arrays (p, n, k)."""
+        places = np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions
+
+        def output(net: Network, at: Equilibria) -> Any:
+            found = beam_states.states(net, at, beam, places)
+            shape = found.x.shape
+            return np.stack([np.broadcast_to(part, shape) for part in found])
+
+        return beam_states.BeamStates(*self.of(output))
+
+    def sections(self, beam: str, fractions: Any = None) -> beam_states.BeamSections:
+        """Return the derivatives of section forces and stresses at fractions of every element; arrays (p, n, k)."""
+        places = np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions
+
+        def output(net: Network, at: Equilibria) -> Any:
+            return np.stack(beam_states.sections(net, beam, beam_states.states(net, at, beam, places)))
+
+        return beam_states.BeamSections(*self.of(output))
+
+    def stress_extremes(self, beam: str, axial: bool = True) -> FloatArray:
+        """Return the derivatives of the values of `EquilibriumPath.stress_extremes`, (p, 2, 2, k).
+
+        An extreme inside a beam stays one while its place moves, so that its place needs no derivative (envelope
+        theorem).
+        """
+        known = self.path.stress_extremes(beam, axial)
+        element, fraction = known.element[self.points], known.fraction[self.points]
+        return self.of(lambda net, at: stress_extremes.stress_at(net, at, beam, element, fraction, axial))
+
+
+class _Lookup(Mapping[str, Any]):
+    """Derivatives by node, computed when needed."""
+
+    def __init__(self, gradient: Gradient, output: Callable[[str], FloatArray]) -> None:
+        self.gradient, self.output = gradient, output
+
+    def __getitem__(self, node: str) -> FloatArray:
+        return self.output(node)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.gradient.path.net.nodes)
+
+    def __len__(self) -> int:
+        return len(self.gradient.path.net.nodes)
+
+
+def _residual(at: Equilibria) -> Any:
+    return np.array([energy.gradient(at.network, z, drive) for z, drive in zip(at.z, at.drive, strict=True)])
+
+
+def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any, points: Any = None) -> Gradient:
+    """Return the derivatives of a path's outputs by design variables.
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        A path of ``build(variables)``.
+    build : callable
+        From the design variables (real or complex) to the network, or to the network and its drive where variables
+        change loads or direction of the drive.
+    variables : (k,) array
+        Where to differentiate: the variables that the path was traced for.
+    points : sequence of int, optional
+        Points of the path; all those requested by default.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If a variable changes the make-up of the network, moves a corner of a beam and a step of its thickness past
+        each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
+    """
+    x = np.asarray(variables, dtype=float)
+    pairs = []
+    for k in range(len(x)):
+        moved = x.astype(complex)
+        moved[k] += 1j * COMPLEX_STEP
+        built = build(moved)
+        pairs.append(built if isinstance(built, tuple) else (built, path.given))
+    for k, (network, _) in enumerate(pairs):
+        if not _is_alike(network, path.net):
+            raise InputError(
+                f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
+            )
+    designs = set_up(path.network, (path.net, path.given), pairs, partial(discretise_alike, path.network))
+    chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
+    return Gradient(path, read_only(chosen, np.int64), designs)
+
+
+def _is_alike(network: Network, other: Network) -> bool:
+    """Return True if two networks have the same nodes, beams, joints, supports, links, springs and loads by name."""
+    return bool(_make_up(network) == _make_up(other))
+
+
+def _make_up(network: Network) -> Any:
+    nodes = [
+        (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
+    ]
+    beams = [(name, b.start, b.end, b.start_joint, b.end_joint) for name, b in network.beams.items()]
+    acting = [
+        (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
+        for one in (*network.springs, *network.loads)
+    ]
+    return nodes, beams, network.links, acting

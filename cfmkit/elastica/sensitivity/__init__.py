@@ -1,1 +1,0 @@
-"""Derivatives of outputs by design variables, and the equilibria of networks that differ little."""
