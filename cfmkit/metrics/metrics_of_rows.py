@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
@@ -94,8 +95,8 @@ class StressRows:
         return self.read()
 
 
-@dataclass(frozen=True, eq=False)
-class CurveRows:
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveRows(ShortRepr):
     """One branch of many curves, one a row."""
 
     samples: RowSamples  # efforts at the points [N or N m]

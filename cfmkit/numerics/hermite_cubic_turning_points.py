@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -21,8 +23,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Monotone:
+@dataclass(frozen=True, repr=False)
+class Monotone(ShortRepr):
     """Curves cut into monotonic pieces."""
 
     place: FloatArray  # (m, k), increasing along the second axis; what others have more is the last place repeated

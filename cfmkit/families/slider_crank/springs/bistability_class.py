@@ -24,6 +24,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import Several, ShortRepr
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -48,8 +50,8 @@ BOUNDARY = 1e-3
 """A drop so near to 1 may be on either side of it in a mechanism that is made."""
 
 
-@dataclass(frozen=True)
-class Classified:
+@dataclass(frozen=True, repr=False)
+class Classified(ShortRepr):
     """The classes of m curves."""
 
     kind: NDArray[np.intp]  # (m,), index into `CLASSES`
@@ -166,7 +168,7 @@ def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
     with np.errstate(divide="ignore", invalid="ignore"):
         first = _highest(lambda motion: needed(assembly.forces(motion), motion - assembly.start), low, high)
         second = _highest(lambda motion: needed(assembly.units(motion).stiffness, 1.0), low, high)
-    return np.where(none, np.nan, first), np.where(none, np.nan, second)
+    return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 
 
 def _needed(torsion: FloatArray, slider: FloatArray, sign: FloatArray | float) -> FloatArray:

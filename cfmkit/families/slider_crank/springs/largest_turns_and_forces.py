@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 
@@ -36,8 +37,8 @@ def is_wide(assembly: Assembly, low: Any, high: Any) -> bool:
     return bool(assembly.drive == "torque" and np.any(high - low > 0.5 * np.pi))
 
 
-@dataclass(frozen=True, eq=False)
-class MotionExtremes:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionExtremes(ShortRepr):
     """The extremes of a linkage over a motion, or of m linkages as rows, of which all are wide or none is."""
 
     assembly: Assembly

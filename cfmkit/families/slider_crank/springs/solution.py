@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.arrays import ShortRepr
+from cfmkit.arrays import Several, ShortRepr
 from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, scale_factors, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
@@ -192,12 +192,12 @@ class Solution(ShortRepr):
         if self.spec.analysis.window is None:
             return None
         found = np.array([window_of(*pair) for pair in zip(self.specs, self.assemblies, strict=True)], dtype=float)
-        return found[:, :1], found[:, 1:]
+        return Several((found[:, :1], found[:, 1:]))
 
     @property
     def window_or_motion(self) -> Ends:
         """The window, else all of the motion."""
-        return self.window or (self.low, self.high)
+        return self.window or Several((self.low, self.high))
 
     # --- curves, (m, n) ---------------------------------------------------------------------------------------------
 
@@ -244,7 +244,7 @@ class Solution(ShortRepr):
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
         driven = self.effort if self.drive == "force" else np.zeros_like(self.effort)
         coupler, guide = reactions(self.assembly, self.units, driven)
-        return coupler / self.legs, (0.0 if self._is_mirrored else 1.0) * guide / self.legs
+        return Several((coupler / self.legs, (0.0 if self._is_mirrored else 1.0) * guide / self.legs))
 
     @property
     def _is_mirrored(self) -> bool:
@@ -293,7 +293,7 @@ class Solution(ShortRepr):
         place, sign, rest = self.curve.place, signs(self.curve, self.rest), self.rest[:, 0]
         found = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
         if not found:
-            return np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)
+            return Several((np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)))
         rows, low, high, stable = (np.array(one) for one in zip(*found, strict=True))
         way, assembly = np.where(stable, 1.0, -1.0)[:, None], rows_of(self.assembly, rows)
         size = np.abs(self.curve.value).max(axis=1)[rows, None]
@@ -306,7 +306,7 @@ class Solution(ShortRepr):
         root = np.where((low != high) & (np.abs(root - rest[rows]) <= SAME * width), rest[rows], root)
         known = np.isfinite(root)
         energy = 0.5 * assembly.total(assembly.units(root[:, None]).turn ** 2)[:, 0]
-        return rows[known], root[known], stable[known], np.broadcast_to(energy, len(root))[known]
+        return Several((rows[known], root[known], stable[known], np.broadcast_to(energy, len(root))[known]))
 
     def nearest(self, stable: bool) -> Ends:
         """Return place and energy of the equilibrium next to the unloaded position, of one kind, (m,); NaN: none."""
@@ -351,7 +351,7 @@ class Solution(ShortRepr):
             return np.asarray(np.abs(rows_of(self.assembly, own).efforts(at) / level[own] - 1.0) - limit[own])
 
         low, high = last_places(excess, np.hstack(inner), np.hstack(beyond)).T
-        return np.where(known, low, np.nan), np.where(known, high, np.nan)
+        return Several((np.where(known, low, np.nan), np.where(known, high, np.nan)))
 
     # --- wherever they are ------------------------------------------------------------------------------------------
 
@@ -377,7 +377,7 @@ class Solution(ShortRepr):
         else:
             coupler, guide = self.extremes.coupler, self.extremes.guide
         size = (0.0 if self._is_mirrored else 1.0) / legs
-        return (coupler[0] / legs, coupler[1] / legs), (size * guide[0], size * guide[1])
+        return Several((coupler[0] / legs, coupler[1] / legs)), Several((size * guide[0], size * guide[1]))
 
     def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> Ends:
         """Return extremes of both ways, of all legs; NaN where friction holds the mechanism somewhere."""
