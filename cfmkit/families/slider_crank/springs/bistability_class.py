@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.numerics.hermite_cubic_turning_points import Monotone
 
-    Ends = tuple[FloatArray, FloatArray]
+    Ends = tuple[FloatArray, ...]
 
 
 CLASSES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")

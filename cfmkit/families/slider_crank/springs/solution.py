@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
-    Ends = tuple[FloatArray, FloatArray]
+    Ends = tuple[FloatArray, ...]
 
 
 GRID = 1025
@@ -240,7 +240,7 @@ class Solution(ShortRepr):
         return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
 
     @cached_property
-    def reactions(self) -> tuple[FloatArray, FloatArray]:
+    def reactions(self) -> Ends:
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
         driven = self.effort if self.drive == "force" else np.zeros_like(self.effort)
         coupler, guide = reactions(self.assembly, self.units, driven)
@@ -288,7 +288,7 @@ class Solution(ShortRepr):
         return classify(self.curve, self.start, self.rest, self.tolerance, self.window)
 
     @cached_property
-    def all_equilibria(self) -> tuple[NDArray[np.intp], FloatArray, NDArray[np.bool_], FloatArray]:
+    def all_equilibria(self) -> tuple[NDArray[Any], ...]:
         """Row, place, stability and energy of every equilibrium, (k,) each, in order."""
         place, sign, rest = self.curve.place, signs(self.curve, self.rest), self.rest[:, 0]
         found = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
