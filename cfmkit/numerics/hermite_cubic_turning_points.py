@@ -62,7 +62,8 @@ def monotone(
     left, right = (np.where(np.isfinite(item), item, rise) for item in (left, right))
     # With like slopes at its ends a cubic turns twice, or not at all.
     a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
-    twice = (b * b > 3.0 * a * left) & ((a > 0.0) != (b > 0.0)) & (np.abs(b) < 3.0 * np.abs(a))
+    product = 3.0 * a * left
+    twice = (product > 0.0) & (b * b > product) & ((a > 0.0) != (b > 0.0)) & (np.abs(b) < 3.0 * np.abs(a))
     row, cell = np.nonzero(((left > 0.0) != (right > 0.0)) | twice)
     share, inside = _turns(left[row, cell], right[row, cell], rise[row, cell])
     order = np.argsort(np.stack([row, row])[inside], kind="stable")

@@ -43,18 +43,21 @@ NO_FACTOR = "it needs torsion springs and a spring at the slider"
 HELD = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
-def _is_turned(solution: Solution) -> bool:
-    return solution.drive == "torque"
-
-
-def _is_pushed(solution: Solution) -> bool:
-    return solution.drive == "force"
-
-
 def _of_drive(drive: str, dimension: str, definition: str, function: Function, reason: str) -> ScalarQuantity[Solution]:
     """Return a quantity that only mechanisms with one kind of drive have."""
-    applies = _is_turned if drive in ("torque", "angle") else _is_pushed
-    return ScalarQuantity(dimension, definition, function, reason, applies)
+    return ScalarQuantity(dimension, definition, function, reason, lambda solution: solution.drive == drive)
+
+
+def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
+    """Return width, start and end of the constant band over the motion of one kind of drive."""
+    reason = f"the reference is outside the motion, or the {drive} there is zero"
+    within = f"of the interval around {_AT} with the {drive} within `analysis.tolerance`"
+    name = f"constant_{motion}"
+    return {
+        name: _of_drive(drive, dimension, f"width {within}", lambda one: one.band[1] - one.band[0], reason),
+        f"{name}_start": _of_drive(drive, dimension, f"start {within}", lambda one: one.band[0], reason),
+        f"{name}_end": _of_drive(drive, dimension, f"end {within}", lambda one: one.band[1], reason),
+    }
 
 
 def _of_wire(name: str) -> ScalarQuantity[Solution]:
@@ -224,48 +227,8 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         lambda solution: solution.nearest(stable=False)[1],
         NO_UNSTABLE,
     ),
-    "constant_angle": _of_drive(
-        "torque",
-        "angle",
-        f"width of the interval around {_AT} with the torque within `analysis.tolerance`",
-        lambda solution: solution.band[1] - solution.band[0],
-        "the reference is outside the motion, or the torque there is zero",
-    ),
-    "constant_angle_start": _of_drive(
-        "torque",
-        "angle",
-        f"start of the interval around {_AT} with the torque within `analysis.tolerance`",
-        lambda solution: solution.band[0],
-        "the reference is outside the motion, or the torque there is zero",
-    ),
-    "constant_angle_end": _of_drive(
-        "torque",
-        "angle",
-        f"end of the interval around {_AT} with the torque within `analysis.tolerance`",
-        lambda solution: solution.band[1],
-        "the reference is outside the motion, or the torque there is zero",
-    ),
-    "constant_travel": _of_drive(
-        "force",
-        "length",
-        f"width of the interval around {_AT} with the force within `analysis.tolerance`",
-        lambda solution: solution.band[1] - solution.band[0],
-        "the reference is outside the motion, or the force there is zero",
-    ),
-    "constant_travel_start": _of_drive(
-        "force",
-        "length",
-        f"start of the interval around {_AT} with the force within `analysis.tolerance`",
-        lambda solution: solution.band[0],
-        "the reference is outside the motion, or the force there is zero",
-    ),
-    "constant_travel_end": _of_drive(
-        "force",
-        "length",
-        f"end of the interval around {_AT} with the force within `analysis.tolerance`",
-        lambda solution: solution.band[1],
-        "the reference is outside the motion, or the force there is zero",
-    ),
+    **_of_band("torque", "angle", "angle"),
+    **_of_band("force", "travel", "length"),
     "reference_torque": _of_drive(
         "torque", "torque", f"torque at {_AT}", lambda solution: solution.level, "the reference is outside the motion"
     ),
@@ -346,7 +309,7 @@ QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
         "that a trim does not change the shape of the curve",
         lambda solution: solution.assembly.rates[3],
-        applies=lambda solution: _is_pushed(solution) and solution.spec.mechanism.springs.anchor is not None,
+        applies=lambda solution: solution.drive == "force" and solution.spec.mechanism.springs.anchor is not None,
     ),
     "force_per_degree": _of_drive(
         "force",
