@@ -20,14 +20,12 @@ from scipy.optimize import minimize
 from timing import best
 
 import cfmkit
-from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.fit_nonnegative_rates import RateGoal, minimax
-from cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block import analyze_block
 from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
-MILLION, DESIGNS = 1_000_000, 65_536
+MILLION, SIDE = 1_000_000, 32
 
 
 def eq_10(angle: np.ndarray, rates: np.ndarray) -> np.ndarray:
@@ -90,19 +88,11 @@ def main() -> None:
     reported = ", ".join(f"{error:.1e}" for error in errors)
     print(f"  SLSQP from one start       {peer:7.3f} s    errors of five starts [N]: {reported}")
 
-    rng = np.random.default_rng(0)
-    names = ("mechanism.springs.crank_pin", "mechanism.springs.slider_pin")
-    values = {name: rng.uniform(0, top, DESIGNS) for name, top in zip(names, (0.012, 0.4), strict=True)}
+    tops = {"mechanism.springs.crank_pin": 0.012, "mechanism.springs.slider_pin": 0.4}
+    lists = {path: [f"{rate} N*m/rad" for rate in np.linspace(0.0, top, SIDE)] for path, top in tops.items()}
     for metrics in (("stiffness_class",), ("stiffness_class", "constant_angle"), ("torque_ripple", "band_range_05pct")):
-        asked = tuple(map(Measure, metrics))
-
-        def classes(asked: tuple[Measure, ...] = asked) -> None:
-            for first in range(0, DESIGNS, 4096):
-                part = {name: row[first : first + 4096] for name, row in values.items()}
-                analyze_block(spec, Block(part, asked, 4096))
-
-        seconds = best(classes, 3)
-        print(f"{DESIGNS} designs: {', '.join(metrics):36s} {seconds:6.2f} s, {DESIGNS / seconds:9.0f} a second")
+        seconds = best(lambda metrics=metrics: cfmkit.sweep(spec, vary=lists, metrics=metrics), 2)
+        print(f"{SIDE**2} designs: {', '.join(metrics):36s} {seconds:6.2f} s, {SIDE**2 / seconds:9.0f} a second")
 
 
 if __name__ == "__main__":

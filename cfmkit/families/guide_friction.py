@@ -71,7 +71,7 @@ class GuideFriction:
             [N]; NaN where `free` or `across` is.
         """
         force = still = free + way * self.drag
-        if not self.friction:
+        if not np.any(self.friction):
             return force
         for _ in range(ROUNDS):
             sums, slopes = np.zeros_like(force), np.zeros_like(force)

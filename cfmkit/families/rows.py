@@ -36,6 +36,7 @@ class ScalarQuantity(Generic[S]):
     function: Callable[[S], Any]  # of a solution: (m,) values or one for all mechanisms [SI], NaN where there is none
     reason: str | Callable[[S], str] = "there is none"  # why a solution of one mechanism has no value
     applies: Callable[[S], bool] | None = None  # False: such mechanisms do not even name it; default: all do
+    words: tuple[str, ...] = ()  # what the values are indices of
 
     def is_of(self, solution: S) -> bool:
         """Return True if mechanisms of this kind have such a value, or a reason why not."""
@@ -55,7 +56,7 @@ def values_of_one(table: Mapping[str, ScalarQuantity[S]], solution: S) -> LazyMa
         quantity = table[name]
         value = float(np.ravel(quantity.function(solution))[0])
         if np.isfinite(value):
-            return Quantity(value, *quantity.about)
+            return Quantity(value, *quantity.about, words=quantity.words)
         reason = quantity.reason if isinstance(quantity.reason, str) else quantity.reason(solution)
         return Quantity(None, *quantity.about, reason=reason)
 

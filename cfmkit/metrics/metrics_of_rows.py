@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.metrics import ranges_many
 from cfmkit.metrics.branch_views import ZERO
 from cfmkit.metrics.branches_cut_to_window import ROUNDING, TOLERANCE
@@ -94,8 +95,8 @@ class StressRows:
         return self.read()
 
 
-@dataclass(frozen=True, eq=False)
-class CurveRows:
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveRows(ShortRepr):
     """One branch of many curves, one a row."""
 
     samples: RowSamples  # efforts at the points [N or N m]
@@ -108,6 +109,7 @@ class CurveRows:
     part_efforts: Callable[[FloatArray], FloatArray] | None = None  # largest of one spring or member, (d, m) -> (d, m)
     stress: StressRows | None = None
     kind: Kind = "force"
+    pose: FloatArray | None = None  # (d,) where bands are taken; default: the middle of the window
     _windows: dict[Any, RowsInWindow] = field(default_factory=dict, init=False, repr=False)
 
     def all_at(self, places: FloatArray) -> FloatArray:
@@ -160,18 +162,19 @@ class RowsInWindow:
         return self.curves.samples.with_ends((low, high), at_ends, TOLERANCE * (high - low))
 
     @cached_property
-    def _dense(self) -> FloatArray:
-        """The dense places in the window, (d, q); those of a row with fewer repeat its first."""
-        dense = self.curves.dense
-        within, own = RowSamples(dense, dense, np.full(len(dense), dense.shape[1])).between(self._cut)
-        return np.where(own, within.motion, self._cut[0][:, None])
+    def _dense(self) -> tuple[FloatArray, FloatArray]:
+        """The dense places in the window and the efforts there, (d, q); those of a row with fewer repeat its first."""
+        dense, effort = self.curves.dense, self.curves.dense_effort
+        within, own = RowSamples(dense, effort, np.full(len(dense), dense.shape[1])).between(self._cut)
+        first = self.inside.values[:, :1]
+        return np.where(own, within.motion, self._cut[0][:, None]), np.where(own, within.values, first)
 
     @property
     def _uneven(self) -> bool:
         return bool(self.curves.dense.shape[1] < FEW)
 
     def _extremes(self, _motion: FloatArray, _effort: FloatArray) -> Ends:
-        known = self.inside.joined(self._dense, self.curves.all_at(self._dense))
+        known = self.inside.joined(*self._dense)
         return known.extremes(self.curves.all_at, self._uneven)
 
     @cached_property
@@ -191,7 +194,8 @@ class RowsInWindow:
                 share = stress.at(at, rows) / allowable - (1 + ROUNDING)
                 return np.where(np.isfinite(allowable), share, -np.inf)
 
-        return ManyBranches(curves.dense, curves.dense_effort, *self.ends, curves.effort, excess, error=curves.error)
+        ends, error = self.ends, curves.error
+        return ManyBranches(curves.dense, curves.dense_effort, *ends, curves.effort, excess, curves.pose, error)
 
     # --- metrics, (d,) each -----------------------------------------------------------------------------------------
 
@@ -201,7 +205,8 @@ class RowsInWindow:
         if function is None:
             return np.full(len(self.ends[0]), np.nan)
         sizes = RowSamples(self.inside.motion, function(self.inside.motion), self.inside.count)
-        top, _ = sizes.joined(self._dense, function(self._dense)).extremes(function, self._uneven)
+        places, _ = self._dense
+        top, _ = sizes.joined(places, function(places)).extremes(function, self._uneven)
         return np.asarray(np.where(top > self.curves.error, static_balance(self.many.spread, top), np.nan))
 
     def stress_max(self) -> FloatArray:
@@ -233,9 +238,9 @@ class RowsInWindow:
 
     def range_of(self, name: str) -> FloatArray:
         """Return one of `RANGES`."""
-        (first, last), (low, high), many = self.curves.extent, self.ends, self.branches
+        (first, last), many = self.curves.extent, self.branches
         slack = TOLERANCE * (last - first)
-        place = high if name.startswith("range_95") else 0.5 * (low + high)
+        place = many.high if name.startswith("range_95") else many.reference
         reached = (place >= first - slack) & (place <= last + slack)
         found = RANGES[name](many)
         if not name.startswith("range_95"):

@@ -13,56 +13,71 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
 
 
-@dataclass(frozen=True)
-class Monotone:
-    """Curves cut into monotonic pieces.
+@dataclass(frozen=True, repr=False)
+class Monotone(ShortRepr):
+    """Curves cut into monotonic pieces."""
 
-    Attributes
-    ----------
-    place : (m, k) array
-        Increasing along the second axis; turning points that a cell does not have repeat a neighbour.
-    value : (m, k) array
-        The curves there.
-    """
-
-    place: FloatArray
-    value: FloatArray
+    place: FloatArray  # (m, k), increasing along the second axis; what others have more is the last place repeated
+    value: FloatArray  # (m, k), the curves there
 
 
-def monotone(place: FloatArray, value: FloatArray, slope: FloatArray) -> Monotone:
+@np.errstate(all="ignore")
+def monotone(
+    place: FloatArray,
+    value: FloatArray,
+    slope: FloatArray,
+    function: Callable[[FloatArray], FloatArray],
+) -> Monotone:
     """Return curves at their samples and turning points.
 
     Parameters
     ----------
-    place : (n,) array
+    place : (n,) or (m, n) array
         Increasing.
     value, slope : (m, n) array
         Curves and their derivatives; a slope that is not finite counts as that of the chord.
+    function : callable
+        The curves at places of each row, (m, k) -> (m, k): the cubics say where to look only.
 
     Examples
     --------
     >>> x = np.linspace(0.0, 3.0, 4)
-    >>> found = monotone(x, np.array([x**3 - 4 * x]), np.array([3 * x**2 - 4]))
+    >>> found = monotone(x, np.array([x**3 - 4 * x]), np.array([3 * x**2 - 4]), lambda x: x**3 - 4 * x)
     >>> float(found.value.min().round(6)), round(-16 / 27**0.5, 6)
     (-3.079201, -3.079201)
     """
-    step = np.diff(place)
-    low, high = value[:, :-1], value[:, 1:]
-    rise = high - low
+    place = np.broadcast_to(place, value.shape)
+    step, rise = np.diff(place), np.diff(value)
     left, right = slope[:, :-1] * step, slope[:, 1:] * step
     left, right = (np.where(np.isfinite(item), item, rise) for item in (left, right))
-    pair, inside = _turns(left, right, rise)
-    # What is missing repeats an end, so that places never decrease.
-    share = np.sort(np.where(inside, pair, np.array([0.0, 1.0])[:, None, None]), axis=0)
-    between = low + _risen(left, right, rise, share)
-    between = np.where(share == 0.0, low, np.where(share == 1.0, high, between))
-    return Monotone(_woven(np.broadcast_to(place, value.shape), place[:-1] + share * step), _woven(value, between))
+    # With like slopes at its ends a cubic turns twice, or not at all.
+    a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
+    product = 3.0 * a * left
+    twice = (product > 0.0) & (b * b > product) & ((a > 0.0) != (b > 0.0)) & (np.abs(b) < 3.0 * np.abs(a))
+    row, cell = np.nonzero(((left > 0.0) != (right > 0.0)) | twice)
+    share, inside = _turns(left[row, cell], right[row, cell], rise[row, cell])
+    order = np.argsort(np.stack([row, row])[inside], kind="stable")
+    turns = (place[row, cell] + share * step[row, cell])[inside][order]
+    row = np.stack([row, row])[inside][order]
+    count = np.bincount(row, minlength=len(value))
+    if not len(row):
+        return Monotone(place, value)
+    more = np.repeat(place[:, -1:], count.max(), axis=1)
+    more[row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)] = turns
+    known = np.where(more == place[:, -1:], value[:, -1:], function(more))
+    both, values = np.hstack([place, more]), np.hstack([value, known])
+    order = np.argsort(both, axis=1, kind="stable")
+    return Monotone(np.take_along_axis(both, order, 1), np.take_along_axis(values, order, 1))
 
 
 def _turns(left: FloatArray, right: FloatArray, rise: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -76,54 +91,3 @@ def _turns(left: FloatArray, right: FloatArray, rise: FloatArray) -> tuple[Float
         big = -(b + np.copysign(root, b))
         share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
         return share, (share > 0.0) & (share < 1.0)
-
-
-def _risen(left: FloatArray, right: FloatArray, rise: FloatArray, share: FloatArray) -> FloatArray:
-    """Return how far Hermite cubics have risen from the start of their cells at some shares of these."""
-    a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
-    with np.errstate(invalid="ignore"):
-        risen: FloatArray = share * (left + share * (b + share * a))
-    return risen
-
-
-def _woven(samples: FloatArray, between: FloatArray) -> FloatArray:
-    """Return samples (m, n) with the two (2, m, n - 1) of each cell behind its first sample, (m, 3 n - 2)."""
-    count = samples.shape[1]
-    woven = np.empty((samples.shape[0], 3 * count - 2))
-    woven[:, ::3] = samples
-    woven[:, 1::3], woven[:, 2::3] = between
-    return woven
-
-
-def sharpened(place: FloatArray, value: FloatArray, slope: FloatArray, twice: bool = True) -> FloatArray:
-    """Return curves at their samples, with the sample next to each turning point replaced by the value there.
-
-    A tenth of the work of `monotone`, and enough where heights count and places do not.
-
-    Parameters
-    ----------
-    place : (n,) array
-        Increasing.
-    value, slope : (m, n) array
-        Curves and their derivatives.
-    twice : bool
-        Whether to look for curves that turn twice between two samples, too: not where they are
-        so steep that a cubic would overshoot.
-    """
-    step = np.diff(place)
-    rise = value[:, 1:] - value[:, :-1]
-    left, right = slope[:, :-1] * step, slope[:, 1:] * step
-    turns = (left > 0.0) != (right > 0.0)
-    # With like slopes at its ends a cubic turns twice, or not at all: only if it goes the other way in its middle.
-    if twice:
-        turns |= (6.0 * rise - left - right) * left < 0.0
-    row, cell = np.nonzero(turns)
-    if not len(row):
-        return value
-    cubics = left[row, cell], right[row, cell], rise[row, cell]
-    found = value.copy()
-    for share, inside in zip(*_turns(*cubics), strict=True):
-        height = value[row, cell] + _risen(*cubics, share)
-        at = cell + (share > 0.5)
-        found[row[inside], at[inside]] = height[inside]
-    return found

@@ -8,8 +8,6 @@ import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.elastica.results import member_efforts
 from cfmkit.errors import ExitCode, SpecError
-from cfmkit.families import family
-from cfmkit.families.base import Block, Measure
 from cfmkit.families.beam.model import solve
 from cfmkit.metrics import MeasuringFrame, Window, known_metrics, measure, validate_requirements
 from cfmkit.metrics.ranges_many import ManyBranches, band_range, range_95, range_95_fraction
@@ -140,17 +138,13 @@ def test_the_efforts_of_all_members_are_that_of_the_drive(name):
     ("config", "path", "values"),
     [
         ("cam", "mechanism.springs.count", (1, 2, 4)),
-        ("slider_crank_li2019", "mechanism.springs.pivot", (0.2, 0.5)),
+        ("slider_crank_li2019", "mechanism.springs.pivot", ("0.2 N*m/rad", "0.5 N*m/rad")),
     ],
 )
 def test_the_balance_of_many_designs_is_that_of_each(config, path, values):
     spec = cfmkit.load(f"configs/{config}.yaml")
     single = [cfmkit.analyze(spec.replace({path: value})).metrics["static_balance"].value for value in values]
-    measure_of_balance = Measure("static_balance", spec.analysis.window)
-    block = Block({path: np.array(values, dtype=float)}, (measure_of_balance,), len(values))
-    answer = family(spec.family).analyze_block(spec, block)
-    assert answer.done.all()
-    many = answer.values[0]["load"]
+    many = cfmkit.sweep(spec, vary={path: list(values)}, metrics=["static_balance"]).table["static_balance"]
     np.testing.assert_allclose(many, single, rtol=1e-6)
 
 

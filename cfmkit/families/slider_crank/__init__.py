@@ -26,10 +26,7 @@ FAMILY = Family(
         "beam": PRINTED,
         "solid": SOLID,
     },
-    analyze_block=when_called(
-        "cfmkit.families.slider_crank.springs.many_designs.metrics_and_findings_of_block:analyze_block"
-    ),
-    block_shares=True,
+    rows=when_called("cfmkit.families.slider_crank.springs.model:solve_rows"),
     design=when_called("cfmkit.families.slider_crank.design:design"),
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
     values=OF_SPRINGS | OF_PARTS,

@@ -94,14 +94,14 @@ def _linkage(result: Result) -> Room:
     link, units = solution.assembly.linkage, solution.units
     half, _ = eye_and_hole(spec)
     around = radii_at_pins(spec)
-    pivot, turned = np.zeros((1, 2)), link.crank * np.column_stack([np.cos(units.angle), np.sin(units.angle)])
-    slid = np.column_stack([units.position, np.full(len(units.position), link.offset)])
+    pivot, turned = np.zeros((1, 2)), link.crank * np.column_stack([np.cos(units.angle[0]), np.sin(units.angle[0])])
+    slid = np.column_stack([units.position[0], np.full(units.position.size, link.offset)])
     pins = list(zip((pivot, turned, slid), around, strict=True))
     low = np.min([pin.min(axis=0) - radius for pin, radius in pins], axis=0)
     high = np.max([pin.max(axis=0) + radius for pin, radius in pins], axis=0)
     along, across = high - low
     count = int(np.count_nonzero(solution.assembly.rates))
-    depth, why = _depth(spec, solution.assembly.rates, solution.extremes.largest_turns)
+    depth, why = _depth(spec, solution.assembly.rates, solution.extremes.largest_turns[:, 0])
     reported = f"links {2e3 * half:.3g} mm wide; {_sizes(springs)}{why}"
     return Room(float(across), float(along), depth, 3 + count, reported, (float(low[0]), float(low[1])), True)
 

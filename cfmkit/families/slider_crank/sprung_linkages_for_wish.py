@@ -305,7 +305,7 @@ def _loads(spec: SliderCrankSpec) -> LinkLoads:
     """Return what acts on the links over the motion of the analysis."""
     assembly = assemble(spec)
     low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
-    return link_loads(assembly, grid_over(assembly, low, high), spec.mechanism.sets)
+    return link_loads(assembly, grid_over(assembly.drive, low, high), spec.mechanism.sets)
 
 
 def _least_sheet(spec: SliderCrankSpec, wish: Wish, block: MaterialBlock) -> float:
@@ -321,7 +321,7 @@ def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:
     """Return how far each torsion spring that is bought turns from where it is relaxed [rad]."""
     assembly = assemble(spec)
     low, high = spec.analysis.travel or spec.analysis.angle or (0.0, 0.0)
-    turns = MotionExtremes(assembly, low, high).largest_turns
+    turns = MotionExtremes(assembly, low, high).largest_turns[:, 0]
     bought = {one.at for one in spec.mechanism.springs.bought}
     return {name: float(turn) for name, turn in zip(JOINTS[:3], turns, strict=False) if name in bought}
 
@@ -370,7 +370,7 @@ def wound(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
     solution = analyze(spec.replace({"design": None, "requirements": ()}), Run()).state
     if solution is None:
         return spec
-    link, (high, low) = solution.assembly.linkage, solution.extremes.turns
+    link, (high, low) = solution.assembly.linkage, (turns[:, 0] for turns in solution.extremes.turns)
     # a spring at the slider lies beside the coupler and is stretched by a slider that leaves the pivot
     rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
     widest, rates = min(link.crank, link.coupler), spec.mechanism.springs.rates

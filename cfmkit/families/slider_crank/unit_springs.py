@@ -5,6 +5,9 @@ relaxed in one position. Energy, effort and stiffness are linear in the four rat
 everything here is per unit rate. beta is the coupler's direction: the crank pin
 turns by beta - t, the slider pin by beta.
 
+One linkage, with plain numbers, takes places of any shape; m linkages as rows, with columns (m, 1), take places that
+are (m, n), or (1, n) for all.
+
 Assumes: rigid massless links, no friction, linear springs.
 
 Reference
@@ -16,7 +19,7 @@ Reference
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -39,29 +42,14 @@ class UnitCurves(ShortRepr):
     """What a spring of rate 1 at each joint gives along the motion, n places.
 
     Rows are those of `JOINTS`; the last row has a length [m] in the place of an angle [rad].
-
-    Attributes
-    ----------
-    angle : (n,) array
-        Crank angle [rad].
-    position : (n,) array
-        The slider's x [m].
-    turn : (4, n) array
-        q: how far each joint has turned, or the slider moved, from the unloaded position.
-    effort : (4, n) array
-        q q', the derivative of q^2/2 by the motion.
-    stiffness : (4, n) array
-        (q q')'.
-    bend : (4, n) array or None
-        (q q')''; None where it was not requested.
     """
 
-    angle: FloatArray
-    position: FloatArray
-    turn: FloatArray
-    effort: FloatArray
-    stiffness: FloatArray
-    bend: FloatArray | None = None
+    angle: FloatArray  # (..., n), of the crank [rad]
+    position: FloatArray  # (..., n), the slider's x [m]
+    turn: FloatArray  # (4, ..., n), q: how far each joint has turned, or the slider moved, from the unloaded position
+    effort: FloatArray  # (4, ..., n), q q', the derivative of q^2/2 by the motion
+    stiffness: FloatArray  # (4, ..., n), (q q')'
+    bend: FloatArray | None = None  # (4, ..., n), (q q')''; None if it was not requested
 
 
 def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool = False) -> UnitCurves:
@@ -90,14 +78,14 @@ def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool
         _, _, b1, _ = first
         b2 = (r1 * sine / r2 + rise * b1**2) / level
         x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
-        second = np.stack([np.zeros_like(angle), b2, b2, x2])
+        second = np.stack([np.zeros_like(b2), b2, b2, x2])
         effort = turn * first
         stiffness = first**2 + turn * second
         if not bend:
             return UnitCurves(angle, position, turn, effort, stiffness)
         b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
         x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
-        third = np.stack([np.zeros_like(angle), b3, b3, x3])
+        third = np.stack([np.zeros_like(b3), b3, b3, x3])
         return UnitCurves(angle, position, turn, effort, stiffness, 3.0 * first * second + turn * third)
 
 
@@ -118,7 +106,7 @@ def _first(
     r1, r2 = linkage.crank, linkage.coupler
     rise = (linkage.offset - r1 * sine) / r2  # sin beta
     level = linkage.branch * np.abs((position - r1 * cosine) / r2)  # cos beta, with the sign of the branch
-    first = np.empty((4, *np.shape(sine)))
+    first = np.empty((4, *np.shape(level)))
     first[0], first[2] = 1.0, -r1 * cosine / (r2 * level)
     first[1] = first[2] - 1.0
     first[3] = -r1 * sine - r2 * rise * first[2]
@@ -131,15 +119,15 @@ def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatA
     half = 0.5 * (angle - unloaded)
     middle = 0.5 * (angle + unloaded)
     swing = 2.0 * r1 * np.sin(half)
-    lift0 = r1 * math.sin(unloaded) - e
+    lift0 = r1 * np.sin(unloaded) - e
     rise = swing * np.cos(middle)  # u - u0
     lift = lift0 + rise
-    run0 = math.sqrt(max((r2 - lift0) * (r2 + lift0), 0.0))
+    run0 = np.sqrt(np.maximum((r2 - lift0) * (r2 + lift0), 0.0))
     run = np.sqrt((r2 - lift) * (r2 + lift))
     shorter = rise * (lift + lift0) / (run + run0)  # a0 - a
     coupler = -linkage.branch * np.arctan2(rise * run0 + lift0 * shorter, run * run0 + lift * lift0)
     travel = -swing * np.sin(middle) - linkage.branch * shorter
-    turn = np.empty((4, *np.shape(angle)))
+    turn = np.empty((4, *np.shape(coupler)))
     turn[0], turn[2], turn[3] = 2.0 * half, coupler, travel
     turn[1] = coupler - turn[0]
     return turn, r1 * np.cos(angle) + linkage.branch * run
@@ -166,29 +154,7 @@ def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArra
         From the unloaded position [m]; positive to the left on the right branch, to the right on the left one:
         towards the pivot from where the linkage is stretched.
     """
-    if linkage.branch < 0:
-        mirror = along_slider(linkage.mirrored(), math.pi - unloaded, -side, travel)
-        angle, position = math.pi - mirror.angle, -mirror.position
-        return UnitCurves(angle, position, -mirror.turn, mirror.effort, mirror.stiffness)
-    travel = np.asarray(travel, dtype=np.float64)
-    path = _path(linkage, unloaded, side)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        state = path.at(travel)
-        effort, stiffness = path.efforts(state)
-    effort, stiffness = (np.where(path.beyond(travel), np.nan, item) for item in (effort, stiffness))
-    return UnitCurves(unloaded + state.turn[0], state.position, state.turn, effort, stiffness)
-
-
-def slider_forces(linkage: Linkage, unloaded: float, side: int, travel: FloatArray) -> FloatArray:
-    """Return the force of a unit spring at each joint, (4, n): `along_slider` without anything else, and faster."""
-    if linkage.branch < 0:
-        return slider_forces(linkage.mirrored(), math.pi - unloaded, -side, travel)
-    travel = np.asarray(travel, dtype=np.float64)
-    path = _path(linkage, unloaded, side)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = path.forces(path.at(travel))
-    found[:, path.beyond(travel)] = np.nan
-    return found
+    return path_of(linkage, unloaded, side).units(travel)
 
 
 @dataclass(frozen=True)
@@ -209,31 +175,63 @@ NEAR_FOOT = 0.01
 """Below this share of the stretched position squared, x0 squared as a difference has lost digits."""
 
 
-_VIEWS = np.array([1.0, 0.0, 1.0])[:, None]
-"""Whether the spring at pivot, crank pin and slider pin turns with the line from pivot to slider pin."""
-
-
-class _SliderPath:
+@dataclass(frozen=True)
+class SliderPath:
     """The way of the slider of a linkage on one side of the stretched position.
 
     The slider may be on either side of the pivot's foot, and may pass it where the offset is
     too large for the links to fold: x has a sign, and the knee angle keeps its own.
     """
 
-    def __init__(self, linkage: Linkage, unloaded: float, side: int) -> None:
+    linkage: Linkage  # of the right branch
+    is_mirrored: bool  # whether that is the mirror image of the linkage that is meant
+    unloaded: float  # crank angle of `linkage` [rad]
+    side: int
+    start: float  # knee angle in the unloaded position [rad]
+    stretched: float  # x_s [m]
+    gap: float  # x_s^2 - x_0^2 [m^2]
+    x0: float  # x in the unloaded position [m]
+    inward: float  # largest travel, and largest travel backwards [m]
+    outward: float
+    shares: tuple[float, float]  # `_shares` in the unloaded position [rad]
+
+    @classmethod
+    def of(cls, linkage: Linkage, unloaded: float, side: int) -> SliderPath:
+        """Return the way of the slider of one linkage."""
+        if linkage.branch < 0:
+            return replace(cls.of(linkage.mirrored(), math.pi - unloaded, -side), is_mirrored=True)
         knee = linkage.knee(unloaded)
-        self.linkage, self.side = linkage, side
-        self.start = side * math.pi if knee == math.pi else knee  # folded is on either side
+        start = side * math.pi if knee == math.pi else knee  # folded is on either side
         xs, place = linkage.stretched_position, float(linkage.slider_position(np.asarray(unloaded)))
-        self.gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * self.start) ** 2
-        square = max(xs**2 - self.gap, 0.0)
-        self.x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
-        self.inward, self.outward = linkage.room(unloaded)
-        self.phi0, self.chi0 = _shares(linkage, np.sin(self.start), np.cos(self.start))
+        gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * start) ** 2
+        square = max(xs**2 - gap, 0.0)
+        x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
+        phi, chi = _shares(linkage, np.sin(start), np.cos(start))
+        shares = float(phi), float(chi)
+        return cls(linkage, False, unloaded, side, start, xs, gap, x0, *linkage.room(unloaded), shares)
+
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
+    def units(self, travel: FloatArray) -> UnitCurves:
+        """Return the unit curves at some travels."""
+        travel = np.asarray(travel, dtype=np.float64)
+        state, beyond = self.at(travel), self.beyond(travel)
+        effort, stiffness = (np.where(beyond, np.nan, item) for item in self.efforts(state))
+        angle = self.unloaded + state.turn[0]
+        if self.is_mirrored:
+            return UnitCurves(math.pi - angle, -state.position, -state.turn, effort, stiffness)
+        return UnitCurves(angle, state.position, state.turn, effort, stiffness)
+
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
+    def unit_forces(self, travel: FloatArray) -> FloatArray:
+        """Return the force of a unit spring at each joint: that of `units` without anything else, and faster."""
+        travel = np.asarray(travel, dtype=np.float64)
+        found = self.forces(self.at(travel))
+        found[:, self.beyond(travel)] = np.nan
+        return found
 
     def beyond(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""
-        slack = 1e-12 * abs(self.x0)
+        slack = 1e-12 * np.abs(self.x0)
         found: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
         return found
 
@@ -242,10 +240,10 @@ class _SliderPath:
 
         The product of both is x_s^2 - x^2.
         """
-        xs = self.linkage.stretched_position
-        if self.x0 >= 0.0:
-            return np.maximum(self.gap / (xs + self.x0) + travel, 0.0), xs + (self.x0 - travel)
-        return xs + (travel - self.x0), np.maximum(self.gap / (xs - self.x0) - travel, 0.0)
+        xs, outside = self.stretched, np.asarray(self.x0) >= 0.0
+        near = np.maximum(self.gap / (xs + np.abs(self.x0)) + np.where(outside, travel, -travel), 0.0)
+        far = xs + np.where(outside, self.x0 - travel, travel - self.x0)
+        return np.where(outside, near, far), np.where(outside, far, near)
 
     def at(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
@@ -253,16 +251,16 @@ class _SliderPath:
         position = self.x0 - travel
         ahead, behind = self._to_stretched(travel)
         share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
-        other = math.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
+        other = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
         folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(other, 0.0), 1.0)))
         knee = self.side * np.where(share > NEARLY_FOLDED, folding, 2.0 * np.arcsin(np.minimum(share, 1.0)))
         e = link.offset
         view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
         sine, cosine = np.sin(knee), np.cos(knee)
         phi, chi = _shares(link, sine, cosine)
-        turn = np.empty((4, *np.shape(travel)))
-        turn[0], turn[1] = view + phi - self.phi0, self.start - knee
-        turn[2], turn[3] = view - (chi - self.chi0), -travel
+        turn = np.empty((4, *np.shape(knee)))
+        turn[0], turn[1] = view + phi - self.shares[0], self.start - knee
+        turn[2], turn[3] = view - (chi - self.shares[1]), -travel
         return _SliderState(knee, position, turn, sine, cosine)
 
     def forces(self, state: _SliderState) -> FloatArray:
@@ -271,10 +269,12 @@ class _SliderPath:
         d2, by_knee = self._by_knee(state.cosine)
         lever = state.position / (link.crank * link.coupler)  # psi' = lever / sin psi
         ratio = state.turn[:3] / state.sine
-        if self.start == 0.0 or abs(self.start) == math.pi:  # 0/0 where relaxed: the limit is that of the slopes
-            ratio = np.where(state.knee == self.start, by_knee / np.cos(self.start), ratio)
+        relaxed = (np.equal(self.start, 0.0) | np.equal(np.abs(self.start), math.pi)) & (state.knee == self.start)
+        if relaxed.any():  # 0/0: the limit is that of the slopes
+            ratio = np.where(relaxed, by_knee / np.cos(self.start), ratio)
         effort = np.empty_like(state.turn)
-        effort[:3] = state.turn[:3] * _VIEWS * (link.offset / d2) + ratio * by_knee * lever
+        effort[:3] = ratio * by_knee * lever
+        effort[:3:2] += state.turn[:3:2] * (link.offset / d2)  # these turn with the line from pivot to slider pin, too
         effort[3] = -state.turn[3]
         return effort
 
@@ -298,17 +298,19 @@ class _SliderPath:
         bends = np.stack([bend, np.zeros_like(knee), bend])
         knee1 = lever / sine
         knee2 = (-1.0 / (r1 * r2) - knee1**2 * cosine) / sine
-        first = _VIEWS * view1 + by_knee * knee1
-        second = _VIEWS * view2 + bends * knee1**2 + by_knee * knee2
-        stiffness = first**2 + state.turn[:3] * second
-        stiffness[:, (sine == 0.0) | (np.abs(knee) == math.pi)] = np.nan
-        return self.forces(state), np.vstack([stiffness, np.ones_like(knee)[None]])
+        first, second = by_knee * knee1, bends * knee1**2 + by_knee * knee2
+        first[::2] += view1
+        second[::2] += view2
+        stiffness = np.ones((4, *np.shape(knee)))
+        stiffness[:3] = first**2 + state.turn[:3] * second
+        stiffness[:3, (sine == 0.0) | (np.abs(knee) == math.pi)] = np.nan
+        return self.forces(state), stiffness
 
 
 @lru_cache(maxsize=8)
-def _path(linkage: Linkage, unloaded: float, side: int) -> _SliderPath:
+def path_of(linkage: Linkage, unloaded: float, side: int) -> SliderPath:
     """Return the way of the slider: places are solved for on one and the same again and again."""
-    return _SliderPath(linkage, unloaded, side)
+    return SliderPath.of(linkage, unloaded, side)
 
 
 def _shares(linkage: Linkage, sine: FloatArray, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -20,9 +20,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, remainder, tau
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from cfmkit.arrays import Several, ShortRepr
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.numerics.hermite_cubic_turning_points import Monotone
+
+    Ends = tuple[FloatArray, ...]
 
 
 CLASSES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")
@@ -46,32 +50,20 @@ BOUNDARY = 1e-3
 """A drop so near to 1 may be on either side of it in a mechanism that is made."""
 
 
-@dataclass(frozen=True)
-class Classified:
-    """The classes of m curves.
+@dataclass(frozen=True, repr=False)
+class Classified(ShortRepr):
+    """The classes of m curves."""
 
-    Attributes
-    ----------
-    kind : (m,) array of int
-        Index into `CLASSES`.
-    drop : (m,) array
-        D, the largest fall after a peak as a fraction of that peak; 1 where a second equilibrium begins to exist.
-    stable, unstable : (m,) array of int
-        Equilibria in the interval, the unloaded position included.
-    """
-
-    kind: NDArray[np.intp]
-    drop: FloatArray
-    stable: NDArray[np.intp]
-    unstable: NDArray[np.intp]
+    kind: NDArray[np.intp]  # (m,), index into `CLASSES`
+    drop: (
+        FloatArray  # (m,), D, the largest fall after a peak as a fraction of it; from 1 on a second equilibrium exists
+    )
+    stable: NDArray[np.intp]  # (m,), equilibria in the interval, the unloaded position included
+    unstable: NDArray[np.intp]  # (m,)
 
 
 def classify(
-    curves: Monotone,
-    start: float,
-    tolerance: float,
-    window: tuple[float, float] | None = None,
-    rest: float | None = None,
+    curves: Monotone, start: FloatArray, rest: FloatArray, tolerance: FloatArray, window: Ends | None
 ) -> Classified:
     """Return the class of each curve.
 
@@ -79,35 +71,33 @@ def classify(
     ----------
     curves : Monotone
         Efforts cut into monotonic pieces.
-    start : float
-        The unloaded position, where the effort is zero whatever rounding says.
-    tolerance : float
+    start, rest : (m, 1) array
+        The unloaded position, and where the effort is known to be zero whatever rounding says, NaN for nowhere.
+    tolerance : (m, 1) array
         Half width of a band that counts as constant: a drop of no more than twice that is zero stiffness.
-    window : tuple of (float, float), optional
+    window : pair of (m, 1) array, optional
         Where the effort is wanted constant: if it is, the stiffness is zero even without any fall.
-    rest : float, optional
-        Where the effort is known to be zero, NaN for nowhere; default: at the start.
     """
     place, value = curves.place, curves.value
     before, after = place <= start, place >= start
     drop = np.maximum(_drop(np.where(after, value, np.nan)), _drop(np.where(before, -value, np.nan)[:, ::-1]))
-    stable, unstable = _equilibria(curves, start if rest is None else rest)
+    stable, unstable = _equilibria(curves, rest)
     falls = drop > 0.0
     if window is not None:
         falls = falls | _constant(curves, window, tolerance)
-    kind = np.where(drop > 2.0 * tolerance, NEGATIVE, np.where(falls, ZERO, POSITIVE))
+    kind = np.where(drop > 2.0 * tolerance[:, 0], NEGATIVE, np.where(falls, ZERO, POSITIVE))
     kind = np.where(unstable > 0, SNAPS, kind)
     kind = np.where(stable == 2, BISTABLE, np.where(stable > 2, TRISTABLE, kind))
     return Classified(kind, drop, stable, unstable)
 
 
-def _constant(curves: Monotone, window: tuple[float, float], tolerance: float) -> NDArray[np.bool_]:
+def _constant(curves: Monotone, window: Ends, tolerance: FloatArray) -> NDArray[np.bool_]:
     """Return whether (max - min)/|max + min| of each curve in a window is within the tolerance."""
     inside = (curves.place >= window[0]) & (curves.place <= window[1]) & np.isfinite(curves.value)
     high = np.where(inside, curves.value, -np.inf).max(axis=1)
     low = np.where(inside, curves.value, np.inf).min(axis=1)
     with np.errstate(invalid="ignore"):  # where no place is inside
-        constant: NDArray[np.bool_] = inside.any(axis=1) & (high - low <= tolerance * np.abs(high + low))
+        constant: NDArray[np.bool_] = inside.any(axis=1) & (high - low <= tolerance[:, 0] * np.abs(high + low))
     return constant
 
 
@@ -120,7 +110,7 @@ def _drop(walk: FloatArray) -> FloatArray:
     return np.where(drop > ROUNDING, drop, 0.0)
 
 
-def signs(curves: Monotone, start: float) -> NDArray[np.int8]:
+def signs(curves: Monotone, start: FloatArray) -> NDArray[np.int8]:
     """Return the signs of the efforts, (m, k): 0 in the unloaded position and where only rounding is left."""
     scale = np.nanmax(np.abs(curves.value), axis=1, initial=0.0, keepdims=True)
     sign = np.sign(curves.value).astype(np.int8)
@@ -129,7 +119,7 @@ def signs(curves: Monotone, start: float) -> NDArray[np.int8]:
     return sign
 
 
-def _equilibria(curves: Monotone, start: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _equilibria(curves: Monotone, start: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the numbers of stable and unstable equilibria, those at the ends included."""
     sign = signs(curves, start)
     ends = sign[:, [0]] == 0, sign[:, [-1]] == 0
@@ -156,54 +146,52 @@ SAMPLES, AROUND = 1001, 101
 """Places of the first look, and of each closer one around the highest of them."""
 
 
-def scale_factors(assembly: Assembly, low: float, high: float) -> tuple[float, float] | None:
-    """Return the factors k1 and k2 by which the torsion springs would have to be scaled, all alike.
+def scale_factors(assembly: Assembly, low: Any, high: Any) -> Ends:
+    """Return the factors k1 and k2 by which the torsion springs would have to be scaled, all alike, (m,) each.
+
+    NaN where there is no torsion spring or no spring at the slider; infinite where no factor is enough.
 
     Parameters
     ----------
     assembly : Assembly
-        Its rates are the springs for a factor of 1.
-    low, high : float
+        Its rates are the springs for a factor of 1; one mechanism, or m as rows.
+    low, high : float or (m, 1) array
         The motion that is looked at; the unloaded position is left out.
-
-    Returns
-    -------
-    tuple of (float, float) or None
-        None where there is no torsion spring or no spring at the slider; infinite where no factor is enough.
     """
-    torsion, slider = assembly.rates[:3], float(assembly.rates[3])
-    if not torsion.any() or slider == 0.0:
-        return None
+    rates = assembly.rates.reshape(4, -1)
+    none = ~rates[:3].any(axis=0) | (rates[3] == 0.0)
 
-    def ratios(motion: FloatArray) -> tuple[FloatArray, FloatArray]:
-        units = assembly.units(motion)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            efforts = torsion @ units.effort[:3], slider * units.effort[3]
-            slopes = torsion @ units.stiffness[:3], slider * units.stiffness[3]
-        return _needed(*efforts, motion - assembly.start), _needed(*slopes, np.ones_like(motion))
+    def needed(unit: FloatArray, sign: FloatArray | float) -> FloatArray:
+        unit = assembly.rates_over(unit) * unit
+        return _needed(unit[:3].sum(axis=0), unit[3], sign)
 
-    return _highest(lambda motion: ratios(motion)[0], low, high), _highest(lambda motion: ratios(motion)[1], low, high)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = _highest(lambda motion: needed(assembly.forces(motion), motion - assembly.start), low, high)
+        second = _highest(lambda motion: needed(assembly.units(motion).stiffness, 1.0), low, high)
+    return Several((np.where(none, np.nan, first), np.where(none, np.nan, second)))
 
 
-def _needed(torsion: FloatArray, slider: FloatArray, sign: FloatArray) -> FloatArray:
+def _needed(torsion: FloatArray, slider: FloatArray, sign: FloatArray | float) -> FloatArray:
     """Return the factor with which sign * (factor * torsion + slider) is not negative; infinite where none is."""
     torsion, slider = np.sign(sign) * torsion, np.sign(sign) * slider
-    with np.errstate(divide="ignore", invalid="ignore"):
-        needed = np.where(torsion > 0.0, -slider / torsion, np.where(slider < 0.0, np.inf, 0.0))
+    needed = np.where(torsion > 0.0, -slider / torsion, np.where(slider < 0.0, np.inf, 0.0))
     return np.where(np.isfinite(slider) & (sign != 0.0), needed, -np.inf)
 
 
-def _highest(function: Callable[[FloatArray], FloatArray], low: float, high: float) -> float:
-    """Return the largest value in an interval: on a grid, then on ever finer ones around its highest place."""
+def _highest(function: Callable[[FloatArray], FloatArray], low: Any, high: Any) -> FloatArray:
+    """Return the largest value in each interval: on a grid, then on ever finer ones around its highest place, (m,)."""
+    low, high = np.reshape(low, (-1, 1)), np.reshape(high, (-1, 1))
+    best = np.full(1, -np.inf)
     for count in (SAMPLES, AROUND, AROUND, AROUND):
-        places = np.linspace(low, high, count)
+        step = (high - low) / (count - 1)
+        places = low + step * np.arange(count)
         values = function(places)
-        top = int(np.argmax(values))
-        best, step = float(values[top]), places[1] - places[0]
-        if not np.isfinite(best):
-            return best
-        low, high = max(low, float(places[top] - step)), min(high, float(places[top] + step))
-    return max(best, 0.0)
+        top = values.argmax(axis=1)[:, None]
+        here = np.take_along_axis(np.broadcast_to(places, values.shape), top, 1)
+        found = np.take_along_axis(values, top, 1)[:, 0]
+        best = np.where(np.isinf(best) & (count < SAMPLES), best, found)
+        low, high = np.maximum(low, here - step), np.minimum(high, here + step)
+    return np.where(np.isfinite(best), np.maximum(best, 0.0), best)
 
 
 def small_angle_number(assembly: Assembly) -> float | None:

@@ -202,7 +202,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
     """Return what can be used at each joint, and what is refused because it does not fit or is moved too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])
-    high, low = MotionExtremes(assembly, *ends).turns
+    high, low = (turns[:, 0] for turns in MotionExtremes(assembly, *ends).turns)
     usable: list[SpringOption] = []
     refused: list[Miss] = []
     for joint, name in enumerate(JOINTS):

@@ -66,7 +66,7 @@ class KeyPosition:
     def title(self, solution: Solution) -> str:
         """Return what stands above its panel."""
         angle = format_short(self.angle, "angle", 3)
-        if solution.assembly.drive == "torque":
+        if solution.drive == "torque":
             return f"{self.name}: crank at {angle}"
         return f"{self.name}: {format_short(self.motion, 'length', 3)},\ncrank at {angle}"
 
@@ -112,13 +112,14 @@ def key(solution: Solution, name: str, motion: float) -> KeyPosition:
 
 def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
     """Return three telling positions: unloaded, stretched or unstable, and the second stable one or the last."""
-    low, high = float(solution.motion[0]), float(solution.motion[-1])
+    low, high = float(solution.motion[0, 0]), float(solution.motion[0, -1])
     start, stretched = solution.assembly.start, solution.assembly.stretched
-    first = key(solution, "unloaded", start) if low <= solution.assembly.rest <= high else key(solution, "first", low)
-    unstable, stable = solution.nearest(False), solution.nearest(True)
+    at_rest = low <= solution.assembly.rest <= high
+    first = key(solution, "unloaded", start) if at_rest else key(solution, "first", low)
+    unstable, stable = solution.nearest_of_one(stable=False), solution.nearest_of_one(stable=True)
     if unstable is not None:
         middle = key(solution, "unstable", unstable.motion)
-    elif solution.assembly.drive == "torque" and low < stretched < high and abs(stretched - start) > 1e-9:
+    elif solution.drive == "torque" and low < stretched < high and abs(stretched - start) > 1e-9:
         middle = key(solution, "stretched", stretched)
     else:
         middle = key(solution, "half way", 0.5 * (low + high))
@@ -131,14 +132,14 @@ def scene(result: Result) -> PanelView:
     """Return a box around all positions of the motion, with room for symbols."""
     solution: Solution = result.state
     link, units = solution.assembly.linkage, solution.units
-    x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
-    y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle)])
+    x = np.concatenate([[0.0], link.crank * np.cos(units.angle[0]), units.position[0]])
+    y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle[0])])
     extent = max(float(np.ptp(x)), float(np.ptp(y)))
     size = 0.045 * extent
     far = float(units.position.max()) if link.branch > 0 else float(units.position.min())
     wall = far + link.branch * 4.0 * size
     springs: Springs = result.spec.at("mechanism.springs")
-    if springs.pulled_outwards(*(float(end[3]) for end in solution.extremes.turns)):
+    if springs.pulled_outwards(*(float(end[3, 0]) for end in solution.extremes.turns)):
         # it lies beside the coupler, as long as its wire is wound
         rest = float(solution.assembly.units(np.array([solution.assembly.start])).position[0])
         wall = rest - link.branch * max(loaded_length(coil) for coil in springs.coils_at("slider"))
@@ -174,7 +175,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
 def motion_scale(solution: Solution) -> Scale:
     """Return the horizontal axis of every diagram."""
-    if solution.assembly.drive == "torque":
+    if solution.drive == "torque":
         return Scale("crank angle", "angle")
     return Scale("travel of the slider", "length")
 
@@ -183,7 +184,7 @@ def motion_scale(solution: Solution) -> Scale:
 def curve(result: Result) -> Figure:
     """Return torque or force over the motion: the constant band named, equilibria marked."""
     solution: Solution = result.state
-    drive = solution.assembly.drive
+    drive = solution.drive
     over = "crank angle" if drive == "torque" else "travel of the slider"
     heading = f"{drive} over {over}: {_kind(solution)}"
     figure = loop_figure(result, None, heading)
@@ -195,19 +196,19 @@ def curve(result: Result) -> Figure:
 
 def _kind(solution: Solution) -> str:
     """Return the class of the stiffness in words for a heading."""
-    name = solution.character.name
+    name = solution.name
     return name if name in ("bistable", "tristable", "snap-through") else f"{name} stiffness"
 
 
 def _band(ax: Axes, solution: Solution) -> None:
     """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
-    if solution.band is None or solution.character.kind > NEGATIVE:
+    if np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE:
         return
     dimension = motion_scale(solution).dimension
-    low, high = (float(to_border(end, dimension)) for end in solution.band)
+    low, high = (float(to_border(float(end[0]), dimension)) for end in solution.band)
     ax.axvspan(low, high, color=BLUE, alpha=0.10, linewidth=0, zorder=0.5, gid="no-obstacle")
-    width = value_text(solution.band[1] - solution.band[0], dimension)
-    text = f"within {100.0 * solution.character.tolerance:g} %: {width}"
+    width = value_text(float(solution.band[1][0] - solution.band[0][0]), dimension)
+    text = f"within {100.0 * solution.tolerance[0, 0]:g} %: {width}"
     floor, ceiling = ax.get_ylim()
     places = np.column_stack([np.full(40, 0.5 * (low + high)), np.linspace(floor, ceiling, 42)[1:-1]])
     place_labels(ax, [Label(text, BLUE, places, prefer=0.12)])
@@ -216,7 +217,7 @@ def _band(ax: Axes, solution: Solution) -> None:
 def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], float]) -> None:
     """Mark stable equilibria with a full, unstable ones with an open circle."""
     dimension = motion_scale(solution).dimension
-    for item in solution.character.equilibria:
+    for item in solution.equilibria:
         x, y = float(to_border(item.motion, dimension)), height(item.motion, item.energy)
         if not ax.get_ylim()[0] <= y <= ax.get_ylim()[1]:
             continue
@@ -232,15 +233,15 @@ def energy(result: Result) -> Figure:
     """Return the energy over the motion with its wells, and the share of each spring."""
     solution: Solution = result.state
     rates = solution.assembly.rates
-    shares = 0.5 * rates[:, None] * solution.units.turn**2
-    series = [Series(solution.energy, "all springs", INK, prefer=0.75)]
+    shares = 0.5 * rates[:, None] * solution.units.turn[:, 0] ** 2
+    series = [Series(solution.energy[0], "all springs", INK, prefer=0.75)]
     if (rates > 0.0).sum() > 1:
         series += [
             Series(shares[k], name.replace("_", " "), COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
             for k, name in enumerate(JOINTS)
             if rates[k] > 0.0
         ]
-    diagram = Diagram(solution.motion, motion_scale(solution), Scale("energy", "energy"), series)
+    diagram = Diagram(solution.motion[0], motion_scale(solution), Scale("energy", "energy"), series)
     figure = diagram_figure(Heading.of(result, "energy of the springs, and its minima"), [diagram])
     _equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
     _name_wells(figure.axes[0], solution)
@@ -249,7 +250,7 @@ def energy(result: Result) -> Figure:
 
 def _name_wells(ax: Axes, solution: Solution) -> None:
     dimension, found = motion_scale(solution).dimension, []
-    for item in solution.character.equilibria:
+    for item in solution.equilibria:
         place = float(to_border(item.motion, dimension)), float(to_border(item.energy, "energy"))
         text = f"{'stable' if item.stable else 'unstable'} pose at {value_text(item.motion, dimension)}"
         found.append(Label(text, INK if item.stable else GREY, np.array([place]), toward=(0.0, 1.0)))
@@ -260,18 +261,18 @@ def _name_wells(ax: Axes, solution: Solution) -> None:
 def springs(result: Result) -> Figure:
     """Return the effort of each spring over the motion, and the stiffness of all."""
     solution: Solution = result.state
-    drive, over = solution.assembly.drive, motion_scale(solution)
+    drive, over = solution.drive, motion_scale(solution)
     there = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
     series = [
-        Series(solution.shares[k], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.9 - 0.12 * n)
+        Series(solution.shares[k, 0], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.9 - 0.12 * n)
         for n, k in enumerate(there)
     ]
     if len(there) > 1:
-        series.insert(0, Series(solution.effort, "all springs", INK, prefer=0.7))
+        series.insert(0, Series(solution.effort[0], "all springs", INK, prefer=0.7))
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
-    slope = [Series(solution.stiffness, "", INK)]
-    upper = Diagram(solution.motion, over, Scale(f"{drive} of a spring", drive), series)
-    lower = Diagram(solution.motion, over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
+    slope = [Series(solution.stiffness[0], "", INK)]
+    upper = Diagram(solution.motion[0], over, Scale(f"{drive} of a spring", drive), series)
+    lower = Diagram(solution.motion[0], over, Scale("stiffness", rate), slope, [Limit(0.0, "zero stiffness")])
     heading = Heading.of(result, f"what each spring adds to the {drive}, and the slope of all")
     return diagram_figure(heading, [upper, lower])
 
@@ -280,17 +281,17 @@ def springs(result: Result) -> Figure:
 def joints(result: Result) -> Figure:
     """Return how far each joint turns, against its limit, and the forces inside."""
     solution: Solution = result.state
-    turn, over = solution.units.turn, motion_scale(solution)
+    turn, over = solution.units.turn[:, 0], motion_scale(solution)
     series = [Series(turn[k], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)]
     limits = [limit for name in JOINTS[:3] for limit in limits_on(result, f"{name}_rotation_max")]
-    coupler, guide = solution.reactions
+    coupler, guide = (force[0] for force in solution.reactions)
     forces = [
         Series(coupler, "along the coupler, tension", BLUE),
         Series(guide, "on the guide", VERMILLION, prefer=0.8),
     ]
     diagrams = [
-        Diagram(solution.motion, over, Scale("rotation", "angle"), series, limits),
-        Diagram(solution.motion, over, Scale("force of one leg", "force"), forces),
+        Diagram(solution.motion[0], over, Scale("rotation", "angle"), series, limits),
+        Diagram(solution.motion[0], over, Scale("force of one leg", "force"), forces),
     ]
     return diagram_figure(Heading.of(result, "rotations of the joints, and forces inside"), diagrams)
 
@@ -327,10 +328,13 @@ def _key_curve(
     solution: Solution = result.state
     ax = axes_mm(figure, box)
     plot_curve(result, ax, CurveLook(bands=False, arrows=False, names=False))
-    drive, dimension = solution.assembly.drive, motion_scale(solution).dimension
+    drive, dimension = solution.drive, motion_scale(solution).dimension
     names = []
     for key in keys:
-        place = float(to_border(key.motion, dimension)), float(to_border(solution.character.effort(key.motion), drive))
+        place = (
+            float(to_border(key.motion, dimension)),
+            float(to_border(solution.frictionless(np.array([[key.motion]]))[0], drive)),
+        )
         ax.plot(*[[value] for value in place], marker="o", markersize=4, color=VERMILLION, linestyle="", zorder=5)
         names.append(Label(key.name, VERMILLION, np.array([place]), toward=(0.0, 1.0)))
     place_labels(ax, names)
@@ -354,7 +358,7 @@ def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: PanelView
     for rate, joint, direction in zip(rates[:3], key.joints, key.directions, strict=True):
         if rate > 0.0:
             parts.edge(ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=OCHRE, zorder=3.6)
-    if solution.assembly.drive == "force":
+    if solution.drive == "force":
         tail = end[0] + 2.6 * size * link.branch, end[1]
         parts.force_arrow(ax, tail, (end[0] + 0.6 * size * link.branch, end[1]))
     parts.to_scale(ax, view.box)
@@ -370,7 +374,7 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
         parts.part_name("coupler", coupler, (0.0, 1.0)),
         parts.part_name("slider", [key.slider_pin], (0.0, -1.0)),
     ]
-    if solution.assembly.drive == "force":
+    if solution.drive == "force":
         tail = np.array([key.slider_pin[0] + 1.8 * view.size * solution.assembly.linkage.branch, key.slider_pin[1]])
         found.append(parts.part_name("F", [tail], (0.0, 1.0), VERMILLION))
     return found
@@ -379,7 +383,7 @@ def _names(solution: Solution, key: KeyPosition, view: PanelView) -> list[Label]
 def moving(result: Result) -> Moving:
     """Return the linkage over its motion, for a film."""
     solution: Solution = result.state
-    motion, view = solution.motion[chosen(len(solution.motion))], scene(result)
+    motion, view = solution.motion[0, chosen(solution.motion.shape[1])], scene(result)
     poses = [key(solution, "", float(place)) for place in motion]
     return Moving(
         motion,
@@ -409,7 +413,7 @@ def draw_as_made(result: Result, key: KeyPosition, ax: Axes, view: PanelView) ->
     if rates[3] > 0.0:
         wide = max((coil.outer_diameter for coil in spec.mechanism.springs.coils_at("slider")), default=half)
         parts.spring(ax, key.slider_pin, (view.wall, offset), wide, "spring-slider")
-    if solution.assembly.drive == "force":
+    if solution.drive == "force":
         out = view.size * solution.assembly.linkage.branch
         tail, tip = (key.slider_pin[0] + 2.6 * out, offset), (key.slider_pin[0] + 0.6 * out, offset)
         parts.force_arrow(ax, tail, tip)

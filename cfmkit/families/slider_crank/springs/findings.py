@@ -1,206 +1,358 @@
-"""What is wrong, or surprising, about a solved slider-crank with springs."""
+"""What is wrong, or surprising, about solved slider-cranks with springs: predicate and sentence of each finding.
+
+Predicates take the solution of any number of mechanisms, sentences that of one.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.findings import deg, mm, newton
-from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.rows import FindingRule
 from cfmkit.families.slider_crank.springs.bistability_class import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
-from cfmkit.families.slider_crank.springs.bought_spring_limits import bought_spring_faults
+from cfmkit.families.slider_crank.springs.bought_spring_limits import fault_of_bought_spring
 from cfmkit.families.slider_crank.springs.sprung_linkage import TURN
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Sequence
 
-    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.solution import Solution
-    from cfmkit.results import Finding
+    from cfmkit.families.slider_crank.springs.spec import Bought
+
+    Sentence = tuple[Any, ...]
+    Rule = FindingRule[Solution]
 
 
 RUN_IN = 0.02
 """An unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly."""
 
-
-def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...]:
-    """Return everything that the user must know."""
-    if not solution.assembly.rates.any():
-        return (finding("no_spring", "no spring has a rate: the mechanism moves freely; set 'mechanism.springs'"),)
-    held = _of_friction(solution)
-    own = _of_torque(solution) if solution.assembly.drive == "torque" else _of_force(spec, solution)
-    return (*held, *_of_class(solution), *own, *_of_band(spec, solution), *_of_limits(spec, solution))
+ON_LIMIT = 1 + 1e-9
+"""A deflection that is beyond its limit by less than this share is on it."""
 
 
 def place(solution: Solution, motion: float) -> str:
     """Return a place of the motion as the user reads it."""
-    return format_short(motion, solution.assembly.dimension)
+    return format_short(motion, solution.assemblies[0].dimension)
 
 
-def _of_friction(solution: Solution) -> Iterator[Finding]:
-    for name, way in zip(("forth", "back"), solution.ways or (), strict=False):
-        held = ~np.isfinite(way.effort)
-        if held[1:].any():
-            first, last = (place(solution, float(solution.motion[held][end])) for end in (0, -1))
-            yield finding(
-                "self_locks",
-                f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
-                "the friction circles of the pins; use pins of smaller diameter or friction ('mechanism.pins'), or "
-                "a motion that ends before the stretched position",
-            )
+# --- friction and class ---------------------------------------------------------------------------------------------
 
 
-def _of_class(solution: Solution) -> Iterator[Finding]:
-    found, unstable = solution.character, solution.nearest(False)
-    if found.kind == SNAPS and unstable is not None:
-        yield finding(
-            "second_stable_outside",
-            f"at {place(solution, unstable.motion)} the mechanism snaps through, and the motion ends before the "
-            "next stable position; extend the motion to find it",
-        )
-    if abs(found.drop - 1.0) < BOUNDARY:
-        side = "has" if found.kind in (SNAPS, BISTABLE, TRISTABLE) else "just misses"
-        yield finding(
-            "class_boundary",
-            f"the lowest {solution.assembly.drive} after the peak is {100 * (1 - found.drop):.2g} % of the peak: the "
-            f"mechanism {side} a second equilibrium, and springs a little stiffer or softer change that",
-        )
-    start = solution.assembly.start
-    if found.low <= start <= found.high and _restless(solution):
-        yield finding(
-            "quartic_minimum",
-            "only the slider's spring acts, and it is relaxed in the stretched position: the energy grows with the "
-            "fourth power there, and the stiffness at rest is zero; add a torsion spring",
+def _locks(number: int, name: str) -> Rule:
+    """Return the rule on places of one of both ways where friction holds the mechanism."""
+
+    def holds(solution: Solution) -> Any:
+        return solution.ways is not None and (~np.isfinite(solution.ways[number].effort)[:, 1:]).any(axis=1)
+
+    def sentence(solution: Solution) -> Sentence:
+        assert solution.ways is not None
+        held = solution.motion[0, ~np.isfinite(solution.ways[number].effort[0])]
+        first, last = (place(solution, float(held[end])) for end in (0, -1))
+        return (
+            f"on the way {name} the mechanism self-locks from {first} to {last}: the line of force runs inside "
+            "the friction circles of the pins; use pins of smaller diameter or friction ('mechanism.pins'), or "
+            "a motion that ends before the stretched position",
         )
 
-
-def _restless(solution: Solution) -> bool:
-    assembly = solution.assembly
-    return assembly.drive == "torque" and not assembly.rates[:3].any() and assembly.linkage.knee(assembly.unloaded) == 0
+    return FindingRule("self_locks", holds, sentence)
 
 
-def _of_torque(solution: Solution) -> Iterator[Finding]:
-    assembly, found = solution.assembly, solution.character
-    turns = found.high - found.low >= TURN * (1 - 1e-9)
-    wound = [name for name, rate in zip(JOINTS[:2], assembly.rates, strict=False) if rate > 0.0]
-    if turns and wound:
-        yield finding(
-            "spring_winds_up",
-            f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
-            "wound up: the torque differs in the next turn; only springs at slider and slider pin repeat",
-        )
-    rests = [item.motion for item in found.equilibria if item.stable]
-    again = [(a, b) for a in rests for b in rests if a < b and _same_pose(a, b)]
-    if again:
-        different = sum(not any(_same_pose(a, b) for a in rests if a < b) for b in rests)
-        yield finding(
-            "same_position_twice",
-            f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {found.name} curve has "
-            f"{different} different stable positions in a full turn",
-        )
+def _snaps_out(solution: Solution) -> Any:
+    return (solution.classified.kind == SNAPS) & (solution.classified.unstable > 0)
 
 
-def _same_pose(first: float, second: float) -> bool:
-    """Return whether two crank angles are whole turns apart."""
-    return abs(math.remainder(second - first, TURN)) < 1e-6
+def _snap(solution: Solution) -> Sentence:
+    return (
+        f"at {place(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and the "
+        "motion ends before the next stable position; extend the motion to find it",
+    )
 
 
-def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    assembly, link = solution.assembly, solution.assembly.linkage
-    knee = link.knee(assembly.unloaded)
-    if knee == 0.0:
-        found = solution.character.effort(0.0)
-        yield finding(
-            "stretched_start",
-            f"the linkage starts in the stretched position, where the force is 0/0: its limit is {newton(found)}, "
-            "the buckling load of a column; a kink smaller than the part's tolerance determines the side",
-        )
-        if spec.analysis.side is None:
-            yield finding(
-                "two_positions",
-                "from the stretched position the crank can move to either side, and 'analysis.side' is not stated: "
-                "'beyond' is assumed; with an offset the force on the other side differs",
-                "analysis.side=before",
-            )
-    elif math.isnan(assembly.rest) and abs(knee) < RUN_IN and solution.motion[0] <= 0.0:
-        yield finding(
-            "force_unbounded",
-            f"the springs are relaxed {deg(abs(assembly.unloaded - link.stretched_angle))} away, on the far side "
-            "of the stretched position: at the stretched position the force is unbounded; leave 'analysis.side' out to "
-            "start on the side on which they are relaxed",
-        )
-    elif abs(knee) < RUN_IN and solution.motion[0] <= 0.0 <= solution.motion[-1]:
-        yield from _run_in(solution)
-    low = assembly.reach[0]
-    span = solution.character.high - solution.character.low
-    if abs(knee) >= RUN_IN and solution.character.low < low + 0.01 * span and low < -1e-9 * span:
-        yield finding(
-            "force_unbounded",
-            f"at {mm(low)} of travel crank and coupler are in one line and the springs are not relaxed: no finite "
-            "force moves the slider there; choose a motion that does not reach it",
-        )
+def _boundary(solution: Solution) -> Sentence:
+    kind, drop = int(solution.classified.kind[0]), float(solution.classified.drop[0])
+    side = "has" if kind in (SNAPS, BISTABLE, TRISTABLE) else "just misses"
+    return (
+        f"the lowest {solution.drive} after the peak is {100 * (1 - drop):.2g} % of the peak: the "
+        f"mechanism {side} a second equilibrium, and springs a little stiffer or softer change that",
+    )
 
 
-def _run_in(solution: Solution) -> Iterator[Finding]:
-    """Yield how far the force needs to come up: to 95 % of what it is in the middle of the motion."""
-    motion = np.geomspace(1e-9, 1.0, 400) * float(solution.motion[-1])
-    force = solution.assembly.rates @ solution.assembly.units(motion).effort
-    there = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * motion[-1], motion, force)))
-    lead = solution.assembly.unloaded - solution.assembly.linkage.stretched_angle
+def _knee(solution: Solution) -> FloatArray:
+    return solution.column(lambda assembly: assembly.knee)[:, 0]
+
+
+def _is_restless(solution: Solution) -> Any:
+    inside = (solution.low <= solution.start) & (solution.start <= solution.high)
+    only_slider = ~solution.assembly.rates.reshape(4, -1)[:3].any(axis=0)
+    return (solution.drive == "torque") & inside[:, 0] & only_slider & (_knee(solution) == 0)
+
+
+def _rest(_solution: Solution) -> Sentence:
+    return (
+        "only the slider's spring acts, and it is relaxed in the stretched position: the energy grows with the "
+        "fourth power there, and the stiffness at rest is zero; add a torsion spring",
+    )
+
+
+# --- driven by a torque ---------------------------------------------------------------------------------------------
+
+
+def _winds_up(solution: Solution) -> Any:
+    turns = (solution.high - solution.low)[:, 0] >= TURN * (1 - 1e-9)
+    return (solution.drive == "torque") & turns & (solution.assembly.rates.reshape(4, -1)[:2] > 0.0).any(axis=0)
+
+
+def _winding(solution: Solution) -> Sentence:
+    rates = solution.assemblies[0].rates
+    wound = [name for name, rate in zip(JOINTS[:2], rates, strict=False) if rate > 0.0]
+    return (
+        f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
+        "wound up: the torque differs in the next turn; only springs at slider and slider pin repeat",
+    )
+
+
+def _same_poses(rests: Sequence[float]) -> list[tuple[float, float]]:
+    """Return pairs of crank angles that are whole turns apart."""
+    return [(a, b) for a in rests for b in rests if a < b and abs(math.remainder(b - a, TURN)) < 1e-6]
+
+
+def _rests_again(solution: Solution) -> Any:
+    again = np.zeros(len(solution), dtype=bool)
+    if solution.drive == "torque" and (solution.high - solution.low > TURN - 2e-6).any():
+        rows, places, stable, _ = solution.all_equilibria
+        for row in np.unique(rows).tolist():
+            again[row] = bool(_same_poses(places[(rows == row) & stable].tolist()))
+    return again
+
+
+def _again(solution: Solution) -> Sentence:
+    rests = [one.motion for one in solution.equilibria if one.stable]
+    again = _same_poses(rests)
+    different = len(set(rests) - {second for _, second in again})
+    return (
+        f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {solution.name} curve has "
+        f"{different} different stable positions in a full turn",
+    )
+
+
+# --- driven by a force ----------------------------------------------------------------------------------------------
+
+
+def _starts_stretched(solution: Solution) -> Any:
+    return (solution.drive == "force") & (_knee(solution) == 0.0)
+
+
+def _column(solution: Solution) -> Sentence:
+    return (
+        "the linkage starts in the stretched position, where the force is 0/0: its limit is "
+        f"{newton(float(solution.frictionless(np.zeros((1, 1)))[0]))}, "
+        "the buckling load of a column; a kink smaller than the part's tolerance determines the side",
+    )
+
+
+def _sides(_solution: Solution) -> Sentence:
+    return (
+        "from the stretched position the crank can move to either side, and 'analysis.side' is not stated: "
+        "'beyond' is assumed; with an offset the force on the other side differs",
+        "analysis.side=before",
+    )
+
+
+def _is_nearly_stretched(solution: Solution) -> Any:
+    knee = _knee(solution)
+    return (solution.drive == "force") & (knee != 0.0) & (np.abs(knee) < RUN_IN) & (solution.motion[:, 0] <= 0.0)
+
+
+def _lead(solution: Solution) -> float:
+    return solution.assemblies[0].unloaded - solution.assemblies[0].linkage.stretched_angle
+
+
+def _far_side(solution: Solution) -> Sentence:
+    return (
+        f"the springs are relaxed {deg(abs(_lead(solution)))} away, on the far side "
+        "of the stretched position: at the stretched position the force is unbounded; leave 'analysis.side' out to "
+        "start on the side on which they are relaxed",
+    )
+
+
+def _run_in(solution: Solution) -> Sentence:
+    """Return how far the force needs to come up: to 95 % of what it is in the middle of the motion."""
+    assembly, end = solution.assemblies[0], float(solution.motion[0, -1])
+    motion = np.geomspace(1e-9, 1.0, 400) * end
+    force = assembly.efforts(motion)
+    there = np.flatnonzero(force >= 0.95 * float(np.interp(0.5 * end, motion, force)))
+    lead = _lead(solution)
     until = f"within {mm(float(motion[there[0]]))} it reaches 95 %" if len(there) else "it never reaches 95 %"
-    kink = abs(math.sin(lead)) * solution.assembly.linkage.crank
-    yield finding(
-        "run_in",
+    kink = abs(math.sin(lead)) * assembly.linkage.crank
+    return (
         f"the springs are relaxed {deg(abs(lead))} off the stretched position, a kink of {mm(kink)} at the crank "
         f"pin: the force begins at zero, and {until} of that at mid-travel; a part made less accurately may bend "
         "to the other side. 'unloaded_offset: 0' starts at the full force",
     )
 
 
-def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    found, reference, window = solution.character, solution.reference, solution.character.window
-    asked = spec.analysis.reference_angle if solution.assembly.drive == "torque" else spec.analysis.reference_travel
-    if asked is not None and not found.low <= reference <= found.high:
-        yield finding("reference_outside", f"the reference {place(solution, reference)} is outside the motion")
-    elif found.low <= reference <= found.high and solution.band is None:
-        yield finding(
-            "reference_zero",
-            f"at the reference {place(solution, reference)} the {solution.assembly.drive} is zero, and a "
-            "band stated in per cent of zero has no width; choose another reference",
-        )
-    if window is None:
-        return
-    inside = (solution.motion >= window[0]) & (solution.motion <= window[1])
-    effort = solution.effort[inside]
-    if inside.any() and effort.min() < 0.0 < effort.max():
-        low, high = (format_short(float(end), solution.assembly.drive) for end in (effort.min(), effort.max()))
-        yield finding(
-            "effort_changes_sign",
-            f"in the window the {solution.assembly.drive} changes sign: it goes from {low} to {high}",
-        )
-    if solution.assembly.drive == "torque" and not window[0] <= solution.assembly.stretched <= window[1]:
-        yield finding(
-            "stretched_outside_window",
-            f"the window {deg(window[0])} to {deg(window[1])} does not contain the stretched position "
-            f"{deg(solution.assembly.stretched)}: only around it is the slider's spring certain to give negative "
-            "stiffness",
-        )
+def _nears_pole(solution: Solution) -> Any:
+    if solution.drive != "force":
+        return False
+    end, span = solution.column(lambda assembly: assembly.reach[0]), solution.high - solution.low
+    near = (solution.low < end + 0.01 * span) & (end < -1e-9 * span)
+    return (np.abs(_knee(solution)) >= RUN_IN) & near[:, 0]
 
 
-def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    for fault, message, cures in bought_spring_faults(spec, solution.extremes.largest_turns):
-        yield finding(fault, message, *cures)
-    limits = spec.mechanism.limits
-    if limits is None:
-        return
-    for name, value in zip(JOINTS, solution.extremes.largest_turns.tolist(), strict=True):
-        limit = getattr(limits, name)
-        if limit is not None and value > limit * (1 + 1e-9):
-            dimension = "length" if name == "slider" else "angle"
-            reported, allowed = format_short(value, dimension), format_short(limit, dimension)
-            what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
-            yield finding("joint_overrotated", f"the {what} is deflected by {reported}; its limit is {allowed}")
+def _pole(solution: Solution) -> Sentence:
+    return (
+        f"at {mm(solution.assemblies[0].reach[0])} of travel crank and coupler are in one line and the springs are "
+        "not relaxed: no finite force moves the slider there; choose a motion that does not reach it",
+    )
+
+
+# --- reference and window -------------------------------------------------------------------------------------------
+
+
+def _reaches_reference(solution: Solution) -> Any:
+    return ((solution.low <= solution.reference) & (solution.reference <= solution.high))[:, 0]
+
+
+def _misses_reference(solution: Solution) -> Any:
+    analysis = solution.spec.analysis
+    asked = analysis.reference_angle if solution.drive == "torque" else analysis.reference_travel
+    return (asked is not None) & ~_reaches_reference(solution)
+
+
+def _at_reference(solution: Solution) -> str:
+    return f"the reference {place(solution, float(solution.reference[0, 0]))}"
+
+
+def _no_level(solution: Solution) -> Sentence:
+    return (
+        f"at {_at_reference(solution)} the {solution.drive} is zero, and a "
+        "band stated in per cent of zero has no width; choose another reference",
+    )
+
+
+def _efforts_in_window(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Return the largest and the smallest effort at the points in the window, (m,); infinite without any."""
+    if solution.window is None:
+        return np.full(1, -np.inf), np.full(1, np.inf)
+    inside = (solution.motion >= solution.window[0]) & (solution.motion <= solution.window[1])
+    high, low = (np.where(inside, solution.effort, fill) for fill in (-np.inf, np.inf))
+    return high.max(axis=1), low.min(axis=1)
+
+
+def _changes_sign(solution: Solution) -> Any:
+    high, low = _efforts_in_window(solution)
+    return (low < 0.0) & (high > 0.0)
+
+
+def _signs(solution: Solution) -> Sentence:
+    high, low = (format_short(float(end[0]), solution.drive) for end in _efforts_in_window(solution))
+    return (f"in the window the {solution.drive} changes sign: it goes from {low} to {high}",)
+
+
+def _leaves_out_stretched(solution: Solution) -> Any:
+    if solution.window is None or solution.drive != "torque":
+        return False
+    low, high = solution.window
+    return ~((low <= solution.stretched) & (solution.stretched <= high))[:, 0]
+
+
+def _stretched_outside(solution: Solution) -> Sentence:
+    low, high = solution.window_or_motion
+    return (
+        f"the window {deg(float(low[0, 0]))} to {deg(float(high[0, 0]))} does not contain the stretched position "
+        f"{deg(float(solution.stretched[0, 0]))}: only around it is the slider's spring certain to give negative "
+        "stiffness",
+    )
+
+
+# --- limits of springs ----------------------------------------------------------------------------------------------
+
+
+def _fails(number: int, spring: Bought) -> Rule:
+    """Return the rule on what a bought spring cannot do."""
+
+    def fault(solution: Solution, row: int) -> Sentence | None:
+        turns = np.broadcast_to(solution.extremes.largest_turns, (4, len(solution)))
+        return fault_of_bought_spring(solution.specs[row], number, float(turns[JOINTS.index(spring.at), row]))
+
+    return FindingRule(
+        "spring_buckles" if spring.kind == "compression" else "spring_binds_on_pin",
+        lambda solution: np.array([fault(solution, row) is not None for row in range(len(solution))]),
+        lambda solution: fault(solution, 0) or (),
+    )
+
+
+def _overturns(joint: int) -> Rule:
+    """Return the rule on a spring that is deflected beyond its limit."""
+    name = JOINTS[joint]
+
+    def holds(solution: Solution) -> Any:
+        limits = solution.settings(lambda spec: getattr(spec.mechanism.limits, name, None))[:, 0]
+        if np.isnan(limits).all():
+            return False
+        return solution.extremes.largest_turns[joint] > limits * ON_LIMIT
+
+    def sentence(solution: Solution) -> Sentence:
+        dimension, limit = "length" if name == "slider" else "angle", getattr(solution.spec.mechanism.limits, name)
+        reported = format_short(float(solution.extremes.largest_turns[joint, 0]), dimension)
+        what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
+        return (f"the {what} is deflected by {reported}; its limit is {format_short(limit, dimension)}",)
+
+    return FindingRule("joint_overrotated", holds, sentence)
+
+
+RULES: tuple[Rule, ...] = (
+    _locks(0, "forth"),
+    _locks(1, "back"),
+    FindingRule("second_stable_outside", _snaps_out, _snap),
+    FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < BOUNDARY, _boundary),
+    FindingRule("quartic_minimum", _is_restless, _rest),
+    FindingRule("spring_winds_up", _winds_up, _winding),
+    FindingRule("same_position_twice", _rests_again, _again),
+    FindingRule("stretched_start", _starts_stretched, _column),
+    FindingRule(
+        "two_positions",
+        lambda solution: _starts_stretched(solution) & (solution.spec.analysis.side is None),
+        _sides,
+    ),
+    FindingRule(
+        "force_unbounded",
+        lambda solution: _is_nearly_stretched(solution) & np.isnan(solution.rest[:, 0]),
+        _far_side,
+    ),
+    FindingRule(
+        "run_in",
+        lambda solution: (
+            _is_nearly_stretched(solution) & ~np.isnan(solution.rest[:, 0]) & (solution.motion[:, -1] >= 0.0)
+        ),
+        _run_in,
+    ),
+    FindingRule("force_unbounded", _nears_pole, _pole),
+    FindingRule(
+        "reference_outside", _misses_reference, lambda solution: (f"{_at_reference(solution)} is outside the motion",)
+    ),
+    FindingRule("reference_zero", lambda solution: _reaches_reference(solution) & ~solution.has_level, _no_level),
+    FindingRule("effort_changes_sign", _changes_sign, _signs),
+    FindingRule("stretched_outside_window", _leaves_out_stretched, _stretched_outside),
+)
+"""Findings of every mechanism, the gravest first."""
+
+NO_SPRING: Rule = FindingRule(
+    "no_spring",
+    lambda _solution: True,
+    lambda _solution: ("no spring has a rate: the mechanism moves freely; set 'mechanism.springs'",),
+)
+
+
+def rules_of(solution: Solution) -> tuple[Rule, ...]:
+    """Return every finding of an analysis, the gravest first: those of its springs, too."""
+    if not solution.assemblies[0].rates.any():
+        return (NO_SPRING,)
+    springs = solution.spec.mechanism.springs.bought
+    return (*RULES, *(_fails(*one) for one in enumerate(springs)), *(_overturns(joint) for joint in range(4)))

@@ -30,24 +30,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FrictionBranch:
-    """One way through the motion, n places.
+    """One way through the motion, n places, of one mechanism or of m as rows: arrays are (n,) or (m, n)."""
 
-    Attributes
-    ----------
-    effort : (n,) array
-        Torque [N m] or force [N]; NaN where the mechanism holds itself.
-    coupler : (n,) array
-        Tension in the coupler, of all legs [N].
-    guide : (n,) array
-        Force on the guide, of all legs, positive upwards [N]; zero for a mirrored pair.
-    lost : mapping of str to (n,) array
-        What ``pins`` and ``guide`` take from the effort [N m or N].
-    """
-
-    effort: FloatArray
-    coupler: FloatArray
-    guide: FloatArray
-    lost: dict[str, FloatArray]
+    effort: FloatArray  # torque [N m] or force [N]; NaN where the mechanism holds itself
+    coupler: FloatArray  # tension in the coupler, of all legs [N]
+    guide: FloatArray  # force on the guide, of all legs, positive upwards [N]; zero for a mirrored pair
+    lost: dict[str, FloatArray]  # what ``pins`` and ``guide`` take from the effort [N m or N]
 
 
 def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch:
@@ -57,7 +45,7 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
     ----------
     assembly : Assembly
         With its springs' rates and its `rubbing`.
-    motion : (n,) array
+    motion : (n,) array, or (m, n) of m mechanisms
         Crank angles [rad] or slider travels [m].
     way : float
         1 while the motion grows, -1 on the way back.
@@ -67,9 +55,9 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch
     FrictionBranch
         Efforts, forces inside, and what friction takes.
     """
-    units, link, rates = assembly.units(motion), assembly.linkage, assembly.rates
+    units, link = assembly.units(motion), assembly.linkage
     angle, beta = units.angle, coupler_angle(link, units)
-    turns = np.stack([rates[k] * units.turn[k] for k in range(4)])
+    turns = assembly.rates_over(units.turn) * units.turn
     on_coupler, on_crank = -turns[1] - turns[2], turns[1] - turns[0]
     crank_rate, coupler_rate, slider_rate = _rates(assembly, angle, beta)
     signs = [np.sign(way * rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate)]
@@ -123,8 +111,8 @@ def _balance(rows: tuple[FloatArray, FloatArray], first: FloatArray, second: Flo
 
 def _through_pins(straight: FloatArray, bent: FloatArray, pin: float) -> tuple[FloatArray, FloatArray]:
     """Return the pull P0 + h P1 and h = pin |P0 + h P1|; NaN where no h fits."""
-    if not pin:
-        return straight, np.zeros(straight.shape[1])
+    if not np.any(pin):
+        return straight, np.zeros(straight.shape[1:])
     square = 1.0 - pin**2 * (bent**2).sum(axis=0)
     cross, level = pin**2 * (straight * bent).sum(axis=0), pin**2 * (straight**2).sum(axis=0)
     root = (cross + np.sqrt(cross**2 + square * level)) / square

@@ -1,22 +1,24 @@
 """Largest turns, energies and forces inside over a motion, wherever they are: they do not depend on a curve's points.
 
-All of them are those of the closed form, for one mechanism or for many that differ in their springs alone: energies
-and forces are linear in the rates.
+All of them are those of the closed form, for one mechanism or for many as rows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import ShortRepr
 from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
 from cfmkit.metrics.continuous_means_and_extremes import extremes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
@@ -30,82 +32,107 @@ Ends = tuple["FloatArray", "FloatArray"]
 """Largest and smallest values."""
 
 
-@dataclass(frozen=True)
-class MotionExtremes:
-    """The extremes of a linkage over a motion.
+def is_wide(assembly: Assembly, low: Any, high: Any) -> bool:
+    """Return whether a motion, or one of several, takes more than a quarter turn."""
+    return bool(assembly.drive == "torque" and np.any(high - low > 0.5 * np.pi))
 
-    Attributes
-    ----------
-    assembly : Assembly
-        Its rates do not matter.
-    low, high : float
-        The motion [rad or m].
-    """
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionExtremes(ShortRepr):
+    """The extremes of a linkage over a motion, or of m linkages as rows, of which all are wide or none is."""
 
     assembly: Assembly
-    low: float
-    high: float
+    low: Any  # ends of the motion, floats or (m, 1) [rad or m]
+    high: Any
 
     @cached_property
-    def nodes(self) -> tuple[FloatArray, UnitCurves]:
-        """A grid over the motion, the unloaded position one of its places, and what unit springs do there."""
-        wide = self.assembly.drive == "torque" and self.high - self.low > 0.5 * np.pi
+    def places(self) -> FloatArray:
+        """A grid over the motion, (m, n), the unloaded position one of its places; the last one may stand twice."""
+        low, high, start = (np.reshape(one, (-1, 1)) for one in (self.low, self.high, self.assembly.start))
+        wide = is_wide(self.assembly, self.low, self.high)
         share = np.linspace(0.0, 1.0, TURN_NODES if wide else NODES)
         if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
             share = share**2
-        places = self.low + (self.high - self.low) * share
-        if self.low < self.assembly.start < self.high:
-            places = np.union1d(places, [self.assembly.start])
-        return places, self.assembly.units(places)
+        places = low + (high - low) * share
+        inside = (low < start) & (start < high) & (places != start).all(axis=1, keepdims=True)
+        more = np.where(inside, start, places[:, -1:])
+        grid = np.broadcast_to(places, (len(more), places.shape[1]))
+        return np.sort(np.hstack([grid, more]), axis=1)
+
+    @cached_property
+    def last(self) -> NDArray[np.intp]:
+        """Index of the last place of each row, (m,)."""
+        places = self.places
+        return np.asarray(places.shape[1] - np.where(places[:, -1] > places[:, -2], 1, 2), dtype=np.intp)
+
+    @cached_property
+    def units(self) -> UnitCurves:
+        """What unit springs do there."""
+        return self.assembly.units(self.places)
 
     @cached_property
     def turns(self) -> Ends:
-        """Largest and smallest turn of the spring at each joint, of the slider's its travel, (4,) each [rad or m]."""
-        places, units = self.nodes
+        """Largest and smallest turn of the spring at each joint, of the slider's its travel, (4, m) each [rad or m]."""
+        values = self.units.turn
+        count = values.shape[1]
+        motion = np.tile(np.broadcast_to(self.places, values.shape[1:]), (4, 1))
+        last = np.tile(np.broadcast_to(self.last, count), 4)
 
         def turn(at: FloatArray) -> FloatArray:
-            """Return each joint's turn at the places of its row."""
-            return np.asarray(np.einsum("jjm->jm", self.assembly.units(at.ravel()).turn.reshape(4, *at.shape)))
+            """Return each joint's turn at the places of its rows."""
+            each = at.reshape(4, count, -1)
+            units = self.assembly.units(each.swapaxes(0, 1).reshape(count, -1))
+            return np.asarray(np.einsum("jmjk->jmk", units.turn.reshape(4, count, 4, -1)).reshape(at.shape))
 
-        return extremes(turn, places[None, :], units.turn, uneven=True)
+        high, low = extremes(turn, motion, values.reshape(4 * count, -1), uneven=True, last=last)
+        return high.reshape(4, count), low.reshape(4, count)
 
     @property
     def largest_turns(self) -> FloatArray:
-        """Sizes of the largest turns, (4,) [rad; the last m]."""
+        """Sizes of the largest turns, (4, m) [rad; the last m]."""
         high, low = self.turns
         return np.maximum(np.abs(high), np.abs(low))
 
-    def energy(self, rates: FloatArray) -> FloatArray:
-        """Return the largest energy in the springs of each design, (d,) [J]; `rates` is (d, 4)."""
-        return self._of(rates, lambda units: 0.5 * units.turn**2)[0]
+    @cached_property
+    def energy(self) -> FloatArray:
+        """The largest energy in the springs, (m,) [J]."""
+        return self._of(lambda units: 0.5 * self.assembly.total(units.turn**2))[0]
 
-    def coupler(self, rates: FloatArray) -> Ends:
-        """Return the largest and the smallest tension in the coupler of each design, (d,) each [N]."""
-        return self._of(rates, lambda units: self._unit_reactions(units, 0))
+    @cached_property
+    def coupler(self) -> Ends:
+        """The largest and the smallest tension in the couplers of all legs, (m,) each [N]."""
+        return self._of(lambda units: self._reactions(units)[0])
 
-    def guide(self, rates: FloatArray) -> Ends:
-        """Return the largest and the smallest force on the guide of each design, (d,) each [N]."""
-        return self._of(rates, lambda units: self._unit_reactions(units, 1))
+    @cached_property
+    def guide(self) -> Ends:
+        """The largest and the smallest force on the guide of all legs, (m,) each [N]."""
+        return self._of(lambda units: self._reactions(units)[1])
 
-    def _unit_reactions(self, units: UnitCurves, which: int) -> FloatArray:
-        """Return what a unit spring at each joint puts on coupler or guide, (4, n)."""
-        drives = units.effort if self.assembly.drive == "force" else np.zeros_like(units.effort)
-        alone = (replace(self.assembly, rates=rates) for rates in np.eye(4))
-        return np.array([reactions(one, units, drive)[which] for one, drive in zip(alone, drives, strict=True)])
+    def _reactions(self, units: UnitCurves) -> tuple[FloatArray, FloatArray]:
+        is_driven = self.assembly.drive == "force"
+        return reactions(self.assembly, units, self.assembly.total(units.effort) if is_driven else np.zeros(1))
 
-    def _of(self, rates: FloatArray, unit: Callable[[UnitCurves], FloatArray]) -> Ends:
-        """Return the extremes of what is linear in the rates of each design."""
-        there = np.flatnonzero(rates.any(axis=0))  # a spring that is nowhere does nothing, even at a pole
-        rates = rates[:, there]
-        places, units = self.nodes
+    def _of(self, function: Callable[[UnitCurves], FloatArray]) -> Ends:
+        """Return the largest and the smallest value over the motion; NaN where none is finite."""
+        values = function(self.units)
+        motion, values, last = finite_samples(self.places, values, self.last)
+        return extremes(lambda at: function(self.assembly.units(at)), motion, values, uneven=True, last=last)
 
-        def values(at: FloatArray) -> FloatArray:
-            found = unit(self.assembly.units(at.ravel()))[there].reshape(-1, *at.shape)
-            return np.asarray(np.einsum("dj,jdm->dm", rates, found))
 
-        each = unit(units)[there]
-        known = np.isfinite(each).all(axis=0)
-        if not known.any():
-            nothing = np.full(len(rates), np.nan)
-            return nothing, nothing
-        return extremes(values, places[known][None, :], rates @ each[:, known], uneven=True)
+def finite_samples(
+    places: FloatArray, values: FloatArray, last: NDArray[np.intp] | int
+) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
+    """Return the samples of each row whose values are finite, up to its last one, and the index of the last of these.
+
+    What follows repeats that sample; a row without any has NaN.
+    """
+    places = np.broadcast_to(places, values.shape)
+    count = np.arange(values.shape[1])
+    good = np.isfinite(values) & (count <= np.reshape(last, (-1, 1)))
+    end = good.sum(axis=1) - 1
+    if good.all():
+        return places, values, end
+    order = np.argsort(~good, axis=1, kind="stable")
+    order = np.take_along_axis(order, np.minimum(count, np.maximum(end, 0)[:, None]), 1)
+    places, values = (np.take_along_axis(one, order, 1) for one in (places, values))
+    return places, np.where((end >= 0)[:, None], values, np.nan), end

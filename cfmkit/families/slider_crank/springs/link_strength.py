@@ -17,20 +17,17 @@ Assumes: both links of one sheet, equal pins; no load out of the plane (links li
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.outline import eye_and_hole
 from cfmkit.families.slider_crank.springs.sprung_linkage import coupler_angle
-from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
@@ -55,84 +52,86 @@ DEFINITIONS = {
 
 @dataclass(frozen=True)
 class LinkLoads:
-    """What acts on crank and coupler of one leg.
+    """What acts on crank and coupler of one leg, at n places of the motion; of m mechanisms as rows.
 
-    Rows of every (2, n) array are crank and coupler, n places of the motion.
+    Rows of every (2, ..., n) array are crank and coupler. Where forces are unbounded there are zeros.
     """
 
-    lengths: tuple[float, float]  # crank, coupler [m]
-    axial: FloatArray  # (2, n), tension positive [N]
-    moment: FloatArray  # (2, n), larger one of both ends, positive [N m]
-    pin: FloatArray  # (n,), force on each pin hole [N]
-    springs: tuple[float, float]  # stiffest torsion spring at an end of each link [N m/rad]
+    lengths: tuple[Any, Any]  # crank, coupler [m]
+    axial: FloatArray  # (2, ..., n), tension positive [N]
+    moment: FloatArray  # (2, ..., n), larger one of both ends, positive [N m]
+    pin: FloatArray  # (..., n), force on each pin hole [N]
+    springs: tuple[Any, Any]  # stiffest torsion spring at an end of each link [N m/rad]
 
     @cached_property
-    def pin_max(self) -> float:
+    def pin_max(self) -> Any:
         """Largest force on a pin hole [N]."""
-        return float(self.pin.max())
+        return self.pin.max(axis=-1)
 
 
 @dataclass(frozen=True)
 class LinkBar:
-    """Section and material of crank and coupler."""
+    """Section and material of crank and coupler; of m mechanisms arrays (m,)."""
 
-    width: float  # [m]
-    sheet: float  # thickness [m]
-    hole: float  # diameter [m]
-    modulus: float  # [Pa]
+    width: Any  # [m]
+    sheet: Any  # thickness [m]
+    hole: Any  # diameter [m]
+    modulus: Any  # [Pa]
 
-    def stress(self, loads: LinkLoads) -> float:
+    def stress(self, loads: LinkLoads) -> Any:
         """Return the largest tension and bending in the section through a hole [Pa]."""
-        w, d, s = self.width, self.hole, self.sheet
+        w, d, s = (np.asarray(size)[..., None] for size in (self.width, self.hole, self.sheet))
         both = np.abs(loads.axial) / ((w - d) * s) + 6.0 * w * loads.moment / (s * (w**3 - d**3))
-        return float(both.max())
+        return both.max(axis=(0, -1))
 
-    def bearing(self, loads: LinkLoads) -> float:
+    def bearing(self, loads: LinkLoads) -> Any:
         """Return the largest pressure of a pin [Pa]."""
         return loads.pin_max / (self.hole * self.sheet)
 
-    def shear_out(self, loads: LinkLoads) -> float:
+    def shear_out(self, loads: LinkLoads) -> Any:
         """Return the largest shear stress behind a pin [Pa]."""
         return loads.pin_max / (self.sheet * (self.width - self.hole))
 
-    def turn_share(self, loads: LinkLoads) -> float:
+    def turn_share(self, loads: LinkLoads) -> Any:
         """Return the largest elastic turn of a link over that of the torsion spring at its end."""
         bending = self.modulus * self.sheet * self.width**3 / 12.0
-        return max(rate * length / bending for rate, length in zip(loads.springs, loads.lengths, strict=True))
+        crank, coupler = (rate * length for rate, length in zip(loads.springs, loads.lengths, strict=True))
+        return np.maximum(crank, coupler) / bending
 
-    def safety(self, loads: LinkLoads, allowable: float) -> float:
+    def safety(self, loads: LinkLoads, allowable: Any) -> Any:
         """Return by what all loads may grow, at least 1 where the links bear them; infinite without any."""
         euler = pi**2 * self.modulus * self.width * self.sheet**3 / 12.0
-        pressed = np.maximum(-loads.axial, 0.0).max(axis=1) * np.square(loads.lengths)
+        crank, coupler = np.maximum(-loads.axial, 0.0).max(axis=-1)
         used = (
             self.stress(loads) / allowable,
             self.bearing(loads) / allowable,
             sqrt(3.0) * self.shear_out(loads) / allowable,
-            float(pressed.max()) / euler,
+            np.maximum(crank * loads.lengths[0] ** 2, coupler * loads.lengths[1] ** 2) / euler,
         )
-        return 1.0 / max(used) if max(used) > 0.0 else np.inf
+        with np.errstate(divide="ignore"):
+            return 1.0 / np.max(np.broadcast_arrays(*used), axis=0)
 
 
-def link_loads(assembly: Assembly, motion: FloatArray, legs: int) -> LinkLoads:
-    """Return what acts on the links of one leg along a motion, (n,) [rad or m]."""
-    alone = replace(assembly, rates=assembly.rates / legs)
-    units, rates, linkage = alone.units(motion), alone.rates, alone.linkage
-    # a spring that is nowhere does nothing, even where a unit spring would at a pole
-    effort = np.where(rates[:, None] > 0.0, units.effort, 0.0)
-    turn = np.where(rates[:, None] > 0.0, units.turn, 0.0)
-    drive = rates @ effort if alone.drive == "force" else np.zeros(len(motion))
-    beta, angle = coupler_angle(linkage, units), units.angle
-    own, other = rates[1] * turn[1], rates[2] * turn[2]
-    pulled = -rates[3] * turn[3] - linkage.branch * drive  # on the slider, along its path
+def link_loads(assembly: Assembly, motion: FloatArray, legs: Any) -> LinkLoads:
+    """Return what acts on the links of one leg along a motion, (n,) [rad or m]; as rows, (m, n) with `legs` (m,)."""
+    units, link = assembly.units(motion), assembly.linkage
+    per_leg = 1.0 / np.asarray(legs, dtype=float)[..., None]
+    drive = assembly.total(units.effort) if assembly.drive == "force" else np.zeros(1)
+    moments = assembly.weigh(units.turn)
+    own, other = moments[1], moments[2]
+    beta, angle = coupler_angle(link, units), units.angle
+    pulled = -moments[3] - link.branch * drive  # on the slider, along its path
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = (linkage.coupler * np.sin(beta) * pulled + own + other) / (linkage.coupler * np.cos(beta))
-    at_pivot = linkage.crank * (-pulled * np.sin(angle) + across * np.cos(angle)) + own
-    axial = np.stack([pulled * np.cos(angle) + across * np.sin(angle), pulled * np.cos(beta) + across * np.sin(beta)])
-    moment = np.stack([np.maximum(np.abs(own), np.abs(at_pivot)), np.maximum(np.abs(own), np.abs(other))])
-    there = np.isfinite(axial).all(axis=0) & np.isfinite(moment).all(axis=0)
-    lengths = linkage.crank, linkage.coupler
-    springs = float(max(rates[:2])), float(max(rates[1:3]))
-    return LinkLoads(lengths, axial[:, there], moment[:, there], np.hypot(pulled, across)[there], springs)
+        across = (link.coupler * np.sin(beta) * pulled + own + other) / (link.coupler * np.cos(beta))
+        at_pivot = link.crank * (-pulled * np.sin(angle) + across * np.cos(angle)) + own
+        axial = [pulled * np.cos(one) + across * np.sin(one) for one in (angle, beta)]
+        moment = [np.maximum(np.abs(own), np.abs(one)) for one in (at_pivot, other)]
+    loads = np.stack(np.broadcast_arrays(*axial, *moment, np.hypot(pulled, across))) * per_leg
+    loads = np.where(np.isfinite(loads).all(axis=0), loads, 0.0)
+    shape = assembly.rates.shape[1:2]  # () of one, (m,) of rows
+    stiffest = (assembly.rates[k : k + 2].max(axis=0).reshape(shape) * per_leg[..., 0] for k in (0, 1))
+    lengths = tuple(np.reshape(one, np.shape(one)[:1]) for one in (link.crank, link.coupler))
+    return LinkLoads((lengths[0], lengths[1]), loads[:2], loads[2:4], loads[4], (next(stiffest), next(stiffest)))
 
 
 def link_of(spec: SliderCrankSpec) -> LinkBar | None:
@@ -144,26 +143,10 @@ def link_of(spec: SliderCrankSpec) -> LinkBar | None:
     return LinkBar(2.0 * eye, part.sheet, 2.0 * hole, material.modulus)
 
 
-def values_of_links(spec: SliderCrankSpec, assembly: Assembly, motion: FloatArray) -> Mapping[str, Quantity]:
-    """Return what the links bear over a motion; nothing where they are not described."""
-    link, material = link_of(spec), spec.mechanism.material
-    if link is None or material is None or not assembly.rates.any():
-        return {}
-    loads = link_loads(assembly, motion, spec.mechanism.sets)
-    if not len(loads.pin):
-        return {}
-    allowable = material.allowable(spec.mechanism.safety_factor)
-    numbers: dict[str, float | None] = {
-        "link_stress_max": link.stress(loads),
-        "pin_bearing_max": link.bearing(loads),
-        "link_safety_factor": None if allowable is None else link.safety(loads, allowable),
-        "link_turn_share_max": link.turn_share(loads),
-    }
-    reason = "no strength of the material is known"
-    return {
-        name: Quantity(value, *DEFINITIONS[name], "" if value is not None else reason)
-        for name, value in numbers.items()
-    }
+def allowable_of(spec: SliderCrankSpec) -> float | None:
+    """Return the allowable stress of the links' material [Pa]; None if no strength is known."""
+    material = spec.mechanism.material
+    return None if material is None else material.allowable(spec.mechanism.safety_factor)
 
 
 PIN_DIAMETERS = tuple(1e-3 * d for d in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30))
@@ -206,7 +189,7 @@ def links_that_bear(
 
     def bears(width: float) -> bool:
         link = LinkBar(width, sheet, pin, modulus)
-        return link.safety(loads, allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE
+        return bool(link.safety(loads, allowable) >= SPARE and SPARE * link.turn_share(loads) <= LARGEST_TURN_SHARE)
 
     if low > high or not bears(high):
         return None
@@ -221,11 +204,11 @@ def links_that_bear(
 def least_sheet(loads: LinkLoads, modulus: float, allowable: float) -> float:
     """Return a thickness below which not even the widest links stay straight and bear their bending [m]."""
     widest = LinkBar(WIDEST_SHARE * min(loads.lengths), 1.0, 0.0, modulus)  # both go with one over the thickness
-    return max(widest.turn_share(loads) / LARGEST_TURN_SHARE, widest.stress(loads) / allowable)
+    return float(max(widest.turn_share(loads) / LARGEST_TURN_SHARE, widest.stress(loads) / allowable))
 
 
 def _pin_bears(diameter: float, loads: LinkLoads, sheet: float, allowable: float) -> bool:
     """Return True if a pin bears its load: in its hole, and bent between two links, whose middles are a sheet apart."""
     pressure = loads.pin_max / (diameter * sheet)
     bent = 32.0 * loads.pin_max * sheet / (pi * diameter**3)
-    return SPARE * pressure <= allowable and SPARE * bent <= PIN_STRENGTH
+    return bool(SPARE * pressure <= allowable and SPARE * bent <= PIN_STRENGTH)

@@ -1,4 +1,4 @@
-"""Analysis of a slider-crank with springs: torque over the crank angle, or force over the slider's travel.
+"""Analysis of slider-cranks with springs: torque over the crank angle, or force over the slider's travel.
 
 The torque is the derivative of the energy by the crank angle [LH, eq. 10 and 12], the force that
 by the slider's travel: what the slider pushes back with while it is moved towards the pivot.
@@ -14,38 +14,44 @@ Reference
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.arrays import distinct
+from cfmkit.arrays import LazySequence, distinct
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
+from cfmkit.families.rows import ScalarQuantity, SolvedRows, findings_of_one, values_of_one
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.linkage_from_spec import resolve
-from cfmkit.families.slider_crank.springs.findings import findings_of
-from cfmkit.families.slider_crank.springs.link_strength import values_of_links
-from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS, values_of, values_of_wires
-from cfmkit.families.slider_crank.springs.solution import Character, ClosedFormEffort, Solution
-from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, assemble, default_motion
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.springs.findings import rules_of
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import is_wide
+from cfmkit.families.slider_crank.springs.scalar_results import QUANTITIES
+from cfmkit.families.slider_crank.springs.solution import ClosedFormEffort, Solution, target_of
+from cfmkit.families.slider_crank.springs.sprung_linkage import TURN, asked_motion, assemble
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.branches_cut_to_window import between_ends
 from cfmkit.numerics.cubic_interpolation import bisect
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import between, format_short
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import format_short
 from cfmkit.stock.parts_list import BoughtPart, listed
 from cfmkit.stock.springs.guides import guide_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.run_control import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
-    from cfmkit.families.slider_crank.unit_springs import UnitCurves
-    from cfmkit.results import Finding, Quantity
+    from cfmkit.results import Finding
 
 
 Ends = tuple[float, float]
@@ -53,16 +59,19 @@ Ends = tuple[float, float]
 RATES = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
 """Where a specification has the rates, and the rows of the springs."""
 
+ROWS_TOGETHER = 96
+"""Mechanisms that are solved together: few enough for their grids to stay in a processor's cache."""
 
-def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+COLUMNS = dict(QUANTITIES) | {
+    name: ScalarQuantity[Solution](*about, lambda _solution: np.nan, applies=lambda _solution: False)
+    for name, about in OF_PARTS.items()
+    if name not in QUANTITIES
+}
+"""What studies may ask of rows: of values that only printed parts have their cells are empty."""
+
+
+def analyze(spec: SliderCrankSpec, _run: Run) -> Result:
     """Return the torque or force curve of a slider-crank, with everything that is wrong with it.
-
-    Parameters
-    ----------
-    spec : SliderCrankSpec
-        The mechanism.
-    run : Run
-        Which metrics are looked at: scalar results that are not, and then the findings, are left out.
 
     Returns
     -------
@@ -76,32 +85,81 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         solution, shortfalls = solve(spec, assembly)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    said, stuck = {item.name for item in shortfalls}, _held(solution)
-    found = findings_of(spec, solution) if run.wanted is None else ()
-    values = dict(_values(spec, solution)) if run.wants(DEFINITIONS) else {}
-    status = Status.PARTIAL if shortfalls or stuck else Status.COMPLETE
+    stuck, model = _held(solution), ClosedFormEffort(solution)
     return Result(
         spec=_as_run(spec, assembly),
-        status=status,
+        status=Status.PARTIAL if shortfalls or stuck else Status.COMPLETE,
         message=shortfalls[0].message if shortfalls else stuck,
         curves=(_curve(solution),),
-        values=values,
-        warnings=(*shortfalls, *(item for item in found if item.name not in said)),
+        values=values_of_one(QUANTITIES, solution),
+        warnings=LazySequence(partial(_findings, solution, shortfalls)),
         travel=asked_motion(spec, assembly),
         target=target_of(spec),
-        reference=solution.reference,
-        closed=ClosedFormEffort(solution.character),
-        effort_error=solution.effort_error,
-        part_efforts=solution.part_efforts,
+        reference=float(solution.reference[0, 0]),
+        closed=model,
+        effort_error=float(solution.effort_error[0]),
+        part_efforts=model.part_efforts,
         tables=listed(parts_of(spec)),
         state=solution,
     )
 
 
-def _values(spec: SliderCrankSpec, solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name: of the mechanism, of the springs' wires, and of the links."""
-    links = values_of_links(spec, solution.assembly, solution.character.grid)
-    return {**values_of(solution), **values_of_wires(spec.mechanism.springs, solution), **links}
+def _findings(solution: Solution, shortfalls: Sequence[Finding]) -> Iterator[Finding]:
+    yield from shortfalls
+    said = {item.name for item in shortfalls}
+    found = findings_of_one(rules_of(solution), finding, solution)
+    yield from (item for item in found if item.name not in said)
+
+
+def solve_rows(specs: Sequence[SliderCrankSpec]) -> Iterator[tuple[NDArray[np.intp], SolvedRows[Solution]]]:
+    """Yield (indices, mechanisms that are solved together) of those that go through all of the motion."""
+    alike: dict[str, list[int]] = {}
+    built: dict[int, tuple[SliderCrankSpec, Assembly, Ends]] = {}
+    for index, spec in enumerate(specs):
+        if spec.fidelity != "prb" or spec.target_curve is not None or not any(spec.mechanism.springs.rates):
+            continue
+        try:
+            resolved = resolve(spec)
+            assembly = assemble(resolved)
+        except CannotBuild:
+            continue
+        asked = asked_motion(resolved, assembly)
+        if assembly.within(*asked) == asked:
+            built[index] = resolved, assembly, asked
+            alike.setdefault(repr(_kind(*built[index])), []).append(index)
+    for members in alike.values():
+        for start in range(0, len(members), ROWS_TOGETHER):
+            chosen = members[start : start + ROWS_TOGETHER]
+            solution = _solution(*zip(*(built[index] for index in chosen), strict=True))
+            yield np.array(chosen), SolvedRows(solution, COLUMNS, rules_of(solution), _is_complete(solution))
+
+
+def _kind(spec: SliderCrankSpec, assembly: Assembly, asked: Ends) -> tuple[Any, ...]:
+    """Return what mechanisms that are solved together have in common: all but the values of numbers."""
+    rubbing, blocks = assembly.rubbing, (spec.mechanism, spec.analysis, spec.design)
+    rubs = rubbing.there, rubbing.guide.friction > 0, rubbing.pin > 0
+    return (*map(_without_numbers, blocks), *rubs, spec.analysis.band, is_wide(assembly, *asked))
+
+
+def _without_numbers(value: Any) -> Any:
+    if isinstance(value, Model | tuple):
+        items = value if isinstance(value, tuple) else vars(value).values()
+        return ["number" if type(item) is float else item and _without_numbers(item) for item in items]
+    return "number" if isinstance(value, float) else value
+
+
+def _solution(specs: Sequence[SliderCrankSpec], assemblies: Sequence[Assembly], motions: Sequence[Ends]) -> Solution:
+    """Return mechanisms of one kind over their motions."""
+    ends = np.array(motions)
+    ends = ends[:1] if (ends == ends[0]).all() else ends
+    motion = np.linspace(ends[:, 0], ends[:, 1], specs[0].analysis.points, axis=1)
+    return Solution(tuple(specs), tuple(assemblies), motion, ends[:, :1], ends[:, 1:])
+
+
+def _is_complete(solution: Solution) -> NDArray[np.bool_]:
+    """Return which mechanisms have an effort at every point and place of the grid, (m,)."""
+    curves = [solution.curve.value, *(branch.samples.values for branch in solution.branches.values())]
+    return np.asarray(np.all([np.isfinite(values).all(axis=1) for values in curves], axis=0))
 
 
 def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
@@ -118,19 +176,6 @@ def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
     return tuple(found)
 
 
-def target_of(spec: SliderCrankSpec) -> float | None:
-    """Return what the effort is to be [N m or N]; None where the design says nothing about this drive."""
-    if spec.design is None:
-        return None
-    return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
-
-
-def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:
-    """Return the motion that the analysis asks for [rad or m]."""
-    asked: tuple[float, float] | None = getattr(spec.analysis, assembly.motion_name)
-    return asked or default_motion(assembly)
-
-
 def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Finding, ...]]:
     """Return the solution over what the linkage reaches of the requested motion, and why that is less.
 
@@ -144,35 +189,11 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     short = tuple(_shortfalls(assembly, asked, (start, stop)))
     if short and not start < stop:
         raise CannotBuild(short[0])
-    motion = np.linspace(start, stop, spec.analysis.points)
-    units = assembly.units(motion)
-    finite = np.isfinite(units.effort[assembly.rates > 0.0]).all(axis=0)
+    solution = _solution([spec], [assembly], [(start, stop)])
+    finite = np.isfinite(solution.units.effort[assembly.rates > 0.0, 0]).all(axis=0)
     if not finite.all():  # where springs are relaxed in a dead point of the crank: 0/0 in that place alone
-        motion = motion[finite]
-        units = assembly.units(motion)
-    character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec, assembly))
-    anchored = spec.mechanism.springs.anchor is not None
-    solution = Solution(
-        assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.sets, anchored
-    )
+        solution = replace(solution, motion=solution.motion[:, finite])
     return solution, short
-
-
-def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] | None:
-    """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
-    window = spec.analysis.window
-    return None if window is None else between(window, asked_motion(spec, assembly))
-
-
-def efforts_inside(
-    assembly: Assembly, motion: FloatArray, units: UnitCurves, window: tuple[float, float] | None
-) -> FloatArray:
-    """Return the unit efforts in a window, (4, k), its ends included; without a window all of them."""
-    if window is None:
-        return units.effort
-    between = between_ends(motion, *window)
-    ends = assembly.forces(np.array(window))
-    return np.concatenate([ends[:, :1], units.effort[:, between], ends[:, 1:]], axis=1)
 
 
 def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]:
@@ -218,18 +239,6 @@ def unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
     )
 
 
-def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
-    """Return where the constant band is taken: as asked, else the stretched position, or half way of a force."""
-    low, high = asked_motion(spec, assembly)
-    if assembly.drive == "force":
-        asked = spec.analysis.reference_travel
-        return 0.5 * (low + high) if asked is None else asked
-    asked = spec.analysis.reference_angle
-    if asked is not None:
-        return asked
-    return assembly.stretched if low <= assembly.stretched <= high else 0.5 * (low + high)
-
-
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     written = {assembly.motion_name: asked_motion(spec, assembly), "fidelity": "prb"}
@@ -237,55 +246,42 @@ def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
 
 
 def _curve(solution: Solution) -> Curve:
-    drive, units = solution.assembly.drive, solution.units
+    """Return the curve of one mechanism; with friction the way through the motion and back."""
+    (assembly,), drive, units = solution.assemblies, solution.drive, solution.units
     rate = "rotational_stiffness" if drive == "torque" else "stiffness"
-    shares = {f"{drive}_{name}": Column(row, drive) for name, row in zip(JOINTS, solution.shares, strict=True)}
-    place = {"slider_position": Column(units.position, "length")}
-    if drive == "force":
-        place = {"crank_angle": Column(units.angle, "angle"), **place}
-    rows = zip(JOINTS[:3], units.turn, strict=False)
-    turns = {f"{name}_rotation": Column(row, "angle") for name, row in rows}
+    coupler, guide = solution.reactions
     extra = {
-        "stiffness": Column(solution.stiffness, rate),
-        "energy": Column(solution.energy, "energy"),
-        **shares,
-        **place,
-        **turns,
-        "slider_travel": Column(units.turn[3] - solution.assembly.tight, "length"),
-        "coupler_force": Column(solution.reactions[0], "force"),
-        "guide_force": Column(solution.reactions[1], "force"),
+        "stiffness": Column(solution.stiffness[0], rate),
+        "energy": Column(solution.energy[0], "energy"),
+        **{f"{drive}_{name}": Column(row[0], drive) for name, row in zip(JOINTS, solution.shares, strict=True)},
+        **({"crank_angle": Column(units.angle[0], "angle")} if drive == "force" else {}),
+        "slider_position": Column(units.position[0], "length"),
+        **{f"{name}_rotation": Column(row[0], "angle") for name, row in zip(JOINTS[:3], units.turn, strict=False)},
+        "slider_travel": Column(units.turn[3, 0] - assembly.tight, "length"),
+        "coupler_force": Column(coupler[0], "force"),
+        "guide_force": Column(guide[0], "force"),
     }
-    if solution.ways is not None:
-        return _loop(solution, extra)
-    return Curve(solution.motion, solution.effort, extra=extra, kind=drive)
-
-
-def _loop(solution: Solution, extra: dict[str, Column]) -> Curve:
-    """Return the way through the motion and back, with friction."""
-    assert solution.ways is not None
+    motion = solution.motion[0]
+    if solution.ways is None:
+        return Curve(motion, solution.effort[0], extra=extra, kind=drive)
     forth, back = solution.ways
-    drive, points = solution.assembly.drive, len(solution.motion)
 
     def both(one: FloatArray, other: FloatArray) -> FloatArray:
-        return np.concatenate([one, other[::-1]])
+        return np.concatenate([one.ravel(), other.ravel()[::-1]])
 
     columns = {name: Column(both(item.values, item.values), item.dimension) for name, item in extra.items()}
-    columns["coupler_force"] = Column(both(forth.coupler, back.coupler) / solution.legs, "force")
-    columns["guide_force"] = Column(both(forth.guide, back.guide) / solution.legs, "force")
+    columns["coupler_force"] = Column(both(forth.coupler, back.coupler) / solution.legs[0], "force")
+    columns["guide_force"] = Column(both(forth.guide, back.guide) / solution.legs[0], "force")
     columns |= {f"lost_to_{kind}": Column(both(forth.lost[kind], back.lost[kind]), drive) for kind in forth.lost}
-    effort, branches = both(forth.effort, back.effort), np.repeat(["load", "unload"], points)
-    return Curve(both(solution.motion, solution.motion), effort, branches, np.isfinite(effort), columns, drive)
+    effort, names = both(forth.effort, back.effort), np.repeat(["load", "unload"], len(motion))
+    return Curve(both(motion, motion), effort, names, np.isfinite(effort), columns, drive)
 
 
 def _held(solution: Solution) -> str:
     """Return what to say of places where friction leaves no equilibrium; empty without any."""
-    ways = solution.ways or ()
-    failed = sum(int((~np.isfinite(way.effort)[1:]).sum()) for way in ways)
-    return (
-        f"{failed} of {2 * len(solution.motion)} points have no equilibrium: friction holds the mechanism"
-        if failed
-        else ""
-    )
+    failed = sum(int((~np.isfinite(way.effort[0, 1:])).sum()) for way in solution.ways or ())
+    points = 2 * solution.motion.shape[1]
+    return f"{failed} of {points} points have no equilibrium: friction holds the mechanism" if failed else ""
 
 
 def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -305,45 +301,41 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
         solution, short = solve(spec, assemble(spec))
     except CannotBuild:
         return {}
-    if short or not solution.assembly.rates.any():
+    if short or not solution.assemblies[0].rates.any():
         return {}
     known = {path: RATES[path] for path in paths if path in RATES}
     legs = spec.mechanism.sets
-    slopes = dict(_slopes(spec, solution))
+    slopes = dict(_slopes(solution))
     return {name: {path: legs * float(by[row]) for path, row in known.items()} for name, by in slopes.items()}
 
 
-def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, FloatArray]]:
+def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     """Yield each metric with its derivatives by the four total rates."""
-    drive, assembly = solution.assembly.drive, solution.assembly
-    unit = efforts_inside(assembly, solution.motion, solution.units, window_of(spec, assembly))
+    drive, (assembly,) = solution.drive, solution.assemblies
+    low, high = (float(end[0, 0]) for end in solution.window_or_motion)
+    motion = solution.motion[0]
+    unit = assembly.forces(np.concatenate([[low], motion[between_ends(motion, low, high)], [high]]))
     effort = assembly.rates @ unit
     sign = -1.0 if effort.mean() < 0 else 1.0
-    places = _places_inside(solution, window_of(spec, assembly))
-    high, low = (_at_extreme(assembly, places, toward) for toward in (sign, -sign))
-    top, bottom = float(assembly.rates @ high), float(assembly.rates @ low)
+    places = np.concatenate([motion, solution.curve.place[0]])
+    places = distinct(np.concatenate([[low, high], places[between_ends(places, low, high)]]))
+    most, least = (_at_extreme(assembly, places, toward) for toward in (sign, -sign))
+    top, bottom = float(assembly.rates @ most), float(assembly.rates @ least)
     yield f"{drive}_mean", unit.mean(axis=1)
-    yield f"{drive}_max", high if sign > 0 else low
-    yield f"{drive}_min", low if sign > 0 else high
+    yield f"{drive}_max", most if sign > 0 else least
+    yield f"{drive}_min", least if sign > 0 else most
     if top != 0.0:
-        yield f"{drive}_ripple", (bottom * high / top - low) / top
+        yield f"{drive}_ripple", (bottom * most / top - least) / top
     if top + bottom != 0.0:
-        yield "half_band", 2.0 * (bottom * high - top * low) / (top + bottom) ** 2
+        yield "half_band", 2.0 * (bottom * most - top * least) / (top + bottom) ** 2
     yield "energy_max", _at_largest_energy(solution)
-    reference = reference_motion(spec, assembly)
-    if solution.character.low <= reference <= solution.character.high:
-        yield f"reference_{drive}", assembly.units(np.array([reference])).effort[:, 0]
+    reference = solution.reference[0]
+    if solution.low[0, 0] <= reference[0] <= solution.high[0, 0]:
+        yield f"reference_{drive}", assembly.units(reference).effort[:, 0]
     if drive == "torque":
-        at = assembly.units(np.array([assembly.stretched]))
+        at = assembly.units(solution.stretched[0])
         yield "stretched_torque", at.effort[:, 0]
         yield "stretched_stiffness", at.stiffness[:, 0]
-
-
-def _places_inside(solution: Solution, window: tuple[float, float] | None) -> FloatArray:
-    """Return the ends of a window, the points of the curve between them and the grid of the class, increasing."""
-    low, high = window or (float(solution.motion[0]), float(solution.motion[-1]))
-    places = np.concatenate([solution.motion, solution.character.grid])
-    return distinct(np.concatenate([[low, high], places[between_ends(places, low, high)]]))
 
 
 def _at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArray:
@@ -365,7 +357,7 @@ def _at_extreme(assembly: Assembly, places: FloatArray, sign: float) -> FloatArr
 
 def _at_largest_energy(solution: Solution) -> FloatArray:
     """Return the energies of unit springs (4,) where the energy is largest: at an end, or where no effort is left."""
-    assembly, character = solution.assembly, solution.character
-    inner = [one.motion for one in character.equilibria if character.low < one.motion < character.high]
-    energy = 0.5 * assembly.units(np.array([character.low, *inner, character.high])).turn ** 2
+    (assembly,), (low, high) = solution.assemblies, solution.ends
+    inner = [one.motion for one in solution.equilibria if low < one.motion < high]
+    energy = 0.5 * assembly.units(np.array([low, *inner, high])).turn ** 2
     return np.asarray(energy[:, int(np.argmax(assembly.rates @ energy))])

@@ -173,7 +173,7 @@ class SpringTask:
         wanted = self.wanted
         if wanted.adjustment is None or wanted.angle_travel is None:
             return None
-        row = mean_effort_per_angle(self.assembly, window) * (wanted.angle_travel * self.spec.mechanism.sets)
+        row = mean_effort_per_angle([self.assembly], *window)[:, 0] * (wanted.angle_travel * self.spec.mechanism.sets)
         used = np.array([name in wanted.springs for name in JOINTS])
         share = row / np.maximum(np.abs(self.assembly.forces(np.array(window))).max(axis=1), 1e-300)
         return row * (1.0 if share[used].sum() >= 0 else -1.0), wanted.adjustment

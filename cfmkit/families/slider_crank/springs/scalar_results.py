@@ -1,16 +1,21 @@
-"""Scalar results of a slider-crank with springs, beside the constant-force metrics of every family."""
+"""Scalar results of slider-cranks with springs, beside the constant-force metrics of every family, each by its name.
+
+A quantity is a dimension, a definition, and a function of the solution of any number of mechanisms.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.rows import ScalarQuantity
+from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, small_angle_number
 from cfmkit.families.slider_crank.springs.link_strength import DEFINITIONS as LINK_DEFINITIONS
+from cfmkit.families.slider_crank.springs.link_strength import LinkBar, LinkLoads, allowable_of, link_loads, link_of
+from cfmkit.families.slider_crank.springs.solution import grid_over
 from cfmkit.families.slider_crank.springs.sprung_linkage import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.results import Quantity
 from cfmkit.stock.springs.stress_and_life import (
     WIRE_DEFINITIONS,
     SpringInUse,
@@ -19,246 +24,344 @@ from cfmkit.stock.springs.stress_and_life import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.solution import Solution
-    from cfmkit.families.slider_crank.springs.spec import Springs
+
+    Function = Callable[[Solution], Any]
 
 
 _AT = "the reference (`analysis.reference_angle` or `reference_travel`)"
 
-DEFINITIONS = {
-    "stiffness_class": (
-        "text",
-        "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
-        "tristable over the motion; a drop of at most twice `analysis.tolerance` counts as zero [LH, sec. 3]",
-    ),
-    "stiffness_drop": (
-        "ratio",
-        "largest fall of the effort after a peak, as a fraction of the peak, on the way from the unloaded position; "
-        "from 1 on there is a second equilibrium",
-    ),
-    "stable_positions": ("count", "stable equilibria in the motion, the unloaded position included"),
-    "unstable_positions": ("count", "unstable equilibria in the motion; beyond each the mechanism snaps through"),
-    "snap_through_angle": ("angle", "crank angle of the first unstable equilibrium from the unloaded position"),
-    "snap_through_travel": ("length", "slider travel of the first unstable equilibrium from the unloaded position"),
-    "second_stable_angle": ("angle", "crank angle of the next stable equilibrium from the unloaded position"),
-    "second_stable_travel": ("length", "slider travel of the next stable equilibrium from the unloaded position"),
-    "energy_barrier": ("energy", "energy at the first unstable equilibrium"),
-    "constant_angle": ("angle", f"width of the interval around {_AT} with the torque within `analysis.tolerance`"),
-    "constant_angle_start": (
-        "angle",
-        f"start of the interval around {_AT} with the torque within `analysis.tolerance`",
-    ),
-    "constant_angle_end": ("angle", f"end of the interval around {_AT} with the torque within `analysis.tolerance`"),
-    "constant_travel": ("length", f"width of the interval around {_AT} with the force within `analysis.tolerance`"),
-    "constant_travel_start": (
-        "length",
-        f"start of the interval around {_AT} with the force within `analysis.tolerance`",
-    ),
-    "constant_travel_end": ("length", f"end of the interval around {_AT} with the force within `analysis.tolerance`"),
-    "reference_torque": ("torque", f"torque at {_AT}"),
-    "reference_force": ("force", f"force at {_AT}"),
-    "start_force": ("force", "force that moves the slider from the unloaded position; where stretched, the limit"),
-    "stretched_torque": ("torque", "torque in the stretched position"),
-    "stretched_stiffness": ("rotational_stiffness", "slope of the torque in the stretched position [LH, eq. 31]"),
-    "bistable_factor": (
-        "factor",
-        "factor on all torsion springs below which the mechanism has a second equilibrium: max(-P/G), G and P the "
-        "efforts of the torsion springs and of the slider's spring",
-    ),
-    "positive_factor": ("factor", "factor on all torsion springs above which the stiffness is positive: max(-P'/G')"),
-    "small_angle_number": (
-        "factor",
-        "K_P kappa^2 phi^2/(2 k), k = K_A + (1 + r1/r2)^2 K_B + (r1/r2)^2 K_C, kappa = r1 (1 + r1/r2)/cos t2, phi the "
-        "lead of the unloaded position; for small phi above 4 bistable, 1 zero stiffness, below 1 positive",
-    ),
-    "loop_energy_pins": ("energy", "energy that the pins dissipate over the window, back and forth"),
-    "loop_energy_guide": ("energy", "energy that the slider's guide dissipates over the window, back and forth"),
-    "loop_share_pins": ("ratio", "share of the loop's area that the pins dissipate"),
-    "loop_share_guide": ("ratio", "share of the loop's area that the slider's guide dissipates"),
-    "force_per_anchor": (
-        "stiffness",
-        "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
-        "that a trim does not change the shape of the curve",
-    ),
-    "force_per_degree": (
-        "force",
-        "increase of the mean force in the window per degree of the unloaded angle, at the same positions of the "
-        "slider",
-    ),
-    "stretched_angle": ("angle", "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]"),
-    "folded_angle": ("angle", "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]"),
-    "unloaded_angle": ("angle", "crank angle with all springs relaxed, theta_A0"),
-    "energy_max": ("energy", "largest energy in the springs"),
-    "pivot_rotation_max": ("angle", "largest rotation of the spring at the pivot"),
-    "crank_pin_rotation_max": ("angle", "largest rotation of the spring at the crank pin"),
-    "slider_pin_rotation_max": ("angle", "largest rotation of the spring at the slider pin"),
-    "slider_travel_max": ("length", "largest travel of the slider from the unloaded position"),
-    "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
-    "guide_force_max": ("force", "largest transverse force of the slider of one leg on its guide"),
-    **WIRE_DEFINITIONS,
-    **LINK_DEFINITIONS,
-}
+NO_UNSTABLE = "there is no unstable equilibrium"
+
+NO_SECOND = "there is no second stable equilibrium in the motion"
+
+NO_FACTOR = "it needs torsion springs and a spring at the slider"
+
+HELD = "friction holds the mechanism in a part of its motion, next to which forces are unbounded"
 
 
-def values_of(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; those that a torque drive, or a force drive, does not have are left out."""
-    found = dict(_numbers(solution))
-    return {name: Quantity(value, *DEFINITIONS[name], reason) for name, (value, reason) in found.items()} | {
-        "stiffness_class": Quantity(float(solution.character.kind), *DEFINITIONS["stiffness_class"], words=CLASSES)
+def _of_drive(drive: str, dimension: str, definition: str, function: Function, reason: str) -> ScalarQuantity[Solution]:
+    """Return a quantity that only mechanisms with one kind of drive have."""
+    return ScalarQuantity(dimension, definition, function, reason, lambda solution: solution.drive == drive)
+
+
+def _of_band(drive: str, motion: str, dimension: str) -> dict[str, ScalarQuantity[Solution]]:
+    """Return width, start and end of the constant band over the motion of one kind of drive."""
+    reason = f"the reference is outside the motion, or the {drive} there is zero"
+    within = f"of the interval around {_AT} with the {drive} within `analysis.tolerance`"
+    name = f"constant_{motion}"
+    return {
+        name: _of_drive(drive, dimension, f"width {within}", lambda one: one.band[1] - one.band[0], reason),
+        f"{name}_start": _of_drive(drive, dimension, f"start {within}", lambda one: one.band[0], reason),
+        f"{name}_end": _of_drive(drive, dimension, f"end {within}", lambda one: one.band[1], reason),
     }
 
 
-def values_of_wires(springs: Springs, solution: Solution) -> Mapping[str, Quantity]:
-    """Return what the wires of bought springs bear over the motion; nothing where they are not known."""
-    return wire_quantities(list(_in_use(springs, solution)))
+def _of_wire(name: str) -> ScalarQuantity[Solution]:
+    """Return the largest stress in the wire of bought springs, or their shortest life."""
+
+    def read(solution: Solution) -> FloatArray:
+        found = [wire_quantities(_in_use(solution, number)).get(name) for number in range(len(solution))]
+        return np.array([np.nan if one is None or one.value is None else one.value for one in found])
+
+    return ScalarQuantity(
+        *WIRE_DEFINITIONS[name],
+        read,
+        lambda solution: wire_quantities(_in_use(solution, 0))[name].reason,
+        lambda solution: name in wire_quantities(_in_use(solution, 0)),
+    )
 
 
-def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
-    """Yield the springs that are bought between their smallest and their largest load over the motion."""
+def _in_use(solution: Solution, number: int) -> list[SpringInUse]:
+    """Return the bought springs of a mechanism between their smallest and their largest load over the motion."""
+    springs, found = solution.specs[number].mechanism.springs, []
     for one in springs.bought:
         joint = JOINTS.index(one.at)
-        high, low = (float(ends[joint]) for ends in solution.extremes.turns)
+        high, low = (float(np.broadcast_to(ends[joint], len(solution))[number]) for ends in solution.extremes.turns)
         least, largest = in_the_sense_of_the_larger(high, low)
         # springs of a joint turn alike: each bears its wire's share of the rate, which may be stated
         wound = None if one.wound is None else one.wound.wound(one.kind)
         each = wound.rate * springs.stated_over_wires(one.at) if wound is not None else 0.0
         fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
-        yield SpringInUse(wound, each * least, each * largest, fatigue, one.life)
+        found.append(SpringInUse(wound, each * least, each * largest, fatigue, one.life))
+    return found
 
 
-def _loop(solution: Solution) -> Iterator[tuple[str, float | None]]:
-    """Yield what pins and guide take over the window, and their shares; nothing without friction."""
-    if solution.ways is None:
-        return
-    (forth, back), motion = solution.ways, solution.motion
-    low, high = solution.character.window or (float(motion[0]), float(motion[-1]))
-    low, high = max(low, float(motion[0])), min(high, float(motion[-1]))
-    at = np.concatenate([[low], motion[(motion > low) & (motion < high)], [high]])
-    taken = {
-        kind: float(np.trapezoid(np.interp(at, motion, forth.lost[kind] + back.lost[kind]), at)) for kind in forth.lost
-    }
-    area = sum(taken.values())
-    for kind, value in taken.items():
-        yield f"loop_energy_{kind}", value if np.isfinite(area) else None
-        yield f"loop_share_{kind}", value / area if np.isfinite(area) and area > 0 else None
+def _of_link(name: str, function: Callable[[LinkBar, LinkLoads, FloatArray], Any]) -> ScalarQuantity[Solution]:
+    """Return what the links bear over the motion; mechanisms whose links are not described do not name it."""
+
+    def read(solution: Solution) -> Any:
+        bars = [link_of(spec) for spec in solution.specs]
+        numbers = [(one.width, one.sheet, one.hole, one.modulus) for one in bars if one is not None]
+        allowable = np.array([allowable_of(spec) for spec in solution.specs], dtype=float)
+        motion = grid_over(solution.drive, solution.low, solution.high)
+        loads = link_loads(solution.assembly, motion, solution.legs[:, 0])
+        return function(LinkBar(*np.array(numbers).T), loads, allowable)
+
+    return ScalarQuantity(
+        *LINK_DEFINITIONS[name],
+        read,
+        "no strength of the material is known",
+        lambda solution: link_of(solution.spec) is not None and bool(solution.assemblies[0].rates.any()),
+    )
 
 
-def _trim(solution: Solution) -> Iterator[tuple[str, float | None]]:
-    """Yield what the anchor of the slider's spring does, where there is one to be screwed."""
-    if solution.anchored and solution.assembly.drive == "force":
-        yield "force_per_anchor", float(solution.assembly.rates[3])
-    if solution.assembly.drive == "force":
-        motion = solution.motion
-        window = solution.character.window or (float(motion[0]), float(motion[-1]))
-        per_rate = mean_effort_per_angle(solution.assembly, window)
-        rates, there = solution.assembly.rates, solution.assembly.rates > 0.0
-        bounded = bool(np.isfinite(per_rate[there]).all())  # not where the window reaches a pole of the force
-        per_degree = float(np.radians(1.0))
-        yield "force_per_degree", float(rates[there] @ per_rate[there]) * per_degree if bounded else None
+def _lost(solution: Solution, kind: str) -> FloatArray:
+    """Return what pins or guide take over the window, back and forth, (m,) [J]."""
+    assert solution.ways is not None
+    (forth, back), motion = solution.ways, solution.for_all(solution.motion)
+    lost = solution.for_all(forth.lost[kind] + back.lost[kind])
+    low, high = (np.broadcast_to(end, (len(solution), 1)) for end in solution.window_or_motion)
+    low, high = np.maximum(low, motion[:, :1]), np.minimum(high, motion[:, -1:])
+    found = []
+    for row in range(len(solution)):
+        inner = motion[row][(motion[row] > low[row]) & (motion[row] < high[row])]
+        at = np.concatenate([low[row], inner, high[row]])
+        found.append(np.trapezoid(np.interp(at, motion[row], lost[row]), at))
+    return np.array(found)
 
 
-def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:
-    """Yield names with values, or the reason why there is none."""
-    for name, value in (
-        *_positions(solution),
-        *_band(solution),
-        *_pose(solution),
-        *_extremes(solution),
-        *_loop(solution),
-        *_trim(solution),
-    ):
-        reason = "" if value is not None else _WHY.get(name.removesuffix("_start").removesuffix("_end"), "")
-        yield name, (value, reason)
+def _of_loop(what: str, kind: str) -> Function:
+    def read(solution: Solution) -> FloatArray:
+        lost = {name: _lost(solution, name) for name in ("pins", "guide")}
+        area = lost["pins"] + lost["guide"]
+        share = np.where(area > 0, lost[kind] / area, np.nan)
+        return np.where(np.isfinite(area), lost[kind] if what == "energy" else share, np.nan)
+
+    return read
 
 
-_WHY = {
-    "snap_through_angle": "there is no unstable equilibrium",
-    "snap_through_travel": "there is no unstable equilibrium",
-    "energy_barrier": "there is no unstable equilibrium",
-    "second_stable_angle": "there is no second stable equilibrium in the motion",
-    "second_stable_travel": "there is no second stable equilibrium in the motion",
-    "constant_angle": "the reference is outside the motion, or the torque there is zero",
-    "constant_travel": "the reference is outside the motion, or the force there is zero",
-    "stiffness_drop": "the effort is zero within its numerical error",
-    "bistable_factor": "it needs torsion springs and a spring at the slider",
-    "positive_factor": "it needs torsion springs and a spring at the slider",
-    "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
-    "folded_angle": "the coupler cannot fold over the crank",
-    "coupler_compression_max": "friction holds the mechanism in a part of its motion, next to which forces are "
-    "unbounded",
-    "guide_force_max": "friction holds the mechanism in a part of its motion, next to which forces are unbounded",
+def _rubs(solution: Solution) -> bool:
+    return solution.ways is not None
+
+
+def _force_per_degree(solution: Solution) -> FloatArray:
+    per_rate = mean_effort_per_angle(solution.assemblies, *solution.window_or_motion)
+    rates = solution.assembly.rates.reshape(4, -1)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.radians(1.0) * np.where(rates > 0.0, rates * per_rate, 0.0).sum(axis=0))
+
+
+def _drop(solution: Solution) -> FloatArray:
+    is_there = np.abs(solution.effort).max(axis=1) > solution.effort_error
+    return np.where(is_there, solution.classified.drop, np.nan)
+
+
+def _stretched_slope(solution: Solution) -> Any:
+    return solution.assembly.total(solution.assembly.units(solution.stretched).stiffness)[:, 0]
+
+
+def _largest_turn(joint: int) -> Function:
+    return lambda solution: solution.extremes.largest_turns[joint]
+
+
+def _slider_travel(solution: Solution) -> Any:
+    high, low = (ends[3] - np.ravel(solution.assembly.tight) for ends in solution.extremes.turns)
+    return np.maximum(np.abs(high), np.abs(low))
+
+
+def _guide_force(solution: Solution) -> FloatArray:
+    up, down = solution.reaction_extremes[1]
+    return np.maximum(np.abs(up), np.abs(down))
+
+
+QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
+    "stiffness_class": ScalarQuantity(
+        "text",
+        "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
+        "tristable over the motion; a drop of at most twice `analysis.tolerance` counts as zero [LH, sec. 3]",
+        lambda solution: solution.classified.kind,
+        words=CLASSES,
+    ),
+    "stiffness_drop": ScalarQuantity(
+        "ratio",
+        "largest fall of the effort after a peak, as a fraction of the peak, on the way from the unloaded position; "
+        "from 1 on there is a second equilibrium",
+        _drop,
+        "the effort is zero within its numerical error",
+    ),
+    "stable_positions": ScalarQuantity(
+        "count",
+        "stable equilibria in the motion, the unloaded position included",
+        lambda solution: solution.classified.stable,
+    ),
+    "unstable_positions": ScalarQuantity(
+        "count",
+        "unstable equilibria in the motion; beyond each the mechanism snaps through",
+        lambda solution: solution.classified.unstable,
+    ),
+    "snap_through_angle": _of_drive(
+        "torque",
+        "angle",
+        "crank angle of the first unstable equilibrium from the unloaded position",
+        lambda solution: solution.nearest(stable=False)[0],
+        NO_UNSTABLE,
+    ),
+    "snap_through_travel": _of_drive(
+        "force",
+        "length",
+        "slider travel of the first unstable equilibrium from the unloaded position",
+        lambda solution: solution.nearest(stable=False)[0],
+        NO_UNSTABLE,
+    ),
+    "second_stable_angle": _of_drive(
+        "torque",
+        "angle",
+        "crank angle of the next stable equilibrium from the unloaded position",
+        lambda solution: solution.nearest(stable=True)[0],
+        NO_SECOND,
+    ),
+    "second_stable_travel": _of_drive(
+        "force",
+        "length",
+        "slider travel of the next stable equilibrium from the unloaded position",
+        lambda solution: solution.nearest(stable=True)[0],
+        NO_SECOND,
+    ),
+    "energy_barrier": ScalarQuantity(
+        "energy",
+        "energy at the first unstable equilibrium",
+        lambda solution: solution.nearest(stable=False)[1],
+        NO_UNSTABLE,
+    ),
+    **_of_band("torque", "angle", "angle"),
+    **_of_band("force", "travel", "length"),
+    "reference_torque": _of_drive(
+        "torque", "torque", f"torque at {_AT}", lambda solution: solution.level, "the reference is outside the motion"
+    ),
+    "reference_force": _of_drive(
+        "force", "force", f"force at {_AT}", lambda solution: solution.level, "the reference is outside the motion"
+    ),
+    "start_force": _of_drive(
+        "force",
+        "force",
+        "force that moves the slider from the unloaded position; where stretched, the limit",
+        lambda solution: solution.frictionless(np.zeros((1, 1))),
+        "the force is unbounded there",
+    ),
+    "stretched_torque": _of_drive(
+        "torque",
+        "torque",
+        "torque in the stretched position",
+        lambda solution: solution.frictionless(solution.stretched),
+        "the torque is unbounded there",
+    ),
+    "stretched_stiffness": _of_drive(
+        "torque",
+        "rotational_stiffness",
+        "slope of the torque in the stretched position [LH, eq. 31]",
+        _stretched_slope,
+        "the torque is unbounded there",
+    ),
+    "bistable_factor": ScalarQuantity(
+        "factor",
+        "factor on all torsion springs below which the mechanism has a second equilibrium: max(-P/G), G and P the "
+        "efforts of the torsion springs and of the slider's spring",
+        lambda solution: solution.scale_factors[0],
+        NO_FACTOR,
+    ),
+    "positive_factor": ScalarQuantity(
+        "factor",
+        "factor on all torsion springs above which the stiffness is positive: max(-P'/G')",
+        lambda solution: solution.scale_factors[1],
+        NO_FACTOR,
+    ),
+    "small_angle_number": ScalarQuantity(
+        "factor",
+        "K_P kappa^2 phi^2/(2 k), k = K_A + (1 + r1/r2)^2 K_B + (r1/r2)^2 K_C, kappa = r1 (1 + r1/r2)/cos t2, phi the "
+        "lead of the unloaded position; for small phi above 4 bistable, 1 zero stiffness, below 1 positive",
+        lambda solution: solution.column(small_angle_number),
+        "the unloaded position is the stretched one, or there is no torsion spring",
+    ),
+    "loop_energy_pins": ScalarQuantity(
+        "energy",
+        "energy that the pins dissipate over the window, back and forth",
+        _of_loop("energy", "pins"),
+        "friction holds the mechanism in a part of its motion",
+        _rubs,
+    ),
+    "loop_energy_guide": ScalarQuantity(
+        "energy",
+        "energy that the slider's guide dissipates over the window, back and forth",
+        _of_loop("energy", "guide"),
+        "friction holds the mechanism in a part of its motion",
+        _rubs,
+    ),
+    "loop_share_pins": ScalarQuantity(
+        "ratio",
+        "share of the loop's area that the pins dissipate",
+        _of_loop("share", "pins"),
+        "friction holds the mechanism in a part of its motion",
+        _rubs,
+    ),
+    "loop_share_guide": ScalarQuantity(
+        "ratio",
+        "share of the loop's area that the slider's guide dissipates",
+        _of_loop("share", "guide"),
+        "friction holds the mechanism in a part of its motion",
+        _rubs,
+    ),
+    "force_per_anchor": ScalarQuantity(
+        "stiffness",
+        "increase of the force per travel of the anchor of the slider's spring; the same over the whole motion, so "
+        "that a trim does not change the shape of the curve",
+        lambda solution: solution.assembly.rates[3],
+        applies=lambda solution: solution.drive == "force" and solution.spec.mechanism.springs.anchor is not None,
+    ),
+    "force_per_degree": _of_drive(
+        "force",
+        "force",
+        "increase of the mean force in the window per degree of the unloaded angle, at the same positions of the "
+        "slider",
+        _force_per_degree,
+        "the force is unbounded in the window",
+    ),
+    "stretched_angle": ScalarQuantity(
+        "angle",
+        "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]",
+        lambda solution: solution.column(lambda assembly: assembly.linkage.stretched_angle),
+    ),
+    "folded_angle": ScalarQuantity(
+        "angle",
+        "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]",
+        lambda solution: solution.column(lambda assembly: assembly.linkage.folded_angle),
+        "the coupler cannot fold over the crank",
+    ),
+    "unloaded_angle": ScalarQuantity(
+        "angle",
+        "crank angle with all springs relaxed, theta_A0",
+        lambda solution: solution.column(lambda assembly: assembly.unloaded),
+    ),
+    "energy_max": ScalarQuantity("energy", "largest energy in the springs", lambda solution: solution.extremes.energy),
+    "pivot_rotation_max": ScalarQuantity("angle", "largest rotation of the spring at the pivot", _largest_turn(0)),
+    "crank_pin_rotation_max": ScalarQuantity(
+        "angle", "largest rotation of the spring at the crank pin", _largest_turn(1)
+    ),
+    "slider_pin_rotation_max": ScalarQuantity(
+        "angle", "largest rotation of the spring at the slider pin", _largest_turn(2)
+    ),
+    "slider_travel_max": ScalarQuantity(
+        "length", "largest travel of the slider from the unloaded position", _slider_travel
+    ),
+    "coupler_compression_max": ScalarQuantity(
+        "force",
+        "largest compression of the coupler of one leg; negative: only tension",
+        lambda solution: -solution.reaction_extremes[0][1],
+        HELD,
+    ),
+    "guide_force_max": ScalarQuantity(
+        "force", "largest transverse force of the slider of one leg on its guide", _guide_force, HELD
+    ),
+    **{name: _of_wire(name) for name in WIRE_DEFINITIONS},
+    "link_stress_max": _of_link("link_stress_max", lambda bar, loads, _allowable: bar.stress(loads)),
+    "pin_bearing_max": _of_link("pin_bearing_max", lambda bar, loads, _allowable: bar.bearing(loads)),
+    "link_safety_factor": _of_link("link_safety_factor", LinkBar.safety),
+    "link_turn_share_max": _of_link("link_turn_share_max", lambda bar, loads, _allowable: bar.turn_share(loads)),
 }
+"""Every scalar result, in the order in which they are shown."""
 
-Pairs = tuple[tuple[str, float | None], ...]
-
-
-def _positions(solution: Solution) -> Pairs:
-    """Return drop and equilibria."""
-    found, place = solution.character, solution.assembly.motion_name
-    unstable, stable = solution.nearest(False), solution.nearest(True)
-    return (
-        ("stiffness_drop", found.drop if float(np.abs(solution.effort).max()) > solution.effort_error else None),
-        ("stable_positions", float(found.classified.stable[0])),
-        ("unstable_positions", float(found.classified.unstable[0])),
-        (f"snap_through_{place}", None if unstable is None else unstable.motion),
-        (f"second_stable_{place}", None if stable is None else stable.motion),
-        ("energy_barrier", None if unstable is None else unstable.energy),
-    )
-
-
-def _band(solution: Solution) -> Pairs:
-    """Return the constant band around the reference."""
-    drive, found = solution.assembly.drive, solution.character
-    name = f"constant_{solution.assembly.motion_name}"
-    low, high = solution.band or (None, None)
-    width = None if low is None or high is None else high - low
-    inside = found.low <= solution.reference <= found.high
-    level = found.effort(solution.reference) if inside else None
-    return (
-        (name, width),
-        (f"{name}_start", low),
-        (f"{name}_end", high),
-        (f"reference_{drive}", level),
-    )
-
-
-def _pose(solution: Solution) -> Pairs:
-    """Return what belongs to the stretched position, and the limits of the classes."""
-    assembly, found = solution.assembly, solution.character
-    factors = scale_factors(assembly, found.low, found.high) or (None, None)
-    finite = tuple(value if value is not None and np.isfinite(value) else None for value in factors)
-    special: Pairs = (("start_force", found.effort(0.0)),)
-    if assembly.drive == "torque":
-        at = assembly.stretched
-        special = (("stretched_torque", found.effort(at)), ("stretched_stiffness", found.stiffness(at)))
-    return (
-        *special,
-        ("bistable_factor", finite[0]),
-        ("positive_factor", finite[1]),
-        ("small_angle_number", small_angle_number(assembly)),
-        ("stretched_angle", assembly.linkage.stretched_angle),
-        ("folded_angle", assembly.linkage.folded_angle),
-        ("unloaded_angle", assembly.unloaded),
-    )
-
-
-def _extremes(solution: Solution) -> Pairs:
-    """Return the largest loads and motions, wherever they are."""
-    found, assembly = solution.extremes, solution.assembly
-    turn = found.largest_turns
-    coupler, guide = solution.reaction_extremes
-    return (
-        ("energy_max", float(found.energy(assembly.rates[None, :])[0])),
-        ("pivot_rotation_max", float(turn[0])),
-        ("crank_pin_rotation_max", float(turn[1])),
-        ("slider_pin_rotation_max", float(turn[2])),
-        ("slider_travel_max", max(abs(float(ends[3]) - assembly.tight) for ends in found.turns)),
-        ("coupler_compression_max", _known(-coupler[1])),
-        ("guide_force_max", _known(max(abs(guide[0]), abs(guide[1])))),
-    )
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+DEFINITIONS = {name: quantity.about for name, quantity in QUANTITIES.items()}
+"""Name -> dimension and definition."""

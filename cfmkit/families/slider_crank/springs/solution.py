@@ -1,7 +1,8 @@
-"""What is known of a solved slider-crank with springs: curves, equilibria with their stability, class, constant band.
+"""Solved slider-cranks with springs as rows: curves, equilibria with their stability, class, constant band.
 
-Places are found on a fine grid of its own, cut into monotonic pieces, and sharpened on the
-closed form: nothing here depends on the points of the curve.
+Places are found on a fine grid of its own, cut into monotonic pieces, and sharpened on the closed form: nothing here
+depends on the points of the curve. What all rows have in common (the motion, or what unit springs do along it) is one
+row, and is broadcast.
 
 Reference
 ---------
@@ -11,27 +12,35 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from cfmkit.arrays import Several, ShortRepr
-from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, signs
+from cfmkit.families.slider_crank.springs.bistability_class import CLASSES, Classified, classify, scale_factors, signs
 from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
-from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes
-from cfmkit.families.slider_crank.springs.sprung_linkage import reactions
+from cfmkit.families.slider_crank.springs.largest_turns_and_forces import MotionExtremes, finite_samples
+from cfmkit.families.slider_crank.springs.sprung_linkage import reactions, reference_motion, rows_of, stacked, window_of
+from cfmkit.metrics.branch_views import MeasuringFrame
 from cfmkit.metrics.continuous_means_and_extremes import extremes
+from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples
 from cfmkit.numerics.hermite_cubic_turning_points import Monotone, monotone
-from cfmkit.numerics.roots import bracketed_root
-from cfmkit.results import round_off
+from cfmkit.numerics.where_condition_ends import last_places
+from cfmkit.results import ROUND_OFF
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.families.slider_crank.springs.sprung_linkage import Assembly
     from cfmkit.families.slider_crank.unit_springs import UnitCurves
+
+    Ends = tuple[FloatArray, ...]
 
 
 GRID = 1025
@@ -46,350 +55,430 @@ NEXT_TO_START = 1e-9
 EDGE = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""
 
+NO_LEVEL = 1e-9
+"""Share of the largest effort that is no reference of a band."""
+
+
+def target_of(spec: SliderCrankSpec) -> float | None:
+    """Return what the effort is to be [N m or N]; None where the design says nothing about this drive."""
+    if spec.design is None:
+        return None
+    return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
+
+
+def grid_over(drive: Kind, low: Any, high: Any) -> FloatArray:
+    """Return the places of the grid over a motion, (n,) [rad or m]; over several motions, (m, 1), (m, n)."""
+    share = np.linspace(0.0, 1.0, GRID)
+    if drive == "force":  # the force runs like the square root of the travel from the stretched place
+        share = share**2
+    return np.asarray(low + (high - low) * share)
+
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A place where nothing needs to hold the mechanism.
+    """A place where nothing needs to hold the mechanism."""
 
-    Attributes
-    ----------
-    motion : float
-        Crank angle [rad] or slider travel [m].
-    stable : bool
-        Whether the energy has a minimum there.
-    energy : float
-        [J].
-    """
-
-    motion: float
-    stable: bool
-    energy: float
+    motion: float  # crank angle [rad] or slider travel [m]
+    stable: bool  # whether the energy has a minimum there
+    energy: float  # [J]
 
 
-def grid_over(assembly: Assembly, low: float, high: float) -> FloatArray:
-    """Return the places of the grid over a motion, (n,) [rad or m]."""
-    share = np.linspace(0.0, 1.0, GRID)
-    if assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
-        share = share**2
-    places: FloatArray = low + (high - low) * share
-    return places
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(ShortRepr):
+    """Solved mechanisms of one kind, one a row: they differ in numbers only."""
 
+    specs: tuple[SliderCrankSpec, ...]
+    assemblies: tuple[Assembly, ...]
+    motion: FloatArray  # (m, n), or (1, n) for all: crank angle [rad] or slider travel [m], increasing
+    low: FloatArray  # (m, 1) or (1, 1), ends of the motion [rad or m]
+    high: FloatArray
 
-@dataclass(frozen=True, repr=False)
-class Character(ShortRepr):
-    """What kind of mechanism it is over an interval of its motion.
+    def __len__(self) -> int:
+        """Return the number of mechanisms."""
+        return len(self.specs)
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The mechanism.
-    low, high : float
-        The interval [rad or m].
-    tolerance : float
-        Half width of a band that counts as constant.
-    window : tuple of (float, float) or None
-        Where the effort is wanted constant: if it is, the class is zero stiffness even without any fall.
-    """
+    def column(self, read: Callable[[Assembly], float | None]) -> FloatArray:
+        """Return a number of each assembly, (m, 1); NaN for None."""
+        return np.array([[read(assembly)] for assembly in self.assemblies], dtype=float)
 
-    assembly: Assembly
-    low: float
-    high: float
-    tolerance: float
-    window: tuple[float, float] | None = None
+    def settings(self, read: Callable[[SliderCrankSpec], Any]) -> FloatArray:
+        """Return a number of each specification, (m, 1); NaN for None."""
+        return np.array([[read(spec)] for spec in self.specs], dtype=float)
 
-    @cached_property
-    def curve(self) -> Monotone:
-        """The effort on the grid and at its turning points, as one of one curves."""
-        units = self.assembly.units(self.grid)
-        rates = self.assembly.rates
-        cut = monotone(self.grid, _summed(rates, units.effort), _summed(rates, units.stiffness))
-        # The cubics say where to look; the values are those of the closed form.
-        return Monotone(cut.place, _summed(rates, self.assembly.forces(cut.place[0])))
+    def for_all(self, values: Any) -> Any:
+        """Return values of one row, or of each, (1, ...) or (m, ...), as (m, ...)."""
+        return np.broadcast_to(values, (len(self), *np.shape(values)[1:]))
 
-    @cached_property
-    def grid(self) -> FloatArray:
-        """Places of the motion, the last of them a little off the ends where an end is a pole."""
-        places = grid_over(self.assembly, self.low, self.high)
-        effort = self.efforts(places)
-        grid: FloatArray = places[np.isfinite(effort)]
-        return grid
-
-    @cached_property
-    def classified(self) -> Classified:
-        """Class, drop and number of equilibria."""
-        return classify(self.curve, self.assembly.start, self.tolerance, self.window, self.assembly.rest)
+    # --- of the first mechanism -------------------------------------------------------------------------------------
 
     @property
-    def kind(self) -> int:
-        """Index of the class in `CLASSES`."""
-        return int(self.classified.kind[0])
+    def spec(self) -> SliderCrankSpec:
+        """Its specification: words and numbers of points are the same in all."""
+        return self.specs[0]
+
+    @property
+    def drive(self) -> Kind:
+        """What the motion is: the crank's angle (``torque``) or the slider's travel (``force``)."""
+        return self.assemblies[0].drive
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of its motion [rad or m]."""
+        return float(self.low[0, 0]), float(self.high[0, 0])
+
+    @property
+    def equilibria(self) -> tuple[Equilibrium, ...]:
+        """All its equilibria in the motion, in order; those at its ends and the unloaded position included."""
+        rows, places, stable, energy = self.all_equilibria
+        own = zip(places[rows == 0].tolist(), stable[rows == 0].tolist(), energy[rows == 0].tolist(), strict=True)
+        return tuple(Equilibrium(*one) for one in own)
 
     @property
     def name(self) -> str:
-        """The class in words."""
-        return CLASSES[self.kind]
+        """Its class in words."""
+        return CLASSES[int(self.classified.kind[0])]
+
+    def nearest_of_one(self, stable: bool) -> Equilibrium | None:
+        """Return its equilibrium next to the unloaded position, of one kind; None if there is none."""
+        place, energy = (float(one[0]) for one in self.nearest(stable))
+        return None if np.isnan(place) else Equilibrium(place, stable, energy)
+
+    # --- numbers of each mechanism, (m, 1) --------------------------------------------------------------------------
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The mechanisms as rows."""
+        return stacked(self.assemblies)
+
+    @cached_property
+    def legs(self) -> FloatArray:
+        """How many legs share the efforts."""
+        return self.settings(lambda spec: spec.mechanism.sets)
+
+    @cached_property
+    def rest(self) -> FloatArray:
+        """Where the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        return self.column(lambda assembly: assembly.rest)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """The motion in the unloaded position."""
+        return self.column(lambda assembly: assembly.start)
+
+    @cached_property
+    def stretched(self) -> FloatArray:
+        """The motion in the stretched position nearest to the unloaded one."""
+        return self.column(lambda assembly: assembly.stretched)
+
+    @cached_property
+    def reference(self) -> FloatArray:
+        """Where the constant band is taken."""
+        pairs = zip(self.specs, self.assemblies, strict=True)
+        return np.array([[reference_motion(spec, assembly)] for spec, assembly in pairs])
+
+    @cached_property
+    def tolerance(self) -> FloatArray:
+        """Half width of a band that counts as constant, as a fraction."""
+        return self.settings(lambda spec: spec.analysis.tolerance)
+
+    @cached_property
+    def target(self) -> FloatArray:
+        """What the effort is to be [N m or N]; NaN if nothing is stated."""
+        return self.settings(target_of)
+
+    @cached_property
+    def window(self) -> Ends | None:
+        """Where the effort is wanted constant; None if the analysis does not state it."""
+        if self.spec.analysis.window is None:
+            return None
+        found = np.array([window_of(*pair) for pair in zip(self.specs, self.assemblies, strict=True)], dtype=float)
+        return Several((found[:, :1], found[:, 1:]))
 
     @property
-    def drop(self) -> float:
-        """Largest fall after a peak, as a fraction of the peak."""
-        return float(self.classified.drop[0])
+    def window_or_motion(self) -> Ends:
+        """The window, else all of the motion."""
+        return self.window or Several((self.low, self.high))
 
-    def effort(self, motion: float) -> float:
-        """Return torque [N m] or force [N] at one place."""
-        return float(self.efforts(np.array([motion]))[0])
-
-    def efforts(self, motion: FloatArray) -> FloatArray:
-        """Return torque [N m] or force [N] at some places, (n,)."""
-        efforts: FloatArray = _summed(self.assembly.rates, self.assembly.forces(motion))[0]
-        return efforts
-
-    def stiffness(self, motion: float) -> float:
-        """Return the slope of the effort at one place [N m/rad or N/m]."""
-        return float(_summed(self.assembly.rates, self.assembly.units(np.array([motion])).stiffness)[0, 0])
-
-    def energy(self, motion: float) -> float:
-        """Return the energy in the springs at one place [J]."""
-        turn = self.assembly.units(np.array([motion])).turn[:, 0]
-        return float(0.5 * self.assembly.rates @ turn**2)
+    # --- curves, (m, n) ---------------------------------------------------------------------------------------------
 
     @cached_property
-    def equilibria(self) -> tuple[Equilibrium, ...]:
-        """All equilibria in the interval, in order; those at its ends and the unloaded position included."""
-        return tuple(
-            Equilibrium(place, stable, self.energy(place)) for place, stable in self._roots() if np.isfinite(place)
-        )
-
-    def _roots(self) -> Iterator[tuple[float, bool]]:
-        place, sign = self.curve.place[0], signs(self.curve, self.assembly.rest)[0]
-        known = np.flatnonzero(sign)
-        if not len(known):
-            return
-        first, last = int(known[0]), int(known[-1])
-        if first > 0:
-            yield self._end(0, first), bool(sign[first] > 0)
-        for k in np.flatnonzero(sign[known[:-1]] != sign[known[1:]]).tolist():
-            before, after = int(known[k]), int(known[k + 1])
-            yield self._between(before, after), bool(sign[after] > 0)
-        if last < len(place) - 1:
-            yield self._end(-1, last), bool(sign[last] < 0)
-
-    def _end(self, end: int, inner: int) -> float:
-        """Return an equilibrium at an end of the interval: the unloaded position itself where that is meant."""
-        place = self.curve.place[0]
-        close = abs(place[end] - self.assembly.rest) <= abs(place[end] - place[inner])
-        return self.assembly.rest if close else float(place[end])
-
-    def _between(self, before: int, after: int) -> float:
-        low, high = self.curve.place[0, before], self.curve.place[0, after]
-        if low <= self.assembly.rest <= high and after - before > 1:
-            return self.assembly.rest
-        root = bracketed_root(self.effort, float(low), float(high))
-        return self.assembly.rest if abs(root - self.assembly.rest) <= SAME * (self.high - self.low) else root
-
-    def band(self, reference: float, tolerance: float) -> tuple[float, float] | None:
-        """Return the interval around a reference in which the effort is within a tolerance of that there.
-
-        None where the effort at the reference is zero, or the reference is outside the interval.
-        """
-        if not self.low <= reference <= self.high:
-            return None
-        level = self.effort(reference)
-        scale = float(np.abs(self.curve.value).max())
-        if not np.isfinite(level) or abs(level) <= 1e-9 * scale:
-            return None
-
-        def excess(motion: float) -> float:
-            return abs(self.effort(motion) / level - 1.0) - tolerance * EDGE
-
-        place, outside = self.curve.place[0], np.abs(self.curve.value[0] / level - 1.0) > tolerance * EDGE
-        left, right = np.flatnonzero(outside & (place < reference)), np.flatnonzero(outside & (place > reference))
-        low = self._edge(excess, place[left[-1]], reference) if len(left) else float(place[0])
-        high = self._edge(excess, place[right[0]], reference) if len(right) else float(place[-1])
-        return low, high
-
-    def _edge(self, excess: Callable[[float], float], outside: float, reference: float) -> float:
-        """Return where the band ends between a place outside and its neighbour inside."""
-        place = self.curve.place[0]
-        inner = place[place > outside].min() if outside < reference else place[place < outside].max()
-        inner = min(inner, reference) if outside < reference else max(inner, reference)
-        return bracketed_root(excess, float(outside), float(inner))
-
-
-def _summed(rates: FloatArray, unit: FloatArray) -> FloatArray:
-    """Return the sum over the springs that are there, (1, n)."""
-    there = rates > 0.0
-    if not there.any():
-        return np.zeros((1, unit.shape[1]))
-    with np.errstate(invalid="ignore"):
-        total: FloatArray = rates[None, there] @ unit[there]
-    return total
-
-
-@dataclass(frozen=True, repr=False)
-class Solution(ShortRepr):
-    """A solved mechanism, as the checks, the scalar values and the pictures need it.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        The parts.
-    motion : (n,) array
-        Crank angle [rad] or slider travel [m], increasing.
-    units : UnitCurves
-        What springs of rate 1 do there.
-    character : Character
-        Equilibria and class over the motion.
-    reference : float
-        Where the constant band is taken.
-    legs : int
-        How many share the efforts.
-    anchored : bool
-        Whether the slider's spring has an anchor that can be screwed.
-    """
-
-    assembly: Assembly
-    motion: FloatArray
-    units: UnitCurves
-    character: Character
-    reference: float
-    legs: int = 1
-    anchored: bool = False
-
-    @cached_property
-    def energy(self) -> FloatArray:
-        """Energy in all springs [J]."""
-        energy: FloatArray = 0.5 * self.assembly.rates @ self.units.turn**2
-        return energy
+    def units(self) -> UnitCurves:
+        """What springs of rate 1 do along the motion."""
+        return self.assembly.units(self.motion)
 
     @cached_property
     def shares(self) -> FloatArray:
-        """Effort of each spring, (4, n) [N m or N]."""
-        return _weighed(self.assembly.rates, self.units.effort)
-
-    @property
-    def effort_error(self) -> float:
-        """Rounding of the sum of the springs' efforts [N m or N]."""
-        return round_off(self.shares)
-
-    def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the largest effort of one spring of one leg at some places of the motion [N m or N]."""
-        shares = _weighed(self.assembly.rates, self.assembly.forces(np.ravel(places)))
-        return np.asarray(np.abs(shares).max(axis=0).reshape(np.shape(places)) / self.legs)
-
-    @cached_property
-    def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
-        """The motion with friction, forth and back; None where nothing rubs."""
-        if not self.assembly.rubbing.there:
-            return None
-        return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
+        """Effort of each spring, (4, m, n) [N m or N]."""
+        return self.assembly.weigh(self.units.effort)
 
     @cached_property
     def effort(self) -> FloatArray:
-        """Torque [N m] or force [N]."""
-        effort: FloatArray = self.shares.sum(axis=0)
-        return effort
+        """Torque [N m] or force [N], without friction."""
+        return np.asarray(self.for_all(self.assembly.total(self.units.effort)))
 
     @cached_property
     def stiffness(self) -> FloatArray:
         """Derivative of the effort by the motion [N m/rad or N/m]."""
-        stiffness: FloatArray = _weighed(self.assembly.rates, self.units.stiffness).sum(axis=0)
-        return stiffness
+        return self.assembly.total(self.units.stiffness)
 
     @cached_property
-    def reactions(self) -> Several[FloatArray]:
+    def energy(self) -> FloatArray:
+        """Energy in all springs [J]."""
+        return 0.5 * self.assembly.total(self.units.turn**2)
+
+    @cached_property
+    def effort_error(self) -> FloatArray:
+        """Rounding of the sum of the springs' efforts, (m,) [N m or N]."""
+        sizes = np.abs(self.shares).sum(axis=0)
+        return np.asarray(self.for_all(ROUND_OFF * sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))))
+
+    @cached_property
+    def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
+        """The motion with friction, forth and back; None where nothing rubs."""
+        if not self.assemblies[0].rubbing.there:
+            return None
+        return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
+
+    @cached_property
+    def reactions(self) -> Ends:
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
-        drive = self.effort if self.assembly.drive == "force" else np.zeros_like(self.effort)
-        coupler, guide = reactions(self.assembly, self.units, drive)
-        if self.assembly.rubbing.mirrored:
-            guide = np.zeros_like(guide)
-        return Several((coupler / self.legs, guide / self.legs))
+        driven = self.effort if self.drive == "force" else np.zeros_like(self.effort)
+        coupler, guide = reactions(self.assembly, self.units, driven)
+        return Several((coupler / self.legs, (0.0 if self._is_mirrored else 1.0) * guide / self.legs))
+
+    @property
+    def _is_mirrored(self) -> bool:
+        return self.assemblies[0].rubbing.mirrored
+
+    # --- at every place ---------------------------------------------------------------------------------------------
+
+    def effort_at(self, places: FloatArray, rows: Any = None, name: str = "load") -> FloatArray:
+        """Return the effort of a branch at places of each mechanism, or of some, (k, n) [N m or N]."""
+        if places is self.curve.place and name == "load" and self.ways is None:
+            return self.curve.value
+        assembly = self.assembly if rows is None else rows_of(self.assembly, rows)
+        if self.ways is not None:
+            return branch(assembly, places, -1.0 if name == "unload" else 1.0).effort
+        return assembly.efforts(places)
+
+    def frictionless(self, place: FloatArray) -> FloatArray:
+        """Return the effort without friction at one place of each mechanism, (m, 1), (m,) [N m or N]."""
+        return np.asarray(self.for_all(self.assembly.efforts(place))[:, 0])
+
+    def part_efforts(self, places: FloatArray) -> FloatArray:
+        """Return the largest effort of one spring of one leg at places of each mechanism, (m, n) [N m or N]."""
+        return np.asarray(np.abs(self.assembly.weigh(self.assembly.forces(places))).max(axis=0) / self.legs)
+
+    @cached_property
+    def curve(self) -> Monotone:
+        """The effort on the grid and at its turning points: (m, k), without friction."""
+        grid = grid_over(self.drive, self.low, self.high)
+        units = self.assembly.units(grid)
+        effort = self.for_all(self.assembly.total(units.effort))
+        slope = self.for_all(self.assembly.total(units.stiffness))
+        if not np.isfinite(effort).all():
+            slope = finite_samples(slope, effort, GRID - 1)[0]
+            grid, effort, end = finite_samples(grid, effort, GRID - 1)
+            grid, effort, slope = (one[:, : int(end.max()) + 1] for one in (grid, effort, slope))
+        return monotone(grid, effort, slope, self.assembly.efforts)
+
+    @cached_property
+    def classified(self) -> Classified:
+        """Classes, drops and numbers of equilibria."""
+        return classify(self.curve, self.start, self.rest, self.tolerance, self.window)
+
+    @cached_property
+    def all_equilibria(self) -> tuple[NDArray[Any], ...]:
+        """Row, place, stability and energy of every equilibrium, (k,) each, in order."""
+        place, sign, rest = self.curve.place, signs(self.curve, self.rest), self.rest[:, 0]
+        found = [(row, *root) for row in range(len(self)) for root in _roots(place[row], sign[row], rest[row])]
+        if not found:
+            return Several((np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0)))
+        rows, low, high, stable = (np.array(one) for one in zip(*found, strict=True))
+        way, assembly = np.where(stable, 1.0, -1.0)[:, None], rows_of(self.assembly, rows)
+        size = np.abs(self.curve.value).max(axis=1)[rows, None]
+
+        def excess(at: FloatArray, few: NDArray[np.intp]) -> FloatArray:
+            return np.asarray(way[few] * rows_of(assembly, few).efforts(at) / size[few])
+
+        root = last_places(excess, low[:, None], high[:, None])[:, 0]
+        width = np.broadcast_to((self.high - self.low)[:, 0], len(self))[rows]
+        root = np.where((low != high) & (np.abs(root - rest[rows]) <= SAME * width), rest[rows], root)
+        known = np.isfinite(root)
+        energy = 0.5 * assembly.total(assembly.units(root[:, None]).turn ** 2)[:, 0]
+        return Several((rows[known], root[known], stable[known], np.broadcast_to(energy, len(root))[known]))
+
+    def nearest(self, stable: bool) -> Ends:
+        """Return place and energy of the equilibrium next to the unloaded position, of one kind, (m,); NaN: none."""
+        rows, places, kinds, energies = self.all_equilibria
+        place, energy = np.full((2, len(self)), np.nan)
+        away = np.abs(places - self.start[rows, 0])
+        for k in np.argsort(away, kind="stable")[::-1]:  # the nearest one last
+            if kinds[k] == stable and away[k] > 0.0:
+                place[rows[k]], energy[rows[k]] = places[k], energies[k]
+        return place, energy
+
+    @cached_property
+    def level(self) -> FloatArray:
+        """Effort at the reference, (m,) [N m or N]; NaN where the motion does not reach it."""
+        inside = (self.low <= self.reference) & (self.reference <= self.high)
+        return np.where(inside[:, 0], self.frictionless(self.reference), np.nan)
+
+    @cached_property
+    def has_level(self) -> NDArray[np.bool_]:
+        """Whether the effort at the reference is more than rounding, (m,): else there is no band around it."""
+        return np.asarray(np.abs(self.level) > NO_LEVEL * np.abs(self.curve.value).max(axis=1))
+
+    @cached_property
+    def band(self) -> Ends:
+        """From where to where the effort is within the tolerance of that at the reference, (m,) each.
+
+        NaN where that effort is zero, or the reference outside the motion.
+        """
+        place, value = self.curve.place, self.curve.value
+        known = self.has_level
+        level, limit = np.where(known, self.level, 1.0)[:, None], self.tolerance * EDGE
+        outside, inner, beyond = np.abs(value / level - 1.0) > limit, [], []
+        for sign in (-1.0, 1.0):  # towards the low end, and towards the high one
+            way, here = sign * place, sign * self.reference
+            first = np.where(outside & (way > here), way, np.inf).min(axis=1, keepdims=True)
+            before = np.maximum(np.where(way < first, way, -np.inf).max(axis=1, keepdims=True), here)
+            inner.append(sign * before)
+            beyond.append(sign * np.where(np.isfinite(first), first, before))
+
+        def excess(at: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
+            own = ends // 2
+            return np.asarray(np.abs(rows_of(self.assembly, own).efforts(at) / level[own] - 1.0) - limit[own])
+
+        low, high = last_places(excess, np.hstack(inner), np.hstack(beyond)).T
+        return Several((np.where(known, low, np.nan), np.where(known, high, np.nan)))
+
+    # --- wherever they are ------------------------------------------------------------------------------------------
 
     @cached_property
     def extremes(self) -> MotionExtremes:
-        """Largest turns and energies, and the forces inside without friction, wherever they are."""
-        return MotionExtremes(self.assembly, self.character.low, self.character.high)
+        """Largest turns and energies, and the forces inside without friction."""
+        return MotionExtremes(self.assembly, self.low, self.high)
 
     @cached_property
-    def reaction_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Largest and smallest tension in the coupler of one leg, and of its slider's force on the guide [N].
+    def scale_factors(self) -> Ends:
+        """By what factors on the torsion springs the mechanisms are no longer bistable, and positive, (m,) each."""
+        return scale_factors(self.assembly, self.low, self.high)
+
+    @cached_property
+    def reaction_extremes(self) -> tuple[Ends, Ends]:
+        """Largest and smallest tension in the coupler of one leg, and of its slider's force on the guide, (m,) [N].
 
         NaN where none is known. With friction of both ways.
         """
-        if self.ways is None:
-            rates = self.assembly.rates[None, :] / self.legs
-            (most, least), (up, down) = self.extremes.coupler(rates), self.extremes.guide(rates)
-            size = 0.0 if self.assembly.rubbing.mirrored else 1.0
-            return (float(most[0]), float(least[0])), (size * float(up[0]), size * float(down[0]))
-        return self._rubbed_extremes("coupler"), self._rubbed_extremes("guide")
+        legs = self.legs[:, 0]
+        if self.ways is not None:
+            coupler, guide = self._rubbed_extremes("coupler"), self._rubbed_extremes("guide")
+        else:
+            coupler, guide = self.extremes.coupler, self.extremes.guide
+        size = (0.0 if self._is_mirrored else 1.0) / legs
+        return Several((coupler[0] / legs, coupler[1] / legs)), Several((size * guide[0], size * guide[1]))
 
-    def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> tuple[float, float]:
-        """Return extremes of both ways; NaN where friction holds the mechanism somewhere."""
-        places, highs, lows = self.extremes.nodes[0].copy(), [], []
-        places[0] += NEXT_TO_START * (places[-1] - places[0])
+    def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> Ends:
+        """Return extremes of both ways, of all legs; NaN where friction holds the mechanism somewhere."""
+        places, last = self.extremes.places.copy(), self.extremes.last
+        places[:, 0] += NEXT_TO_START * (places[:, -1] - places[:, 0])
+        found = []
         for way in (1.0, -1.0):
 
             def force(at: FloatArray, way: float = way) -> FloatArray:
-                values: FloatArray = getattr(branch(self.assembly, at.ravel(), way), part) / self.legs
-                return values.reshape(at.shape)
+                return np.asarray(getattr(branch(self.assembly, at, way), part))
 
             values = force(places)
-            if not np.isfinite(values).all():
-                return np.nan, np.nan
-            high, low = extremes(force, places[None, :], values[None, :], uneven=True)
-            highs.append(float(high[0]))
-            lows.append(float(low[0]))
-        return max(highs), min(lows)
+            high, low = extremes(force, places, values, uneven=True, last=np.broadcast_to(last, len(values)))
+            held = ~np.isfinite(values).all(axis=1)
+            found.append((np.where(held, np.nan, high), np.where(held, np.nan, low)))
+        (high, low), (other_high, other_low) = found
+        return np.maximum(high, other_high), np.minimum(low, other_low)
+
+    # --- as metrics see them ----------------------------------------------------------------------------------------
 
     @cached_property
-    def band(self) -> tuple[float, float] | None:
-        """The interval around the reference in which the effort is constant; None where there is none."""
-        return self.character.band(self.reference, self.character.tolerance)
+    def branches(self) -> dict[str, CurveRows]:
+        """The curves by branch; with friction there are two."""
+        motion = self.for_all(self.motion)
+        efforts = {"load": self.effort}
+        if self.ways is not None:
+            efforts = dict(zip(("load", "unload"), (self.for_all(way.effort) for way in self.ways), strict=True))
+        full = np.full(len(self), motion.shape[1])
+        ends = motion[:, 0], motion[:, -1]
+        band = getattr(self.spec.analysis, "band", MeasuringFrame.band)
+        return {
+            name: CurveRows(
+                RowSamples(motion, effort, full),
+                self.curve.place,
+                partial(self.effort_at, name=name),
+                self.effort_error,
+                self.target[:, 0],
+                band,
+                ends,
+                self.part_efforts,
+                kind=self.drive,
+                pose=self.reference[:, 0],
+            )
+            for name, effort in efforts.items()
+        }
 
-    def nearest(self, stable: bool) -> Equilibrium | None:
-        """Return the equilibrium next to the unloaded position, of one kind; None if there is none."""
-        start = self.assembly.start
-        others = [item for item in self.character.equilibria if item.stable is stable and item.motion != start]
-        return min(others, key=lambda item: abs(item.motion - start), default=None)
 
+def _roots(place: FloatArray, sign: NDArray[np.int8], rest: float) -> Iterator[tuple[float, float, bool]]:
+    """Yield between which places each equilibrium of a curve lies, the same ones if it is known, and if it is stable.
 
-@dataclass(frozen=True, repr=False)
-class ClosedFormEffort(ShortRepr):
-    """The effort at every place of the motion, for metrics that are places.
-
-    Attributes
-    ----------
-    character : Character
-        Of the mechanism over the motion.
+    At an end of the motion the unloaded position itself is meant where it is no farther than the grid.
     """
+    known = np.flatnonzero(sign)
+    if not len(known):
+        return
 
-    character: Character
+    def at_end(end: float, inner: float) -> float:
+        return rest if abs(end - rest) <= abs(end - inner) else end
 
-    @property
+    first, last = int(known[0]), int(known[-1])
+    if first > 0:
+        at = at_end(float(place[0]), float(place[first]))
+        yield at, at, bool(sign[first] > 0)
+    for k in np.flatnonzero(sign[known[:-1]] != sign[known[1:]]).tolist():
+        before, after = int(known[k]), int(known[k + 1])
+        low, high = float(place[before]), float(place[after])
+        is_rest = low <= rest <= high and after - before > 1
+        yield (rest if is_rest else low), (rest if is_rest else high), bool(sign[after] > 0)
+    if last < len(place) - 1:
+        at = at_end(float(place[-1]), float(place[last]))
+        yield at, at, bool(sign[last] < 0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedFormEffort(ShortRepr):
+    """The effort of one mechanism at every place of its motion (a `cfmkit.results.ClosedForm`)."""
+
+    solution: Solution
+
+    @cached_property
     def places(self) -> FloatArray:
         """Places of a fine grid, and those of the turning points [rad or m]."""
-        places: FloatArray = self.character.curve.place[0]
-        return places
+        return np.asarray(self.solution.curve.place[0])
 
     @property
     def peaks(self) -> FloatArray:
-        """The grid: springs bend the curve on the scale of the linkage, which few points of a curve may miss."""
-        return self.character.grid
+        """All places: springs bend the curve on the scale of the linkage, which few points of a curve may miss."""
+        return self.places
 
-    def effort(self, branch_name: str, places: FloatArray, /) -> FloatArray:
-        """Return torque [N m] or force [N] at places of any shape."""
-        assembly = self.character.assembly
-        if assembly.rubbing.there:
-            way = -1.0 if branch_name == "unload" else 1.0
-            return branch(assembly, np.ravel(places), way).effort.reshape(np.shape(places))
-        return self.character.efforts(np.ravel(places)).reshape(np.shape(places))
+    def effort(self, name: str, places: FloatArray, /) -> FloatArray:
+        """Return torque [N m] or force [N] of a branch at places of any shape."""
+        if places.size == self.places.size and np.may_share_memory(places, self.places):  # as each metric begins
+            own = self.solution.curve.place
+        else:
+            own = np.reshape(places, (1, -1))
+        return self.solution.effort_at(own, None, name).reshape(np.shape(places))
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return zeros: springs have no stress here."""
         return np.zeros(np.shape(places))
 
-
-def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
-    """Return rates times unit curves; a spring that is not there does nothing, even at a pole."""
-    with np.errstate(invalid="ignore"):
-        product: FloatArray = np.where(rates[:, None] == 0.0, 0.0 * np.isnan(unit), rates[:, None] * unit)
-    return product
+    def part_efforts(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest effort of one spring of one leg at places of any shape [N m or N]."""
+        return self.solution.part_efforts(np.reshape(places, (1, -1))).reshape(np.shape(places))

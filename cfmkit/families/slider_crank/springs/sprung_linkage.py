@@ -1,5 +1,9 @@
 """A slider-crank with springs put together: linkage, rates, the motion that it can run through, the forces inside.
 
+An `Assembly` is one mechanism, or m mechanisms as rows (`stacked`): then numbers that differ are columns (m, 1), rates
+are (4, m, 1), and places are (m, n), or (1, n) for all. Numbers that are equal in all stay plain, so that what
+mechanisms of one linkage have in common is computed once.
+
 The coupler is in equilibrium under the forces at its ends and the moments of the springs at crank pin and
 slider pin; the slider passes on its own spring's force and what drives it.
 
@@ -12,8 +16,9 @@ the slider's spring, that adds most where a joint turns most per travel.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
@@ -21,19 +26,24 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.families.guide_friction import FREE, GuideFriction
 from cfmkit.families.slider_crank.linkage_from_spec import linkage_of, side_of, unloaded_angle
 from cfmkit.families.slider_crank.unit_springs import (
+    SliderPath,
     UnitCurves,
     along_crank,
-    along_slider,
     crank_efforts,
-    slider_forces,
+    path_of,
 )
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
+
+T = TypeVar("T")
 
 TURN = 2.0 * math.pi
 
@@ -46,21 +56,11 @@ CLOSEST = 1e-6
 
 @dataclass(frozen=True)
 class Rubbing:
-    """What rubs in a slider-crank.
+    """What rubs in a slider-crank."""
 
-    Attributes
-    ----------
-    pin : float
-        Friction couple per load of each pin, mu d/2 [m].
-    guide : GuideFriction
-        Of the slider.
-    mirrored : bool
-        Whether a mirrored pair keeps the guide free of load.
-    """
-
-    pin: float = 0.0
+    pin: float = 0.0  # friction couple per load of each pin, mu d/2 [m]
     guide: GuideFriction = FREE
-    mirrored: bool = False
+    mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
 
     @property
     def there(self) -> bool:
@@ -70,56 +70,37 @@ class Rubbing:
 
 @dataclass(frozen=True, repr=False)
 class Assembly(ShortRepr):
-    """A slider-crank put together.
+    """A slider-crank put together, or several as rows; the motion that can be run through is that of one."""
 
-    Attributes
-    ----------
-    linkage : Linkage
-        The lengths, the coupler's written out.
-    unloaded : float
-        Crank angle with all springs relaxed [rad].
-    rates : (4,) array
-        Of the springs of all legs together [N m/rad; the last N/m].
-    drive : {"torque", "force"}
-        What the motion is: the crank's angle or the slider's travel.
-    side : int
-        Of a force drive: 1 beyond, -1 before the stretched position.
-    anchor : float
-        How far the anchor of the slider's spring is screwed beyond where that spring is relaxed [m].
-    rubbing : Rubbing
-        Friction of its pins and guide; efforts of `units` and `forces` are without.
-    """
+    linkage: Linkage  # the lengths, the coupler's written out
+    unloaded: float  # crank angle with all springs relaxed [rad]
+    rates: FloatArray  # (4,), of the springs of all legs together [N m/rad; the last N/m]
+    drive: Kind = "torque"  # what the motion is: the crank's angle ("torque") or the slider's travel ("force")
+    side: int = 1  # of a force drive: 1 beyond, -1 before the stretched position
+    anchor: float = 0.0  # how far the anchor of the slider's spring is screwed beyond where that is relaxed [m]
+    rubbing: Rubbing = Rubbing()  # friction of its pins and guide; efforts of `units` and `forces` are without
 
-    linkage: Linkage
-    unloaded: float
-    rates: FloatArray
-    drive: Kind = "torque"
-    side: int = 1
-    anchor: float = 0.0
-    rubbing: Rubbing = Rubbing()
+    @cached_property
+    def path(self) -> SliderPath:
+        """The way of the slider."""
+        return path_of(self.linkage, self.unloaded, self.side)
 
     def units(self, motion: FloatArray) -> UnitCurves:
         """Return what unit springs do along the motion of the drive."""
-        if self.drive == "torque":
-            plain = along_crank(self.linkage, self.unloaded, motion)
-        else:
-            plain = along_slider(self.linkage, self.unloaded, self.side, motion)
-        return self._anchored(plain, motion) if self.anchor else plain
-
-    def _anchored(self, plain: UnitCurves, motion: FloatArray) -> UnitCurves:
-        """Return unit curves whose spring at the slider is tight by the anchor's way."""
-        turn, effort, stiffness = plain.turn.copy(), plain.effort.copy(), plain.stiffness.copy()
-        tight = self.tight
-        turn[3] += tight
+        is_turned = self.drive == "torque"
+        plain = along_crank(self.linkage, self.unloaded, motion) if is_turned else self.path.units(motion)
+        if not np.any(self.anchor):
+            return plain
         first, second = self._slider_rates(motion)
-        effort[3] += tight * first
-        stiffness[3] += tight * second
+        more = self.tight, self.tight * first, self.tight * second
+        rows = zip((plain.turn, plain.effort, plain.stiffness), more, strict=True)
+        turn, effort, stiffness = (_with_more_at_slider(row, added) for row, added in rows)
         return replace(plain, turn=turn, effort=effort, stiffness=stiffness)
 
     @property
     def tight(self) -> float:
         """What the anchor adds to the deflection of the slider's spring, along the slider's path [m]."""
-        return -self.linkage.branch * self.anchor if self.anchor else 0.0
+        return -self.linkage.branch * self.anchor + 0.0  # no minus before a zero
 
     def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return dx/d(motion) and its derivative, of the slider's place x."""
@@ -140,10 +121,30 @@ class Assembly(ShortRepr):
         if self.drive == "torque":
             found = crank_efforts(self.linkage, self.unloaded, motion)
         else:
-            found = slider_forces(self.linkage, self.unloaded, self.side, motion)
-        if self.anchor:
-            found[3] -= self.linkage.branch * self.anchor * self._slider_rates(motion)[0]
+            found = self.path.unit_forces(motion)
+        if np.any(self.anchor):
+            found = _with_more_at_slider(found, self.tight * self._slider_rates(motion)[0])
         return found
+
+    def rates_over(self, unit: FloatArray) -> FloatArray:
+        """Return the rates with as many axes as unit curves (4, ..., n)."""
+        return self.rates.reshape(*self.rates.shape, *[1] * (unit.ndim - self.rates.ndim))
+
+    def weigh(self, unit: FloatArray) -> FloatArray:
+        """Return rates times unit curves; a spring that is not there does nothing, even at a pole."""
+        rates = self.rates_over(unit)
+        with np.errstate(invalid="ignore"):
+            return np.where(rates == 0.0, 0.0, rates * unit)
+
+    def total(self, unit: FloatArray) -> FloatArray:
+        """Return the sum of rates times unit curves over the springs that are there, (..., n)."""
+        if unit.ndim == 3 and unit.shape[1] == 1 and np.isfinite(unit).all():  # of one linkage: a product
+            return np.asarray(self.rates.reshape(4, -1).T @ unit[:, 0])
+        return np.asarray(self.weigh(unit).sum(axis=0))
+
+    def efforts(self, motion: FloatArray) -> FloatArray:
+        """Return torque [N m] or force [N] at some places."""
+        return self.total(self.forces(motion))
 
     @property
     def motion_name(self) -> Literal["angle", "travel"]:
@@ -160,14 +161,18 @@ class Assembly(ShortRepr):
         """The motion in the unloaded position."""
         return self.unloaded if self.drive == "torque" else 0.0
 
+    @cached_property
+    def knee(self) -> float:
+        """The knee angle in the unloaded position [rad]."""
+        return self.linkage.knee(self.unloaded)
+
     @property
     def rest(self) -> float:
         """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
-        knee = self.linkage.knee(self.unloaded)
-        other_side = self.drive == "force" and self.side * knee < 0.0 and knee != math.pi
+        other_side = self.drive == "force" and self.side * self.knee < 0.0 and self.knee != math.pi
         return math.nan if other_side or self.anchor else self.start
 
-    @property
+    @cached_property
     def reach(self) -> tuple[float, float]:
         """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
         if self.drive == "torque":
@@ -176,10 +181,10 @@ class Assembly(ShortRepr):
         first, last = self._relaxed_ends
         return 0.0 if first else -outward, 0.0 if last else inward
 
-    @property
+    @cached_property
     def _relaxed_ends(self) -> tuple[bool, bool]:
         """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
-        stretched, folded = (self.linkage.knee(self.unloaded) == knee for knee in (0.0, math.pi))
+        stretched, folded = (self.knee == knee for knee in (0.0, math.pi))
         past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
         return (folded, stretched) if past else (stretched, folded)
 
@@ -236,6 +241,42 @@ class Assembly(ShortRepr):
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
 
 
+def _with_more_at_slider(rows: FloatArray, more: Any) -> FloatArray:
+    """Return rows of the four joints with something added to that of the slider."""
+    return np.stack(np.broadcast_arrays(*rows[:3], rows[3] + more))
+
+
+def stacked(items: Sequence[T]) -> T:
+    """Return dataclasses of numbers as one, with columns where they differ: (m, 1), of arrays (k,) (k, m, 1)."""
+    first: Any = items[0]
+    found: Any = first
+    if len(items) == 1:
+        return items[0]
+    if is_dataclass(first):
+        found = object.__new__(type(first))  # without what is known of the first one
+        names = [item.name for item in fields(first)]
+        for name in [*names, "path"] if isinstance(first, Assembly) and first.drive == "force" else names:
+            vars(found)[name] = stacked([getattr(one, name) for one in items])
+    elif isinstance(first, tuple):
+        found = tuple(stacked(one) for one in zip(*items, strict=True))
+    elif not ((values := np.array(items)) == values[0]).all():
+        found = np.moveaxis(values, 0, -1)[..., None]
+    return found  # type: ignore[no-any-return]
+
+
+def rows_of(item: T, rows: Any) -> T:
+    """Return some rows of what is stacked, with what is known of it; plain numbers hold for every row."""
+    found: Any = item
+    if isinstance(item, np.ndarray):
+        found = item[..., rows, :] if item.ndim > 1 else item
+    elif isinstance(item, tuple):
+        found = tuple(rows_of(one, rows) for one in item)
+    elif is_dataclass(item):
+        found = object.__new__(type(found))
+        vars(found).update({name: rows_of(value, rows) for name, value in vars(item).items()})
+    return found  # type: ignore[no-any-return]
+
+
 def assemble(spec: SliderCrankSpec) -> Assembly:
     """Return the slider-crank put together.
 
@@ -281,6 +322,30 @@ def default_motion(assembly: Assembly) -> tuple[float, float]:
     return low + room, high - room
 
 
+def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:
+    """Return the motion that the analysis asks for [rad or m]."""
+    asked: tuple[float, float] | None = getattr(spec.analysis, assembly.motion_name)
+    return asked or default_motion(assembly)
+
+
+def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] | None:
+    """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
+    window = spec.analysis.window
+    return None if window is None else between(window, asked_motion(spec, assembly))
+
+
+def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
+    """Return where the constant band is taken: as asked, else the stretched position, or half way of a force."""
+    low, high = asked_motion(spec, assembly)
+    if assembly.drive == "force":
+        asked = spec.analysis.reference_travel
+        return 0.5 * (low + high) if asked is None else asked
+    asked = spec.analysis.reference_angle
+    if asked is not None:
+        return asked
+    return assembly.stretched if low <= assembly.stretched <= high else 0.5 * (low + high)
+
+
 def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the force along the coupler and that of the slider on its guide.
 
@@ -299,7 +364,7 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
         Tension in the coupler, and force on the guide across the slider's path (positive
         upwards) [N]; for the rates and the drive given, so of all legs together or of one.
     """
-    link, rates, turn = assembly.linkage, assembly.rates, units.turn
+    link, turn, rates = assembly.linkage, units.turn, assembly.rates_over(units.turn)
     beta = coupler_angle(link, units)
     along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
     moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
@@ -344,18 +409,21 @@ def turned(assembly: Assembly, angle: float) -> tuple[Assembly, float]:
     return other, link.branch * (before - after)
 
 
-def effort_per_angle(assembly: Assembly, motion: FloatArray) -> FloatArray:
-    """Return by how much unit efforts rise per unloaded angle, (4, n), [N m or N, per rate and rad]."""
+def mean_effort_per_angle(assemblies: Sequence[Assembly], low: Any, high: Any) -> FloatArray:
+    """Return by how much unit efforts rise per unloaded angle, (4, m), [N m or N, per rate and rad].
+
+    Parameters
+    ----------
+    assemblies : sequence of Assembly
+        Each of one mechanism.
+    low, high : float or (m, 1) array
+        The windows over which the means are taken [rad or m].
+    """
+    places = np.linspace(np.reshape(low, -1), np.reshape(high, -1), PLACES, axis=1)
     rows = []
     for step in (STEP, -STEP):
-        other, less = turned(assembly, step)
-        rows.append(other.forces(motion - less))
+        others, less = zip(*(turned(one, step) for one in assemblies), strict=True)
+        rows.append(stacked(others).forces(places - np.reshape(less, (-1, 1))))
     with np.errstate(invalid="ignore"):  # at the end of the reach some efforts are unbounded
-        change: FloatArray = (rows[0] - rows[1]) / (2.0 * STEP)
-    return change
-
-
-def mean_effort_per_angle(assembly: Assembly, window: tuple[float, float]) -> FloatArray:
-    """Return the mean of `effort_per_angle` over a window, (4,)."""
-    found: FloatArray = effort_per_angle(assembly, np.linspace(*window, PLACES)).mean(axis=1)
-    return found
+        change = (rows[0] - rows[1]) / (2.0 * STEP)
+    return np.asarray(change.mean(axis=-1))

@@ -1,1 +1,0 @@
-"""Many slider-cranks at once that differ in their springs."""
