@@ -90,8 +90,8 @@ def _largest_force(at: Equilibria) -> float:
     return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))
 
 
-def pick_points(path: Path) -> list[int]:
-    """Return the indices of the points at which the error of a path is estimated, none beside an event."""
+def pick_points(path: Path, places: Sequence[float]) -> list[int]:
+    """Return the indices of the points at which the error of a path is estimated, none at events at these drives."""
     if not len(path):
         return []
     at = path.at_requested if len(path.at_requested) else np.arange(len(path))
@@ -103,8 +103,7 @@ def pick_points(path: Path) -> list[int]:
         left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
         bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
         chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))
-    if not path.events:
+    if not places:
         return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
-    places = [event.drive for event in path.events]
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along
+from cfmkit.numerics.continuation.branch_ends import primary_slope
 from cfmkit.numerics.continuation.branches import (
     AMPLITUDES,
     LAST_AMPLITUDES,
@@ -41,6 +42,7 @@ LOOK_PAST_BY = 2e-3, 2e-2
 LOOK_PAST_MISS = 0.02  # motion
 CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
 FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
+FORWARD = 1e-13  # share of the range: less is rounding
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
@@ -64,6 +66,12 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
         yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes, found.within)
         walk = yield from _reach_bifurcation(walk, found, far, slope)
+        for number in walk.targets_up_to(new.drive):  # just behind it their count is rounding
+            goal = float(walk.targets[number])
+            guess = found.x + (goal - found.drive) / (new.drive - found.drive) * (new.x - found.x)
+            at = correct(problem, guess, goal) or PathEquilibrium(guess, goal, new.rate, new.unstable)
+            yield Point(at._replace(unstable=new.unstable), number, walk.branch)
+            walk = replace(walk, number=number + 1)
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
@@ -168,7 +176,9 @@ def look_past(walk: Walk, goal: float) -> Items:
 def start_critical(walk: Walk) -> Walk | None:
     """Return the walk a little behind a start at which a mode is just critical, or None if none is.
 
-    Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
+    What the drive does there may grow with its cube root: the mode leads, to the side on which the drive goes forward.
+    If it does so to none, the drive relieves the structure: the path goes on along the slope without the mode. How many
+    directions are unstable at the start is rounding.
     """
     problem, start = walk.problem, walk.here
     is_stiff = getattr(problem, "is_stiff", None)
@@ -182,11 +192,13 @@ def start_critical(walk: Walk) -> Walk | None:
     for halvings in range(MAX_HALVINGS):
         for sign in (walk.options.sign, -walk.options.sign):
             step = step_along(problem, start, sign * tangent, FIRST_AMPLITUDE * 0.5**halvings, walk.options.span)
-            if step is None or step.new.unstable or (step.new.drive - start.drive) * walk.sense <= 0:
+            forward = 0.0 if step is None else (step.new.drive - start.drive) * walk.sense
+            if step is None or step.new.unstable or forward <= FORWARD * walk.options.span:
                 continue
             if not walk.targets_up_to(step.new.drive):
                 return walk.restart(step.new, abs(step.new.drive - start.drive))
-    return None
+    relieved = start._replace(rate=primary_slope(problem, start, modes), unstable=start.unstable - int(values[0] < 0))
+    return replace(walk, here=relieved, trail=(relieved,))
 
 
 def start_unstable(walk: Walk) -> Walk | None:
