@@ -27,11 +27,12 @@ MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
 ROUNDING = 1e-13
+ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
 CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
 SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
-NO_FORCE, NO_EFFORT = 1e-12, 1e-6  # largest force, and effort as a share of it, that are none; dimensionless
+NO_FORCE = 1e-6  # largest force, EI/L^2, over the largest motion, that is none; effort, over both
 SMALL_MOTION = 1e-3  # largest motion up to which errors of motions are relative to this
 
 
@@ -59,11 +60,22 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     efforts: Any = np.abs(fine.effort - path.effort[chosen])
     forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[chosen, :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
-    load = max(_largest_force(fine.at), NO_FORCE)
-    size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
-    reach = max(float(np.abs(own.z[:, :n_bodies]).max()), SMALL_MOTION)
-    relative = np.max([efforts / size, moves / reach, forces / load], axis=0)
+    reach = float(np.abs(own.z[:, :n_bodies]).max())
+    load = max(_largest_force(fine.at), NO_FORCE * reach, ROUNDING)
+    size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * scales.moment / scales.drive)
+    reach = max(reach, SMALL_MOTION)
+    bearing = np.maximum(efforts / size, forces / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
+    relative = np.maximum(bearing, moves / reach)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+
+
+def _rises(path: Path) -> FloatArray:
+    """Return by how much the effort changes at every point while the drive does by one rounding of a length of one."""
+    if len(path) < 2:
+        return np.zeros(len(path))
+    change = np.diff(path.at.drive)
+    slope = np.abs(np.diff(path.effort)) / np.where(change == 0, np.inf, np.abs(change))
+    return np.asarray(np.maximum(np.append(slope, 0.0), np.append(0.0, slope)) * np.finfo(float).eps)
 
 
 def polish(path: Path) -> Path:

@@ -313,7 +313,7 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    points = [_at_event(point, events, drive, unit, control) for point in points]
+    points = [_at_event(point, events, drive, unit) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _path(network, drive, start, points, told, status, message)
     return TraceAttempt(path, mesh, start, first, tuple(events), tuple(point.branch for point in points))
@@ -351,7 +351,7 @@ def _tell(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
-def _at_event(point: Point, events: list[PathEvent], drive: Drive, unit: float, control: Control) -> Point:
+def _at_event(point: Point, events: list[PathEvent], drive: Drive, unit: float) -> Point:
     """Return a point, which if it lies at a bifurcation is as stable as the path is on the better side of it.
 
     There the number of unstable directions is rounding.
@@ -359,8 +359,7 @@ def _at_event(point: Point, events: list[PathEvent], drive: Drive, unit: float, 
     near = SAME_PLACE * _range(drive) / unit
     for event in events:
         if event.kind == "bifurcation" and abs(point.at.drive - event.drive) <= near:
-            unstable = max(event.before, event.after) if control.branch == "primary" else min(event.before, event.after)
-            return point._replace(at=point.at._replace(unstable=unstable))
+            return point._replace(at=point.at._replace(unstable=min(event.before, event.after)))
     return point
 
 
