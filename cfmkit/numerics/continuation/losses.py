@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -34,6 +34,8 @@ Items = Generator[Point | PathEvent, None, Walk | PathStop | None]
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
 NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
 """Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
+RIGID_CLUSTERS, NEARLY_RIGID = (0.5, 2.0, 8.0, 32.0), 1e-6
+"""Ways to the first within which nearly rigid structures pass several together; that way, as a share of the range."""
 NEAR_SHARE = 1e-3  # of the way to the first of them: the other modes of a slender column are not together with it
 ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
 LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
@@ -78,8 +80,8 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         yield Point(new, -1, walk.branch)
         return PathStop(WhyStopped.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
     onto, mode = None, problem.orient(modes)
-    for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
-        several = _pass_together(walk, new, found, slope, clusters)
+    for widths, amplitudes in _cluster_widths(walk, found):
+        several = _pass_together(walk, new, found, slope, widths)
         if several is not None:
             onto, modes, after = several
         onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
@@ -101,16 +103,26 @@ def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium |
     return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
 
 
+def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Yield ranges of the drive within which bifurcations are passed together, with amplitudes along the first mode.
+
+    Nearly rigid structures reach many critical loads at once, measured by the drive's range, and not at all so measured
+    by the way to the first.
+    """
+    width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.trail[0].drive)
+    yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), AMPLITUDES + LAST_AMPLITUDES
+    yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
+    if way < NEARLY_RIGID * walk.options.span:
+        yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
+
+
 def _pass_together(
-    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
+    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, widths: tuple[float, ...]
 ) -> tuple[PathEquilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
     problem, here = walk.problem, walk.here
-    for factor in clusters:
-        width = factor * walk.options.cluster
-        ahead = walk.sense * width * walk.options.span
-        if clusters is NEAR_CLUSTERS:
-            ahead *= min(1.0, NEAR_SHARE * abs(found.drive - walk.trail[0].drive) / abs(ahead))
+    for width in widths:
+        ahead = walk.sense * width
         saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
         if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
             continue
