@@ -235,11 +235,7 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     network, moved = at.network, at.z
     if designs.base is not None:
         moved = at.z + 1j * np.imag(designs.base)[:, None]
-    tables = {name: table[:, None] for name, table in designs.tables.items() if np.imag(table).any()}
-    places = {name: place[:, None] for name, place in designs.places.items() if np.imag(place).any()}
-    stepped = replace(
-        network, elements=network.elements._replace(**tables), attachments=network.attachments._replace(**places)
-    )
+    stepped = all_designs(designs)
     found = np.zeros((len(at.z), designs.count, network.size))
     together = max(1, MAX_TOGETHER // (designs.count * network.elements.angle.size))
     for first in range(0, len(at.z), together):
@@ -255,6 +251,15 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
                 part = TERMS[type(attached.item)](one, attached, z, 1.0, drive)
                 np.add.at(found[k, d], part.unknowns, np.imag(part.gradient) / COMPLEX_STEP)
     return found
+
+
+def all_designs(designs: NetworkDesigns) -> Discretisation:
+    """Return the arrays of all designs as one network: tables (d, 1, e, q) and places (d, 1, k, 2) that have a step."""
+    network = designs.template
+    tables = {name: table[:, None] for name, table in designs.tables.items() if np.imag(table).any()}
+    places = {name: place[:, None] for name, place in designs.places.items() if np.imag(place).any()}
+    elements, attachments = network.elements._replace(**tables), network.attachments._replace(**places)
+    return replace(network, elements=elements, attachments=attachments)
 
 
 def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
