@@ -111,9 +111,9 @@ def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, .
     """
     width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.trail[0].drive)
     yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), AMPLITUDES + LAST_AMPLITUDES
-    yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
     if way < NEARLY_RIGID * walk.options.span:
         yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
+    yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
 
 
 def _pass_together(
