@@ -4,23 +4,6 @@ Run: python benchmarks/beams_engine.py [--peer]. With --peer the same curves are
 interleaved, if it can be imported (Debian: libblas3, liblapack3 and libgfortran5 must be there), with as many elements
 as the tolerance asks for; it follows the unstable branch of the V-beam. Minima of repeats after warm-up; networks are
 built anew for each, and forces (or displacements under forces) read out; the error is against the finest engine mesh.
-
-Where the time goes (processor time, one core of an EPYC): of Lan's curve at 1e-4, 0.64 ms, compiled code takes 0.28,
-0.24 of it 36 iterations of Newton's method in the march: four tenths are drifts, kicks and assembly, four tenths the
-system of 18 unknowns, solved and its inertia counted. The rest is Python: the network 0.02, its numbers and fits 0.09,
-tables and arrays 0.05, around the march 0.08, the error's second mesh 0.07, path and forces 0.05; no line of it takes
-more than 0.01 ms. Of the cantilever's 0.30 ms 0.05 are compiled. A V-beam takes 2.9 ms: 1.0 compiled, half of that 17
-solutions of 45 unknowns on the finer mesh on which its bifurcations are placed, and 1.9 the decisions there, in Python;
-on the mesh that is marched on they take no less. Thirteen gradients
-take 1.05 ms beside a curve of 0.68 ms at 1e-5: 0.40 compiled, 0.23 the thirteen networks that the caller builds, the
-rest their plain slopes in Python, no function more than 0.05. A design of a batch takes 0.75 ms: 0.29 compiled in three
-calls, 0.02 its network, the rest the same Python as around a single curve; what designs share is kept between them
-(numbering, mesh), but decisions, paths and checks are made for each. Of a whole process (`analyze` of Lan, warm, 0.58 s
-of processor time) imports are four fifths: numpy 0.09, pydantic and the specification's models 0.13, typer 0.09.
-Some 180 dataclasses and 60 models are made anew in each process.
-Where Python may not keep bytecode (PYTHONDONTWRITEBYTECODE) each process compiles 150 modules, a quarter more.
-The first compilation of the solver is numba's typing for two thirds,
-optimisation for a fifth, translation for a tenth.
 """
 
 from __future__ import annotations

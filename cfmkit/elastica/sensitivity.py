@@ -20,7 +20,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import Equilibria, effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria, all_designs, effort_slopes, unknown_slopes
 from cfmkit.elastica.mechanics.designs import design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise_alike
 from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
@@ -137,23 +137,32 @@ class Gradient:
 
     def states(self, beam: str, fractions: Any = None) -> beam_states.BeamStates:
         """Return the derivatives of states at fractions of every element of a beam; arrays (p, n, k)."""
-        places = np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions
-
-        def output(net: Network, at: Equilibria) -> Any:
-            found = beam_states.states(net, at, beam, places)
-            shape = found.x.shape
-            return np.stack([np.broadcast_to(part, shape) for part in found])
-
-        return beam_states.BeamStates(*self.of(output))
+        return beam_states.BeamStates(*map(self._slopes, self._states(beam, fractions)))
 
     def sections(self, beam: str, fractions: Any = None) -> beam_states.BeamSections:
         """Return the derivatives of section forces and stresses at fractions of every element; arrays (p, n, k)."""
-        places = np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions
+        widths = np.array([net.beams[beam].section.width for net, _ in self.designs.networks])[:, None, None]
+        found = beam_states.sections_of_width(widths, self._states(beam, fractions))
+        return beam_states.BeamSections(*map(self._slopes, found))
 
-        def output(net: Network, at: Equilibria) -> Any:
-            return np.stack(beam_states.sections(net, beam, beam_states.states(net, at, beam, places)))
+    def _states(self, beam: str, fractions: Any) -> beam_states.BeamStates:
+        """Return the states of all designs at fractions of every element of a beam, (k, p, n)."""
+        places = tuple(np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions)
+        if (beam, places) not in self._known:
+            moved = self.at.z + 1j * COMPLEX_STEP * np.moveaxis(self.unknowns, 1, 0)
+            stepped = Equilibria(all_designs(self.designs), moved, self.at.drive)
+            self._known[beam, places] = beam_states.states_of_designs(self.designs, stepped, beam, places)
+        return self._known[beam, places]
 
-        return beam_states.BeamSections(*self.of(output))
+    @cached_property
+    def _known(self) -> dict[Any, beam_states.BeamStates]:
+        """States of beams: their places and their stresses are requested one after the other."""
+        return {}
+
+    def _slopes(self, values: Any) -> FloatArray:
+        """Return the derivatives (p, n, k) of values (k, p, n)."""
+        shape = self.designs.count, len(self.points), np.shape(values)[-1]
+        return read_only(np.moveaxis(np.broadcast_to(np.imag(values), shape), 0, -1) / COMPLEX_STEP)
 
     def stress_extremes(self, beam: str, axial: bool = True) -> FloatArray:
         """Return the derivatives of the values of `EquilibriumPath.stress_extremes`, (p, 2, 2, k).

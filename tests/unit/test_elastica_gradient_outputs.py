@@ -32,7 +32,7 @@ def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
     found = {"effort": path.effort[keep], "energy": path.energy[keep]}
     for node in path.net.nodes:
         found[f"motion {node}"] = path.motion(node)[keep]
-    for node in path.layout.masters:
+    for node in path.network.bodies:
         found[f"reaction {node}"] = path.reaction(node)[keep]
     for beam in path.net.beams:
         found[f"start force {beam}"] = path.end_force(beam, 0)[keep]
@@ -53,7 +53,7 @@ def slopes(g: Any) -> dict[str, Any]:
     found = {"effort": g.effort, "energy": g.energy}
     for node in g.path.net.nodes:
         found[f"motion {node}"] = g.motion[node]
-    for node in g.path.layout.masters:
+    for node in g.path.network.bodies:
         found[f"reaction {node}"] = g.reaction[node]
     for beam in g.path.net.beams:
         found[f"start force {beam}"] = g.end_force(beam, 0)

@@ -110,7 +110,8 @@ def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> N
         wanted = np.split(difference(outputs, x, which), sizes[:-1])
         for (name, (slopes, _)), want in zip(asked.items(), wanted, strict=True):
             off = np.abs(slopes[..., which].ravel() - want).max()
-            assert off <= 1e-6 * np.abs(want).max(), (name, which, off, np.abs(want).max())
+            limit = 1e-5 if name == "extremes" else 1e-6  # their places are found on grids
+            assert off <= limit * np.abs(want).max(), (name, which, off, np.abs(want).max())
 
 
 def corner_of_the_polyline() -> float:

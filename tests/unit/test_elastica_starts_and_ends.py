@@ -105,8 +105,9 @@ def test_a_point_beside_a_bifurcation_does_not_lead_to_the_path_that_crosses(off
 
 def test_a_path_keeps_no_more_memory_than_its_points_take() -> None:
     network, rise = half_arch(4.0)
-    points = trace(network, Displacement("middle", -UP, [0.1 * rise])).points
-    assert all(part.base is None or part.base.nbytes == part.nbytes for part in points.parts)
+    path = trace(network, Displacement("middle", -UP, [0.1 * rise]))
+    parts = path.at.z, path.at.drive, path.unstable, path.requested
+    assert all(part.base is None or part.base.nbytes == part.nbytes for part in parts)
 
 
 LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12

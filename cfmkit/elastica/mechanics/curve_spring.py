@@ -1,7 +1,7 @@
 """A nonlinear spring as an energy term: one function of the unknowns, and a line in `TERMS`.
 
 The force is a curve through given points, between them monotone cubics, beyond them straight on. Networks with it run
-on numpy; the shooting engine does not have it.
+on numpy.
 
 References
 ----------

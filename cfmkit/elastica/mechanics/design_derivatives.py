@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -33,11 +33,13 @@ from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
+
+
+MAX_TOGETHER = 300_000  # numbers of a table of all designs at some points: 5 MB
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def partials(network: Discretisation, z: Any, drive: Any) -> dict[str, Any]:
 def _by_attachments(network: Discretisation, z: Any, first: Any, last: Any) -> dict[str, Any]:
     """Return the derivatives by origin, arm and frame, from the forces on both ends of every element."""
     a, ends = network.attachments, network.elements.ends
-    force = np.zeros((*z.shape[:-1], *a.arm.shape), z.dtype)
+    force = np.zeros((*z.shape[:-1], *a.arm.shape), np.result_type(z, first, last))
     by_place = np.moveaxis(force, -2, 0)  # a view
     np.add.at(by_place, ends[:, 0], np.moveaxis(-first, -2, 0))
     np.add.at(by_place, ends[:, 1], np.moveaxis(last, -2, 0))
@@ -214,13 +216,55 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
         If a tangent is singular.
     """
     network, chosen = at.network, at.network.free
-    each: Sequence[Discretisation] = [design_of(designs, d) for d in range(designs.count)]
+    own, forces = equations(network), _force_slopes(at, designs)
     found = np.zeros((len(at.z), designs.count, network.size))
     if designs.base is not None:
         found += np.imag(designs.base) / COMPLEX_STEP
-    for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
-        forces = [energy.gradient(one, z + 1j * COMPLEX_STEP * found[k, d], drive).imag for d, one in enumerate(each)]
-        right = np.array(forces)[:, chosen] / COMPLEX_STEP
-        tangent = energy.hessian(network, z, drive)[np.ix_(chosen, chosen)]
-        found[k][:, chosen] = np.linalg.solve(tangent, -right.T).T
+    for k, (z, drive) in enumerate(zip(at.z, at.drive.tolist(), strict=True)):
+        found[k][:, chosen] = own.resolve(z[chosen], drive, -forces[k][:, chosen])[0]
+    if not np.isfinite(found).all():
+        raise np.linalg.LinAlgError("the tangent is singular")
     return found
+
+
+def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
+    """Return the derivatives of the gradient by variables where free unknowns stay, (p, k, size).
+
+    Held ones move with their support, to which every spring and load at them answers.
+    """
+    network, moved = at.network, at.z
+    if designs.base is not None:
+        moved = at.z + 1j * np.imag(designs.base)[:, None]
+    stepped = all_designs(designs)
+    found = np.zeros((len(at.z), designs.count, network.size))
+    together = max(1, MAX_TOGETHER // (designs.count * network.elements.angle.size))
+    for first in range(0, len(at.z), together):
+        some = slice(first, first + together)
+        own, _ = energy.element_gradients(stepped, moved[..., some, :], at.drive[some], 1.0)
+        change = np.moveaxis(np.broadcast_to(own.imag, (designs.count, *own.shape[-3:])), 0, 1) / COMPLEX_STEP
+        here: Any = (slice(None), slice(None), network.elements.unknowns)
+        np.add.at(found[some], here, change)
+    for d, terms in enumerate(_moved_terms(at, designs)):
+        for one, attached in terms:
+            for k, drive in enumerate(at.drive.tolist()):
+                z = moved[d, k] if designs.base is not None else at.z[k]
+                part = TERMS[type(attached.item)](one, attached, z, 1.0, drive)
+                np.add.at(found[k, d], part.unknowns, np.imag(part.gradient) / COMPLEX_STEP)
+    return found
+
+
+def all_designs(designs: NetworkDesigns) -> Discretisation:
+    """Return the arrays of all designs as one network: tables (d, 1, e, q) and places (d, 1, k, 2) that have a step."""
+    network = designs.template
+    tables = {name: table[:, None] for name, table in designs.tables.items() if np.imag(table).any()}
+    places = {name: place[:, None] for name, place in designs.places.items() if np.imag(place).any()}
+    elements, attachments = network.elements._replace(**tables), network.attachments._replace(**places)
+    return replace(network, elements=elements, attachments=attachments)
+
+
+def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:
+    """Return the springs and loads of each design that have a complex step, or all where held unknowns have one."""
+    if designs.base is None or not (at.network.springs or at.network.loads):
+        return _changed_terms(designs)
+    each = (design_of(designs, d) for d in range(designs.count))
+    return [[(one, attached) for attached in (*one.springs, *one.loads)] for one in each]

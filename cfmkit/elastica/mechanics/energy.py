@@ -62,7 +62,8 @@ def rotation_columns(degree: int) -> Any:
 
 def line_load(network: Discretisation, drive: Any, share: Any = 1.0) -> Any:
     """Return the line load on the elements, (..., e, 2), at one drive or several (n,)."""
-    return share * network.elements.line[:, 0] + np.asarray(drive)[..., None, None] * network.elements.line[:, 1]
+    line = network.elements.line
+    return share * line[..., 0, :] + np.asarray(drive)[..., None, None] * line[..., 1, :]
 
 
 def gradient(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
@@ -86,19 +87,25 @@ def _end_poses(network: Discretisation, z: Any) -> tuple[AttachmentPoses, Attach
 
 
 def element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
-    """Return the gradients of the elements by their unknowns, (e, degree + 9), and their type."""
+    """Return the gradients of the elements by their unknowns, (..., e, degree + 9), and their type.
+
+    Of one state (size,), of several (n, size), or with tables of several designs (d, 1, e, q), (d, n, e, degree + 9).
+    """
     e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
     start, end = _end_poses(network, z)
-    last = z[e.unknowns[:, -2:]]
-    first = last + line_load(network, drive, share) * e.length[:, None]
+    last = z[..., e.unknowns[:, -2:]]
+    first = last + line_load(network, drive, share) * e.length[..., None]
     bend = e.weight * bending(e, at.curvature).moment
     turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
-    own = np.zeros(e.unknowns.shape, np.result_type(bend, turning, start.place, first))
-    own[:, rotation_columns(network.degree)] = bend @ rule.slopes - turning @ rule.values
-    own[:, 0:3] = -(first[:, None, :] @ start.jacobian)[:, 0]
-    own[:, 4:7] = (last[:, None, :] @ end.jacobian)[:, 0]
-    reach = np.stack([(e.weight * at.slope_x).sum(axis=1), (e.weight * at.slope_y).sum(axis=1)], axis=1)
-    own[:, -2:] = end.place - start.place - reach - (1.0 - share) * e.gap
+    turned = bend @ rule.slopes - turning @ rule.values
+    reach = np.stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)], axis=-1)
+    missed = end.place - start.place - reach - (1.0 - share) * e.gap
+    outer = np.broadcast_shapes(turned.shape[:-1], missed.shape[:-1], first.shape[:-1])
+    own = np.zeros((*outer, e.unknowns.shape[1]), np.result_type(bend, turning, start.place, first))
+    own[..., rotation_columns(network.degree)] = turned
+    own[..., 0:3] = -(first[..., None, :] @ start.jacobian)[..., 0, :]
+    own[..., 4:7] = (last[..., None, :] @ end.jacobian)[..., 0, :]
+    own[..., -2:] = missed
     return own, own.dtype
 
 

@@ -9,6 +9,7 @@
 
 #define LARGEST_CORRECTION 50.0 /* of a motion: beyond that Newton's method has left the path */
 #define SAME_EQUILIBRIUM 1e-7   /* motions that differ by less are one */
+#define STANDING 1e-10          /* motions that change by less stand: then forces may still change by 1e-3 */
 #define MAX_ROUNDS 14
 #define LAND_FROM 1.3           /* steps to a target from which on it is hit by one */
 #define SHORTEST_STEP 1e-13     /* share of the range */
@@ -245,7 +246,8 @@ static int newton(const Model *m, Work *w, double *x, double *way, const Goal *g
             return CONVERGED;
         }
         /* a large force multiplies rounding: accept where motions stand and forces no longer come nearer */
-        const int stands = moved < SAME_EQUILIBRIUM && step < 2e-5 && step > 0.3 * last;
+        const int rounds = (moved < SAME_EQUILIBRIUM && step < 2e-5) || (moved < STANDING && step < 1e-3);
+        const int stands = rounds && step > 0.3 * last;
         if (step < goal->tolerance * (1.0 + largest) || stands) {
             at = stage(m, *way);
             place(m, w, x, at);

@@ -20,13 +20,16 @@ class AttachmentPoses(NamedTuple):
 
 
 def poses(attachments: Attachments, z: Any, which: Any) -> AttachmentPoses:
-    """Return the poses of attachments at the values of all unknowns, (size,) or of several states (n, size)."""
+    """Return the poses of attachments at the values of all unknowns, (size,) or of several states (n, size).
+
+    Attachments of several designs have axes before their own, (d, 1, k, 2).
+    """
     unknowns = attachments.unknowns[which]
-    cos, sin = attachments.frame[which].T
+    cos, sin = np.moveaxis(attachments.frame[..., which, :], -1, 0)
     x, y, turn = z[..., unknowns[:, 0]], z[..., unknowns[:, 1]], z[..., unknowns[:, 2]]
-    ax, ay = attachments.arm[which].T
+    ax, ay = np.moveaxis(attachments.arm[..., which, :], -1, 0)
     arm = np.stack([np.cos(turn) * ax - np.sin(turn) * ay, np.sin(turn) * ax + np.cos(turn) * ay], axis=-1)
-    place = attachments.origin[which] + np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1) + arm
+    place = attachments.origin[..., which, :] + np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1) + arm
     jacobian = np.empty((*place.shape, 3), np.result_type(arm, cos))
     jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 0, 2] = cos, -sin, -arm[..., 1]
     jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = sin, cos, arm[..., 0]

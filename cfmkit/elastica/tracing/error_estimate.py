@@ -25,12 +25,13 @@ DEGREES_MORE = 4
 MAX_POINTS = 6  # at which the degree is raised
 BESIDE_EVENT = 5e-3  # share of the range around an event within which everything is a root
 SAFETY = 1.5
-ROUNDING = 1e-13  # of a force, and of an error; dimensionless
+ROUNDING = 1e-13
+ROUNDED_PLACES = 4.0  # roundings of a place by which a nearly rigid network's effort is uncertain
 CRITICAL = 1e-6  # stiffness of a mode, EI / L, below which rounding decides whether it is stable
 NEXT_CORRECTION = 1e-10  # square of a correction on the finer mesh from which on it is the last
 SAME_POINT = 1e-3  # motion by which a point may be improved
 MAX_CHANGE = 0.3  # of a motion: beyond it is another equilibrium
-NO_FORCE, NO_EFFORT = 1e-12, 1e-6  # largest force, and effort as a share of it, that are none; dimensionless
+NO_FORCE = 1e-6  # largest force, EI/L^2, over the largest motion, that is none; effort, over both
 SMALL_MOTION = 1e-3  # largest motion up to which errors of motions are relative to this
 
 
@@ -58,13 +59,22 @@ def point_errors(path: Path, finer: Discretisation, indices: Sequence[int]) -> F
     efforts: Any = np.abs(fine.effort - path.effort[chosen])
     forces: Any = np.abs(fine.residual[:, :n_bodies] - path.residual[chosen, :n_bodies]).max(axis=1)
     moves: Any = np.abs(states[:, :n_bodies] - own.z[chosen, :n_bodies]).max(axis=1)
-    load = max(largest_force(fine.at), NO_FORCE)
-    size = max(float(np.abs(path.effort).max()), NO_EFFORT * load * scales.moment / scales.drive)
-    reach = max(float(np.abs(own.z[:, :n_bodies]).max()), SMALL_MOTION)
-    unloaded = (forces <= ROUNDING) & (efforts <= ROUNDING * scales.moment / scales.drive)
-    changes = np.where(unloaded, 0.0, np.maximum(efforts / size, forces / load))
-    relative = np.maximum(changes, moves / reach)
+    reach = float(np.abs(own.z[:, :n_bodies]).max())
+    load = max(largest_force(fine.at), NO_FORCE * reach, ROUNDING)
+    size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * scales.moment / scales.drive)
+    reach = max(reach, SMALL_MOTION)
+    bearing = np.maximum(efforts / size, forces / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
+    relative = np.maximum(bearing, moves / reach)
     return np.where(known, SAFETY * relative + ROUNDING, np.inf)
+
+
+def _rises(path: Path) -> FloatArray:
+    """Return by how much the effort changes at every point while the drive does by one rounding of a length of one."""
+    if len(path) < 2:
+        return np.zeros(len(path))
+    change = np.diff(path.at.drive)
+    slope = np.abs(np.diff(path.effort)) / np.where(change == 0, np.inf, np.abs(change))
+    return np.asarray(np.maximum(np.append(slope, 0.0), np.append(0.0, slope)) * np.finfo(float).eps)
 
 
 def polish(path: Path) -> Path:
@@ -82,8 +92,8 @@ def polish(path: Path) -> Path:
     return replace(path, at=replace(path.at, z=z))
 
 
-def pick_points(path: Path) -> list[int]:
-    """Return the indices of the points at which the error of a path is estimated, none beside an event."""
+def pick_points(path: Path, places: Sequence[float]) -> list[int]:
+    """Return the indices of the points at which the error of a path is estimated, none at events at these drives."""
     if not len(path):
         return []
     at = path.at_requested if len(path.at_requested) else np.arange(len(path))
@@ -95,8 +105,7 @@ def pick_points(path: Path) -> list[int]:
         left = np.abs(highest).max(axis=1)  # what the last polynomials say: the next may be as large
         bounds = [len(at) * k // (MAX_POINTS - 2) for k in range(MAX_POINTS - 1)]
         chosen.update(int(at[a + left[a:b].argmax()]) for a, b in itertools.pairwise(bounds))
-    if not path.events:
+    if not places:
         return sorted(chosen)
     width = BESIDE_EVENT * float(np.ptp(np.append(path.drive, 0.0)))
-    places = [event.drive for event in path.events]
     return sorted(k for k in chosen if all(abs(path.drive[k] - place) >= width for place in places))

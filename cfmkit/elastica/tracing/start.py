@@ -66,11 +66,12 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
             return DriveStart(problem, None, tuple(events), branch, first, (what, PathStop(WhyStopped.LOST, 0.0)))
         for item in follow(ramp, begin, np.ones(1), options, branch):
             if isinstance(item, PathEvent):
-                events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
+                if control.branch != "primary" and item.before != item.after:  # nothing is lost on a path straight on
+                    events.append(Event(f"{item.kind} under {what}", item.drive, item.before, item.after))
                 if first is None and item.modes is not None:
                     first = Buckling(ramp, item, what)
-            elif isinstance(item, Point):
-                at, branch = item.at, item.branch
+            elif isinstance(item, Point):  # there are some behind the whole of it, on a branch that begins just before
+                at, branch = (item.at, item.branch) if item.at.drive <= 1.0 else (at, branch)
             elif item.end is not WhyStopped.COMPLETE:
                 return DriveStart(problem, None, tuple(events), branch, first, (what, item))
         if branch is not None and not branch.label:

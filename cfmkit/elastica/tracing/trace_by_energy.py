@@ -50,6 +50,7 @@ MORE_TENSION = 1.5  # times what is known, from which on layers are cut anew
 MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: it locks
 WHOLE = 0.15  # share of a beam from which on a taut element is cut again
 EVENT_TOLERANCE = 1e-7  # of bifurcations on a primary path, share of the range
+SAME_PLACE = 1e-9  # share of the range within which a point lies at a bifurcation
 SAME_END = 1e-3  # share of the range within which two paths end alike
 RIGID = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
 
@@ -141,10 +142,10 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             best, attempt = attempt, None
             continue
         finer = _finer(path)
-        path = _with_error(path, finer)
-        if tolerance < path.error < NEARLY * tolerance:
-            path = _with_error(polish(path), finer)
-        attempt = attempt._replace(path=path)
+        attempt = _with_error(attempt, finer)
+        if tolerance < attempt.path.error < NEARLY * tolerance:
+            attempt = _with_error(attempt._replace(path=polish(path)), finer)
+        path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
         reached = path.error <= tolerance and path.status in (PathStatus.COMPLETE, PathStatus.FULL)
@@ -217,8 +218,8 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
         for branch in attempt.branches
     )
     unit = path.network.scales.drive
-    events = tuple(replace(event, drive=drive * unit) for event, drive in zip(path.events, drives, strict=True))
-    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=events)
+    told = tuple(_tell(replace(event, drive=drive), unit) for event, drive in zip(attempt.events, drives, strict=True))
+    raised = replace(path, at=Equilibria(fine, z, path.at.drive), branch=_name_branches(branches, unit), events=told)
     lifted = tuple(_lift(event, drive, path.network, fine) for event, drive in zip(attempt.events, drives, strict=True))
     started = start._replace(problem=problem)
     return attempt._replace(path=raised, mesh=mesh, start=started, branches=branches, events=lifted)
@@ -259,11 +260,12 @@ def _finer(path: Path) -> Discretisation:
     return raise_degree(path.network, path.network.degree + DEGREES_MORE)
 
 
-def _with_error(path: Path, finer: Discretisation) -> Path:
-    errors = point_errors(path, finer, pick_points(path))
+def _with_error(attempt: TraceAttempt, finer: Discretisation) -> TraceAttempt:
+    path, unit = attempt.path, attempt.path.network.scales.drive
+    errors = point_errors(path, finer, pick_points(path, [event.drive * unit for event in attempt.events]))
     told = replace(path, error=float(errors.max(initial=0.0)))
     vars(told)["effort"] = path.effort  # is known
-    return told
+    return attempt._replace(path=told)
 
 
 def _end_alike(path: Path, before: Path) -> bool:
@@ -310,7 +312,8 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    told = (*start.events, *(Event(event.kind, event.drive * unit, event.before, event.after) for event in events))
+    points = [_at_event(point, events, drive, unit) for point in points]
+    told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _without_locked_points(_path(network, drive, start, points, told, status, message))
     branches = tuple(point.branch for point in points[: len(path)])
     return TraceAttempt(path, mesh, start, first, tuple(events), branches)
@@ -342,6 +345,22 @@ def _path(
         status=status, message=message, events=events, error=float("inf"),
         accurate=read_only(np.ones(len(points)), np.bool_),
     )  # fmt: skip
+
+
+def _tell(event: PathEvent, unit: float) -> Event:
+    return Event(event.kind, event.drive * unit, event.before, event.after)
+
+
+def _at_event(point: Point, events: list[PathEvent], drive: Drive, unit: float) -> Point:
+    """Return a point, which if it lies at a bifurcation is as stable as the path is on the better side of it.
+
+    There the number of unstable directions is rounding.
+    """
+    near = SAME_PLACE * _range(drive) / unit
+    for event in events:
+        if event.kind == "bifurcation" and abs(point.at.drive - event.drive) <= near:
+            return point._replace(at=point.at._replace(unstable=min(event.before, event.after)))
+    return point
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
@@ -398,7 +417,11 @@ def _are_settled(attempt: TraceAttempt, finer: Discretisation, control: Control,
 
 
 def _span(path: Path) -> float:
-    points = path.given.points
+    return _range(path.given)
+
+
+def _range(drive: Drive) -> float:
+    points = drive.points
     return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)
 
 

@@ -50,6 +50,6 @@ FAMILY = Family(
     references=(
         "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "
         "operations, IEEE Int. Conf. Robotics and Automation (2010) 2131-2136",
-        "C.-C. Lan, K.-M. Lee, ASME J. Mech. Des. 128 (2006) 765: the generalised multiple shooting method",
+        "C.-C. Lan, K.-M. Lee, ASME J. Mech. Des. 128 (2006) 765: networks of curved beams",
     ),
 )

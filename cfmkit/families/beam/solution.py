@@ -74,7 +74,7 @@ class Solution(ShortRepr):
             return read_only(moved[:, 2])
         angle = self.assembly.direction
         along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
-        return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(), along, 0.0))
+        return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(initial=0.0), along, 0.0))
 
     @property
     def motion_dimension(self) -> str:

@@ -13,7 +13,7 @@ from cfmkit.numerics.continuation.branches import find_beside
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_fold
 from cfmkit.numerics.continuation.folds import pass_fold
-from cfmkit.numerics.continuation.path import PathStop, Point, Walk, WhyStopped
+from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import PathEquilibrium, largest_motion
 
 if TYPE_CHECKING:
@@ -113,9 +113,12 @@ def _end_at_fold(
         yield Point(beside, number, walk.branch)
         walk = replace(walk, number=number + 1)
         if turns:
+            yield _nothing_lost(fold, begin)
             return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if walk.turns_at(fold.drive):
-        yield Point(fold.near._replace(drive=float(walk.targets[walk.number])), walk.number, walk.branch)
+        goal = float(walk.targets[walk.number])
+        yield Point(fold.near._replace(drive=goal, unstable=begin.unstable), walk.number, walk.branch)
+        yield _nothing_lost(fold, begin)
         walk = replace(walk, number=walk.number + 1)
         return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if joined is None:
@@ -134,6 +137,11 @@ def _end_at_fold(
     yield Point(beyond, -1, walk.branch)
     span = walk.options.span
     return walk.restart(beyond, min(0.02 * span, max(abs(beyond.drive - fold.drive), 1e-3 * span)))
+
+
+def _nothing_lost(fold: Located, begin: PathEquilibrium) -> PathEvent:
+    """Return the event at a bifurcation where the drive turns back: stability is neither lost nor gained."""
+    return PathEvent("bifurcation", fold.drive, begin.unstable, begin.unstable, fold.near)
 
 
 def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:

@@ -218,7 +218,11 @@ def locate_fold(problem: ContinuationProblem, move: ArcMove, span: float) -> tup
     if fold is None:
         return None
     just_before = solve(fold.share - JUST_BEFORE)
-    if just_before is not None and just_before.unstable == move.old.unstable and value(just_before) * value(move.old) > 0:
+    if (
+        just_before is not None
+        and just_before.unstable == move.old.unstable
+        and value(just_before) * value(move.old) > 0
+    ):
         fold = fold._replace(before=just_before)
     past = solve(fold.share + 0.3 * (1 - fold.share))
     return fold, move.new.unstable if past is None or past.unstable == move.old.unstable else past.unstable

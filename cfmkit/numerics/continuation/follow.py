@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.continuation.branch_ends import find_passed_end
+from cfmkit.numerics.continuation.branch_ends import find_passed_end, primary_slope
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
@@ -85,15 +85,18 @@ def _items(
     branch: PathBranch | None,
 ) -> Iterator[Point | PathEvent | PathStop]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
-    yield Point(start, at_first - 1, branch)
     walk = Walk(
         problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,), branch=branch
     )
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
-    if beyond is not None:
-        walk = beyond
+    if beyond is not None:  # how many directions are unstable there is rounding
+        yield Point(start._replace(unstable=beyond.here.unstable), at_first - 1, branch)
+    else:
+        yield Point(start, at_first - 1, branch)
+    walk = beyond or walk
+    if walk.here.drive != start.drive:
         yield Point(walk.here, -1, walk.branch)
-    elif start.unstable and options.branch != "primary" and not walk.done:
+    elif walk.here.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
             yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
@@ -196,12 +199,16 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
         within = found.within if found else None
         yield PathEvent("bifurcation", drive, here.unstable, new.unstable, near, modes, within)
+        if abs(new.drive - drive) <= AT_EVENT * walk.options.span:  # the slope there is that of a mode
+            _, critical = walk.problem.modes(new, abs(lost))
+            new = new._replace(rate=primary_slope(walk.problem, new, critical))
     elif walk.branch is not None:
         end = find_passed_end(walk, new)
         if end == "unsure":
             return replace(walk.shorten(0.5 * step), before=None)
         if end is not None and lands and walk.turns_at(end.drive):
             yield Point(new, walk.number, walk.branch)
+            yield PathEvent("bifurcation", end.drive, new.unstable, new.unstable, end.near)
             return replace(walk, number=walk.number + 1, before=None)
         if end is not None:
             yield end

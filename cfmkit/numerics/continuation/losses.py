@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import step_along
+from cfmkit.numerics.continuation.branch_ends import primary_slope
 from cfmkit.numerics.continuation.branches import (
     AMPLITUDES,
     LAST_AMPLITUDES,
@@ -33,6 +34,8 @@ Items = Generator[Point | PathEvent, None, Walk | PathStop | None]
 FARTHER_BACK = 1e-3  # share of the piece's length by which the slope before a bifurcation is taken from before it
 NEAR_CLUSTERS, WIDE_CLUSTERS = (0.1,), (1.0, 10.0)
 """Times `Options.cluster`: ranges within which bifurcations are passed together: at once, or if nothing else helps."""
+RIGID_CLUSTERS, NEARLY_RIGID = (0.5, 2.0, 8.0, 32.0), 1e-6
+"""Ways to the first within which nearly rigid structures pass several together; that way, as a share of the range."""
 NEAR_SHARE = 1e-3  # of the way to the first of them: the other modes of a slender column are not together with it
 ON_PATH = 1e-3  # motion by which an equilibrium may be off the path's secant just before a bifurcation
 LOOK_PAST_FROM = 2e-3  # share of the range behind here where a slope is taken
@@ -41,6 +44,7 @@ LOOK_PAST_BY = 2e-3, 2e-2
 LOOK_PAST_MISS = 0.02  # motion
 CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
 FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
+FORWARD = 1e-13  # share of the range: less is rounding
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
 
@@ -64,14 +68,20 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         modes = problem.modes(found.near, max(1, new.unstable - here.unstable))[1]
         yield PathEvent("bifurcation", found.drive, here.unstable, new.unstable, found.near, modes, found.within)
         walk = yield from _reach_bifurcation(walk, found, far, slope)
+        for number in walk.targets_up_to(new.drive):  # just behind it their count is rounding
+            goal = float(walk.targets[number])
+            guess = found.x + (goal - found.drive) / (new.drive - found.drive) * (new.x - found.x)
+            at = correct(problem, guess, goal) or PathEquilibrium(guess, goal, new.rate, new.unstable)
+            yield Point(at._replace(unstable=new.unstable), number, walk.branch)
+            walk = replace(walk, number=number + 1)
         return walk.restart(new, 0.5 * abs(new.drive - found.drive), same_piece=True)
     if options.branch == "stop":
         yield from _reach_bifurcation(walk, found, far, slope)
         yield Point(new, -1, walk.branch)
         return PathStop(WhyStopped.JUMPS, found.drive, "stability is lost at {place}: the path ends there")
     onto, mode = None, problem.orient(modes)
-    for clusters, amplitudes in ((NEAR_CLUSTERS, AMPLITUDES + LAST_AMPLITUDES), (WIDE_CLUSTERS, ())):
-        several = _pass_together(walk, new, found, slope, clusters)
+    for widths, amplitudes in _cluster_widths(walk, found):
+        several = _pass_together(walk, new, found, slope, widths)
         if several is not None:
             onto, modes, after = several
         onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
@@ -93,16 +103,26 @@ def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium |
     return next((e for e in reversed(walk.trail) if abs(e.drive - drive) > distance), None)
 
 
+def _cluster_widths(walk: Walk, found: Located) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Yield ranges of the drive within which bifurcations are passed together, with amplitudes along the first mode.
+
+    Nearly rigid structures reach many critical loads at once, measured by the drive's range, and not at all so measured
+    by the way to the first.
+    """
+    width, way = walk.options.cluster * walk.options.span, abs(found.drive - walk.trail[0].drive)
+    yield tuple(min(factor * width, NEAR_SHARE * way) for factor in NEAR_CLUSTERS), AMPLITUDES + LAST_AMPLITUDES
+    if way < NEARLY_RIGID * walk.options.span:
+        yield tuple(factor * way for factor in RIGID_CLUSTERS), ()
+    yield tuple(factor * width for factor in WIDE_CLUSTERS), ()
+
+
 def _pass_together(
-    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, clusters: tuple[float, ...]
+    walk: Walk, new: PathEquilibrium, found: Located, slope: FloatArray, widths: tuple[float, ...]
 ) -> tuple[PathEquilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
     problem, here = walk.problem, walk.here
-    for factor in clusters:
-        width = factor * walk.options.cluster
-        ahead = walk.sense * width * walk.options.span
-        if clusters is NEAR_CLUSTERS:
-            ahead *= min(1.0, NEAR_SHARE * abs(found.drive - walk.trail[0].drive) / abs(ahead))
+    for width in widths:
+        ahead = walk.sense * width
         saddle = correct(problem, found.x + ahead * slope, found.drive + ahead)
         if saddle is None or saddle.unstable < max(here.unstable + 2, new.unstable):
             continue
@@ -168,7 +188,9 @@ def look_past(walk: Walk, goal: float) -> Items:
 def start_critical(walk: Walk) -> Walk | None:
     """Return the walk a little behind a start at which a mode is just critical, or None if none is.
 
-    Whatever the drive does there grows with its cube root: the mode leads, to the side on which the drive goes forward.
+    What the drive does there may grow with its cube root: the mode leads, to the side on which the drive goes forward.
+    If it does so to none, the drive relieves the structure: the path goes on along the slope without the mode. How many
+    directions are unstable at the start is rounding.
     """
     problem, start = walk.problem, walk.here
     is_stiff = getattr(problem, "is_stiff", None)
@@ -182,11 +204,13 @@ def start_critical(walk: Walk) -> Walk | None:
     for halvings in range(MAX_HALVINGS):
         for sign in (walk.options.sign, -walk.options.sign):
             step = step_along(problem, start, sign * tangent, FIRST_AMPLITUDE * 0.5**halvings, walk.options.span)
-            if step is None or step.new.unstable or (step.new.drive - start.drive) * walk.sense <= 0:
+            forward = 0.0 if step is None else (step.new.drive - start.drive) * walk.sense
+            if step is None or step.new.unstable or forward <= FORWARD * walk.options.span:
                 continue
             if not walk.targets_up_to(step.new.drive):
                 return walk.restart(step.new, abs(step.new.drive - start.drive))
-    return None
+    relieved = start._replace(rate=primary_slope(problem, start, modes), unstable=start.unstable - int(values[0] < 0))
+    return replace(walk, here=relieved, trail=(relieved,))
 
 
 def start_unstable(walk: Walk) -> Walk | None:

@@ -50,7 +50,10 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PathEvent:
-    """A bifurcation or limit point; unstable directions before and after it on the path that it lies on."""
+    """A bifurcation or limit point; unstable directions before and after it on the path that it lies on.
+
+    They are the same where the drive turns back just at it.
+    """
 
     kind: Literal["bifurcation", "limit point"]
     drive: float

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
-    from cfmkit.elastica.mechanics.design_derivatives import Equilibria
     from cfmkit.elastica.sensitivity import Gradient
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
@@ -239,13 +238,9 @@ class Response:
         known = self._slopes.get(beam)
         if known is None:
             fractions = self._fractions(beam)
-
-            def output(net: Network, at: Equilibria) -> FloatArray:
-                states = beam_states.states(net, at, beam, fractions)
-                sections = beam_states.sections(net, beam, states)
-                return np.stack([states.x, states.y, sections.bending_stress, sections.axial_stress])
-
-            known = self._slopes[beam] = tuple(self._gradient.of(output))
+            states, sections = self._gradient.states(beam, fractions), self._gradient.sections(beam, fractions)
+            known = states.x, states.y, sections.bending_stress, sections.axial_stress
+            self._slopes[beam] = known
         return known
 
     @cached_property
