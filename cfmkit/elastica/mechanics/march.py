@@ -125,9 +125,7 @@ class CompiledEquations(NumpyEquations):
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
-        self.code.evaluate(
-            self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share
-        )
+        self.code.evaluate(self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share)
         return gradient, hessian
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
