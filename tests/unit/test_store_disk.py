@@ -157,7 +157,7 @@ def test_the_stamp_of_a_package_is_that_of_its_source_files(tmp_path):
     (tmp_path / "part" / "a.py").write_text("x = 1\n")
     before = tree_hash(tmp_path)
     (tmp_path / "part" / "__pycache__").mkdir()
-    for left in ("part/__pycache__/a.cpython-311.pyc", "part/kernel.nbi", ".hidden"):
+    for left in ("part/__pycache__/a.cpython-311.pyc", "part/kernel.so", ".hidden"):
         (tmp_path / left).write_text("left behind")
     assert tree_hash(tmp_path) == before
     (tmp_path / "part" / "a.py").write_text("x = 2\n")
