@@ -190,6 +190,28 @@ def test_marches_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
         assert mine.effort == pytest.approx(its.effort, rel=1e-8, abs=1e-6)
 
 
+@needs_c
+@pytest.mark.parametrize(("seed", "number"), [(1, 0), (4, 1)])
+def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int, number: int) -> None:
+    net = beam_networks.network(seed, follower=False)
+    network = discretise(net, beam_networks.drives(net, seed)[number], 6)
+    c, reference = equations(network), NumpyEquations(network)
+    start = begin(c)
+    ways = start.way + np.array([1e-3, 3e-3, 50.0]) * np.sign(beam_networks.drives(net, seed)[number].points[-1])
+    found = [own.solve_each(np.tile(start.free, (3, 1)), ways) for own in (c, reference)]
+    assert (found[0].converged == found[1].converged).all()
+    good = found[1].converged
+    assert good[:2].all()
+    for name in ("free", "rate", "effort"):
+        mine, its = (getattr(each, name)[good] for each in found)
+        np.testing.assert_allclose(mine, its, rtol=0, atol=1e-7 * np.abs(its).max())
+    assert (found[0].unstable == found[1].unstable)[good].all()
+    vector = np.cos(np.arange(c.n) ** 1.5)
+    flexibilities, modes = zip(*(own.soften(start.free, start.way, vector, 4) for own in (c, reference)), strict=True)
+    assert flexibilities[0] == pytest.approx(flexibilities[1], rel=1e-8)
+    assert modes[0] == pytest.approx(modes[1], abs=1e-7 * np.abs(modes[1]).max())
+
+
 @pytest.mark.parametrize("kind", [equations, NumpyEquations])
 def test_a_border_holds_what_it_names_in_place_of_the_drive(kind: Any) -> None:
     net = Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, 1e-3))})

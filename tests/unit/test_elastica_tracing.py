@@ -21,10 +21,11 @@ from cfmkit.elastica import (
     Node,
     PathStatus,
     PointLoad,
+    Rotation,
     Section,
     guided,
 )
-from cfmkit.elastica.tracing.trace_by_energy import trace
+from cfmkit.elastica.tracing.trace_by_energy import DegreeAndPieces, raise_attempt, trace, trace_on
 from cfmkit.elastica.vibration import frequencies
 
 if TYPE_CHECKING:
@@ -103,3 +104,63 @@ def test_a_step_along_the_arc_does_not_lead_to_the_mirror_image() -> None:
     sides = [trace(net, drive, Control(imperfection=size)).motion("a")[-1, 2] for size in (3.5e-6, 3.5e-5, -3.5e-6)]
     assert sides[0] == pytest.approx(sides[1], rel=1e-2)
     assert sides[0] == pytest.approx(-sides[2], rel=1e-7)
+
+
+def test_leaves_on_a_shuttle_that_may_turn_end_at_a_limit_point() -> None:
+    """Four V-beams that turn as they buckle: by the arc length their branch is a closed loop that never goes further.
+
+    Behind it the straight path is stable, and has less energy: they jump there.
+    """
+    case = CASES["leaves on a shuttle that may turn fare alike with any points 1"]
+    network, drive = (from_json(case[part]) for part in ("network", "drive"))
+    ends = trace(network, drive)
+    assert ends.status is PathStatus.LIMIT_POINT
+    limit = ends.drive[-1]
+    assert limit == pytest.approx(6.29445e-3, rel=1e-6)
+    loop = trace(network, drive, Control(through_folds=True, most_points=150))
+    assert loop.status is PathStatus.FULL
+    assert loop.drive.max() < limit * (1 + 1e-6)
+    folds = [event.drive for event in loop.events if event.kind == "limit point"]
+    assert sum(abs(fold - limit) < 1e-6 * limit for fold in folds) >= 3  # it comes by again
+    straight = trace(network, replace(drive, points=np.array([limit])), Control(branch="primary"))
+    assert straight.stable[-1]
+    assert straight.energy[-1] < ends.energy[-1] - 1e-7
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-7])
+def test_an_arch_of_two_straight_beams_that_do_not_stretch_buckles_to_the_same_side(tolerance: float) -> None:
+    """It is rigid at rest, so that it reaches many critical loads at once; both beams buckle in their first modes."""
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.05, 0.0173, guided(np.pi / 2)), "b": Node(0.1, 0, PINNED)}
+    net = Network(nodes, {"x": Beam("a", "t", STIFF), "y": Beam("t", "b", STIFF)})
+    path = trace(net, Displacement("t", -np.pi / 2, np.linspace(1e-3, 8e-3, 4)), Control(tolerance))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    length = float(np.hypot(0.05, 0.0173))
+    bending = 2e9 * 1e-2 * 1e-9 / 12 / length**2
+    forces = (4 + 2.0457) * np.pi**2 * bending * 0.0173 / length  # Euler's, clamped, and clamped and pinned
+    assert path.effort[path.at_requested][0] == pytest.approx(forces, rel=0.1)
+
+
+def test_a_path_that_is_raised_is_that_of_its_degree() -> None:
+    """Its points and events are corrected on the finer mesh, not followed anew."""
+    case = CASES["config: vcfm_pla 2"]
+    network, drive = (from_json(case[part]) for part in ("network", "drive"))
+    coarse = trace_on(network, drive, Control(1e-8), DegreeAndPieces(10))
+    coarse = coarse._replace(path=replace(coarse.path, error=1e-5))
+    raised = raise_attempt(coarse, DegreeAndPieces(14), Control(1e-8))
+    assert raised is not None
+    anew = trace_on(network, drive, Control(1e-8), DegreeAndPieces(14)).path
+    both = [path.effort[path.at_requested] for path in (raised.path, anew)]
+    np.testing.assert_allclose(both[0], both[1], rtol=0, atol=1e-9 * np.abs(both[1]).max())
+    assert [event.drive for event in raised.path.events] == pytest.approx(
+        [event.drive for event in anew.events], rel=1e-8
+    )
+    assert raised.path.branch[-1] == anew.branch[-1]
+
+
+def test_forces_of_a_mechanism_that_bears_nothing_are_no_error() -> None:
+    nodes = {"hinge": Node(0, 0, PINNED), "end": Node(0.05, 0.0)}
+    net = Network(nodes, {"strip": Beam("end", "hinge", STIFF)})
+    path = trace(net, Rotation("end", np.array([-0.3, -0.9])), Control(1e-9))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert np.abs(path.effort).max() < 1e-9

@@ -101,6 +101,7 @@ class CompiledEquations(NumpyEquations):
 
     arrays: Mapping[str, Any] = field(init=False)  # what the addresses point to
     row: Any = field(init=False)  # counts and addresses
+    code: Any = field(init=False, default_factory=compiled)  # the compiled module
 
     def __post_init__(self) -> None:
         """Collect the arrays."""
@@ -108,7 +109,7 @@ class CompiledEquations(NumpyEquations):
         arrays = model_arrays(self)
         counts = model_counts(self.network, self.ramp)
         row = np.array([*counts.values(), *(0 for _ in ADDRESSES)], np.int64)
-        compiled().place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
+        self.code.place(row, len(COUNTS), tuple(arrays.get(name) for name in ADDRESSES))
         object.__setattr__(self, "arrays", arrays)
         object.__setattr__(self, "row", row)
 
@@ -118,28 +119,26 @@ class CompiledEquations(NumpyEquations):
         object.__setattr__(stiff, "network", network)
         object.__setattr__(stiff, "arrays", {**self.arrays, "axial": axial})
         object.__setattr__(stiff, "row", self.row.copy())
-        compiled().place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
+        self.code.place(stiff.row, len(COUNTS) + ADDRESSES.index("axial"), (axial,))
         return stiff
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
         gradient, hessian = np.empty(len(z)), np.empty((len(z), len(z)))
-        compiled().evaluate(
-            self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share
-        )
+        self.code.evaluate(self.row, np.ascontiguousarray(z, float), np.array([drive], float), gradient, hessian, share)
         return gradient, hessian
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
         found = np.empty(z.shape)
         given = np.ascontiguousarray(z, float), np.ascontiguousarray(drive, float)
-        compiled().evaluate(self.row, *given, found, np.empty(0), 1.0)
+        self.code.evaluate(self.row, *given, found, np.empty(0), 1.0)
         return found
 
     def linearise(self, free: FloatArray, way: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         out = LinearEquations(np.empty(self.n), np.empty((self.n, self.n)), np.empty(self.n))
-        compiled().linearise(self.row, np.ascontiguousarray(free, float), *out, way)
+        self.code.linearise(self.row, np.ascontiguousarray(free, float), *out, way)
         return out
 
     def resolve(self, free: FloatArray, way: float, right: FloatArray) -> tuple[FloatArray, int]:
@@ -151,7 +150,7 @@ class CompiledEquations(NumpyEquations):
             If the tangent is singular.
         """
         found, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
-        if compiled().resolve(self.row, np.ascontiguousarray(free, float), found, count, way):
+        if self.code.resolve(self.row, np.ascontiguousarray(free, float), found, count, way):
             raise np.linalg.LinAlgError("the tangent is singular")
         return found, self._unstable(free, way, int(count[0]))
 
@@ -173,7 +172,7 @@ class CompiledEquations(NumpyEquations):
         x, at, rate, found = np.array(free, float), np.array([way], float), np.empty(self.n), np.empty(2)
         nothing = np.empty(0)
         given = [nothing if array is None else np.ascontiguousarray(array, float) for array in (border, push)]
-        if compiled().solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
+        if self.code.solve(self.row, x, at, *given, rate, found, level, tolerance, quick):
             return None
         way = float(at[0])
         return MarchState(x, way, rate, self._unstable(x, way, int(found[0])), float(found[1]))
@@ -184,7 +183,7 @@ class CompiledEquations(NumpyEquations):
         """Return the equilibria near k guesses."""
         x, ways = np.array(free, float, order="C"), np.array(way, float)
         rate, found = np.empty(x.shape), np.zeros((len(x), 3))
-        if compiled().solve_many(self.row, x, ways, rate, found, tolerance, quick):
+        if self.code.solve_many(self.row, x, ways, rate, found, tolerance, quick):
             raise MemoryError
         converged, unstable = found[:, 0] == 0, found[:, 1].astype(np.int64)
         for k in np.flatnonzero(converged & (unstable < 0)):
@@ -194,7 +193,7 @@ class CompiledEquations(NumpyEquations):
     def soften(self, free: FloatArray, way: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
         shape = np.array(vector, float)
-        return compiled().soften(self.row, np.ascontiguousarray(free, float), shape, way, rounds), shape
+        return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, way, rounds), shape
 
     def march(self, start: MarchState, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
         """Return the states on the way to targets, as far as nothing happens."""
@@ -205,7 +204,7 @@ class CompiledEquations(NumpyEquations):
         before = plan.before
         known = np.empty(0) if before is None else np.concatenate([before.free, before.rate, [before.way]])
         here = np.concatenate([start.free, start.rate, [start.way]])
-        code = compiled().march(self.row, given, here, known, goals, rows, stored)
+        code = self.code.march(self.row, given, here, known, goals, rows, stored)
         rows = rows[: stored[0]].copy()
         way, effort, told, target = rows[:, 2 * n :].T.tolist()
         given_states = zip(rows[:, :n], way, rows[:, n : 2 * n], map(int, told), effort, map(int, target), strict=True)

@@ -17,6 +17,8 @@ from cfmkit.numerics.continuation.path import MarchedSteps
 from cfmkit.numerics.continuation.problem import PathEquilibrium
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.mechanics.equations import NumpyEquations
@@ -77,6 +79,13 @@ class NetworkProblem:
         if state is None or not np.isfinite(state.rate).all():
             return None
         return _equilibrium(state)
+
+    def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
+        """Return the equilibria near guesses at their drives, in compiled code."""
+        found = self.equations.solve_each(np.array(guesses), np.array(drives))
+        good = found.converged & np.isfinite(found.rate).all(axis=1)
+        each = zip(found.free, drives, found.rate, found.unstable.tolist(), found.effort.tolist(), strict=True)
+        return [PathEquilibrium(*values) if well else None for values, well in zip(each, good, strict=True)]
 
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""

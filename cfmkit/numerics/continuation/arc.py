@@ -81,10 +81,11 @@ class ArcMove(NamedTuple):
         """Return the unknowns at a drive between its ends by the cubic in the arc length through them."""
         first, last = _place(self.old), _place(self.new)
         starts, ends = self.length * self.tangent_before, self.length * self.tangent
+        drives = float(first[-1]), float(last[-1]), float(starts[-1]), float(ends[-1])
         low, high, rising = 0.0, 1.0, self.new.drive > self.old.drive
         for _ in range(N_HALVINGS):
             s = 0.5 * (low + high)
-            drive = _cubic(first[-1], last[-1], starts[-1], ends[-1], s)
+            drive = _cubic(*drives, s)
             low, high = (s, high) if (drive < goal) == rising else (low, s)
         return np.asarray(_cubic(first[:-1], last[:-1], starts[:-1], ends[:-1], 0.5 * (low + high)))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.numerics.continuation.arc import ArcMove, follow_arc
-from cfmkit.numerics.continuation.correct import correct
+from cfmkit.numerics.continuation.correct import correct_each
 from cfmkit.numerics.continuation.events import locate_fold, locate_stability_change_on_arc
 from cfmkit.numerics.continuation.path import PathEvent, PathStop, Point, Walk, WhyStopped
 from cfmkit.numerics.continuation.problem import largest_motion
@@ -107,9 +107,11 @@ def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) ->
     room, targets = largest_motion(walk.problem, step.new.x - step.old.x), walk.targets[run.start : run.stop]
     for side, (low, high) in enumerate(itertools.pairwise(turns)):
         inside = np.flatnonzero(((targets - low) * (targets - high) <= 0) & (targets != low))
-        for number in (run.start + inside[np.abs(targets[inside] - low).argsort(kind="stable")]).tolist():
-            guess = _guess(step, fold, side, float(walk.targets[number]))
-            at = correct(walk.problem, guess, float(walk.targets[number]))
+        inside = inside[np.abs(targets[inside] - low).argsort(kind="stable")]
+        goals = targets[inside].tolist()
+        guesses = [_guess(step, fold, side, goal) for goal in goals]
+        found = zip((run.start + inside).tolist(), correct_each(walk.problem, guesses, goals), guesses, strict=True)
+        for number, at, guess in found:
             if at is not None and largest_motion(walk.problem, at.x - guess) <= room:
                 yield Point(at, number, walk.branch)
                 if number == run[-1]:
