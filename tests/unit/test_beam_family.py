@@ -939,14 +939,17 @@ def test_the_usable_stroke_that_a_stress_ends_does_not_depend_on_the_number_of_p
 
 @pytest.mark.parametrize("window", ["14 mm", "22.0701434087 mm"])
 def test_a_peak_at_a_bifurcation_is_there_however_many_points_and_if_one_is_on_it(window):
-    """Cubics went across the kink: with 31 points the peak was 1.3e-2 off, the place of a stress 7.5e-4."""
+    """Cubics went across the kink: with 31 points the peak was 1.3e-2 off, the place of a stress 7.5e-4.
+
+    Before the bifurcation the force is level: to 1e-12 of itself over 0.01 um.
+    """
     found = []
     for count in (31, 90):
         changes = {"analysis.points": count, "analysis.window": [window, "27.2 mm"]}
         result = cfmkit.analyze(cfmkit.load("configs/beam_two_layers.yaml").replace(changes))
         found.append(cfmkit.evaluate(result, ("peak_displacement", "peak_force", "stress_limit_displacement")))
         assert found[-1]["peak_displacement"].value == pytest.approx(
-            result.values["bifurcation_displacement"].value, rel=1e-12
+            result.values["bifurcation_displacement"].value, rel=1e-6
         )
     few, many = found
     assert few["peak_force"].value == pytest.approx(many["peak_force"].value, rel=1e-8)  # the path: 5e-8

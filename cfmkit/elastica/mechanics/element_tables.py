@@ -17,7 +17,7 @@ from cfmkit.elastica.model.section import Taper
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.elastica.mechanics.discretise import MechanicsUnits
+    from cfmkit.elastica.mechanics.units import MechanicsUnits
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.beam_fits import BeamFits
     from cfmkit.elastica.model.plain_beams_at_once import Bundle

@@ -99,9 +99,7 @@ def states_of_designs(designs: NetworkDesigns, stepped: Equilibria, beam: str, f
     """
     given, parts = np.asarray(fractions, float), []
     for element in elements_of(designs.template, beam):
-        each = (
-            _rest(net, design_of(designs, d), beam, element, given) for d, (net, _) in enumerate(designs.networks)
-        )
+        each = (_rest(net, design_of(designs, d), beam, element, given) for d, (net, _) in enumerate(designs.networks))
         place, angle, thickness = (np.array(rows)[:, None] for rows in zip(*each, strict=True))
         rest = _BeamAtRest(place[0, 0], angle, thickness)
         parts.append(_element_states(stepped, element, given, rest))
@@ -181,9 +179,7 @@ def _fields(e: BeamElements, element: int, own: Any, load: Any, turn: Any) -> _F
     h, v = (own[..., axis - 2, None] + load[..., axis, None] * e.ahead[..., element, :] for axis in (0, 1))
     normal, shear = h * cos + v * sin, v * cos - h * sin
     stretch, slip = 1 + axial * normal, shearing * shear
-    return _Fields(
-        stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + (axial - shearing) * normal)
-    )
+    return _Fields(stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + (axial - shearing) * normal))
 
 
 def _bending_moment(e: BeamElements, element: int, curvature: Any) -> Any:

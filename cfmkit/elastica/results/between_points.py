@@ -1,10 +1,9 @@
 """A traced path at every place of its drive: equilibria between its points, and the extremes that lie there.
 
 What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
-solved from the polynomial through the nearest four, on the branch that these are on. A stress takes longer, and is
-solved at its extremes and where it passes the allowable one; elsewhere the polynomial is taken, for each beam by
-itself, since the largest of all has a kink where it passes from one beam to another. At a bifurcation, where the path
-has a corner, everything is parted.
+solved from the polynomial through the nearest four, on the branch that these are on. A stress is solved at its
+extremes and where it passes the allowable one; elsewhere the polynomial is taken, for each beam by itself. At a
+bifurcation, where the path has a corner, everything is parted.
 
 Under a load the place is the driven node's motion: it is held while the load is solved for, so that a force may have
 an extreme there.
@@ -50,11 +49,9 @@ ASIDE = 1e-6
 NEARER = (0.1, 0.01, 0.001)
 """Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
 
-AT_POINT = 1e-10
-"""Share of the drive's range within which a bifurcation is at a point of the path: it is not located better."""
+AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at a point: it is not located better
 
-KNOWN = 1e-12
-"""Share of the drive's range within which a place is that of a point."""
+KNOWN = 1e-12  # share of the drive's range within which a place is that of a point
 
 
 def between_points(
@@ -318,7 +315,7 @@ class BetweenPoints(ShortRepr):
     def _loads(self) -> FloatArray:
         return np.asarray(self.path.at.drive[self._order])
 
-    @property
+    @cached_property
     def _drive(self) -> FloatArray:
         return self._loads
 
