@@ -30,7 +30,7 @@ mechanism:
     a: {at: [0 mm, 0 mm], support: clamped}
     b: {at: [50 mm, 0 mm], support: guided, direction: 0 deg}
   beams: {s: {start: a, end: b}}
-  drive: {kind: displacement, node: b, direction: 180 deg}
+  drive: {kind: displacement, node: b, direction: 0 deg}
 analysis: {travel: 0.5 mm, points: 5}
 """
 LEAF = """\

@@ -382,7 +382,9 @@ class BetweenPoints(ShortRepr):
             near = place + share * (drive[point] - place)
             spot = self._spot(values_at(x, y, np.array([near]))[0], near, near)
             if spot is None or spot.unstable not in self._counts(point, point):
-                return None
+                if share == NEARER[0]:
+                    return None
+                break  # of a bifurcation just behind the rest, the place is known less closely
             at = int(np.searchsorted(x, near))
             x, y = np.insert(x, at, near), np.insert(y, at, spot.free, axis=0)
         return np.asarray(values_at(x, y, np.array([place]))[0])
