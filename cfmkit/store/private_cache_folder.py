@@ -1,4 +1,4 @@
-"""A folder of this user alone, for what later runs may use again: compiled code, a list of fonts."""
+"""A folder of this user alone, for what later runs may use again: a list of fonts."""
 
 from __future__ import annotations
 

@@ -33,7 +33,6 @@ from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
 
 if TYPE_CHECKING:
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import Attached, Discretisation
