@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.equations import MarchState, NumpyEquations
     from cfmkit.elastica.results.path import EquilibriumPath
 
-FEWEST = 4
-"""Points of a path below which nothing is said of what lies between them: a cubic needs four."""
+FEWEST = 4  # points of a path below which nothing is said of what lies between them: a cubic needs four
 
 ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
@@ -50,7 +49,6 @@ NEARER = (0.1, 0.01, 0.001)
 """Shares of the way from a corner to the next point: equilibria are solved for there, to extrapolate to the corner."""
 
 AT_POINT = 1e-10  # share of the drive's range within which a bifurcation is at a point: it is not located better
-
 KNOWN = 1e-12  # share of the drive's range within which a place is that of a point
 
 
