@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.element_tables import BeamFits, element_tables, smooth_marks
+from cfmkit.elastica.mechanics.element_tables import BeamFits, MechanicsUnits, element_tables, smooth_marks
 from cfmkit.elastica.model.drive import Displacement, Loading
 from cfmkit.elastica.model.network import LineLoad, PointLoad, SlideSpring, TorsionSpring
 from cfmkit.elastica.model.numbering import apart, driven
@@ -42,19 +42,6 @@ LAYER_WIDTH = 10.0  # of the first of these elements, in sqrt(EI/N)
 LAYER_GROWTH = 4.0  # factor from one of them to the next
 FRAME_OF_DRIVE = 3
 """Frame of a node that is held nowhere in `driven`: that of the drive, along whose x it moves."""
-
-
-class MechanicsUnits(NamedTuple):
-    """Units of length [m], force [N] and the drive (m, rad or 1)."""
-
-    length: float
-    force: float
-    drive: float
-
-    @property
-    def moment(self) -> float:
-        """Unit of moment and energy [N m]."""
-        return self.force * self.length
 
 
 class BeamElements(NamedTuple):

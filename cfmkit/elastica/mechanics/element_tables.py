@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,23 @@ from cfmkit.elastica.model.section import Taper
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.elastica.mechanics.discretise import MechanicsUnits
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import Network
 
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
+
+
+class MechanicsUnits(NamedTuple):
+    """Units of length [m], force [N] and the drive (m, rad or 1)."""
+
+    length: float
+    force: float
+    drive: float
+
+    @property
+    def moment(self) -> float:
+        """Unit of moment and energy [N m]."""
+        return self.force * self.length
 
 
 class BeamFits(Mapping[str, Fit]):
