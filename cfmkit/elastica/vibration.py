@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 DEGREE_OF_FIRST, DEGREE_PER_MODE = 9, 1.5
 """Degree of rotations for the first mode of a beam, and for each more: six modes of a cantilever to 1e-9."""
+DEGREES_BESIDE_STATICS = 3  # more than what the bent shape needs: modes multiply it
 LONG_CHAIN, ORDER_IN_CHAIN = 8, 6
 """Elements a beam from which on it is a chain, and the order of forces in one: coils of many turns."""
 MAX_DEGREE = 36
@@ -178,7 +179,7 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
 def _degree(network: Discretisation, count: int) -> int:
     """Return the degree of the rotations: modes of a beam are spread over its elements."""
     wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(network))
-    return max(network.degree, min(MAX_DEGREE, wanted))
+    return max(network.degree, min(MAX_DEGREE, max(wanted, network.degree + DEGREES_BESIDE_STATICS)))
 
 
 def _order(network: Discretisation, degree: int) -> int:
