@@ -488,8 +488,8 @@ def between_loads(
     moved = path.motion(node)
     motion = moved[:, 2] if along is None else moved[:, 0] * np.cos(along) + moved[:, 1] * np.sin(along)
     rest = motion - scale * (path.free @ row[:-1])
-    steps = np.diff(motion)
-    if not row.any() or np.ptp(rest) > KNOWN * np.ptp(motion) or not ((steps > 0).all() or (steps < 0).all()):
+    steps, least = np.diff(motion), KNOWN * float(np.ptp(motion))  # rounding may go one way, too
+    if not row.any() or np.ptp(rest) > least or not ((steps > least).all() or (steps < -least).all()):
         return None
     return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))
 

@@ -103,15 +103,23 @@ def _interpolate(
     near = sorted(samples, key=lambda sample: abs(sample.value))[:3]
     if abs(near[0].value) > largest:
         return None
+    nearest = near[0]
     if len({sample.value for sample in near}) < 3:
         near = near[:1]
+    if not low.share <= _weighted(near, [sample.share for sample in near]) <= high.share:
+        near = [low, high]  # the third lies on another path
+    x = _weighted(near, np.array([sample.at.x for sample in near]))
+    drive = float(_weighted(near, [sample.at.drive for sample in near]))
+    share = float(_weighted(near, [sample.share for sample in near]))
+    return Located(x, drive, nearest.at, low.at, high.at, share, within)
+
+
+def _weighted(near: list[_Sample], values: Any) -> Any:
+    """Return Lagrange's interpolation of values at samples to where their function vanishes."""
     weights = [
         float(np.prod([other.value / (other.value - own.value) for other in near if other is not own])) for own in near
     ]
-    x = np.array(weights) @ np.array([sample.at.x for sample in near])
-    drive = float(np.dot(weights, [sample.at.drive for sample in near]))
-    share = float(np.dot(weights, [sample.share for sample in near]))
-    return Located(x, drive, near[0].at, low.at, high.at, share, within)
+    return np.array(weights) @ np.asarray(values)
 
 
 def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) -> Callable[[PathEquilibrium], float]:
