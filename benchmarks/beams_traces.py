@@ -1,7 +1,6 @@
-"""Whole traces on the functional beside the shooting engine: start, path, events, error estimate.
+"""Whole traces of beam networks: start, path, events, error estimate; minima of processor time over some turns.
 
-Run: nice python benchmarks/beams_traces.py [--only TEXT] [--tolerance T] [--turns N]. Both take turns in one process;
-minima of processor time over some turns, and their ratio (above 1: the functional is faster).
+Run: nice python benchmarks/beams_traces.py [--only TEXT] [--tolerance T] [--turns N]; in turn with another checkout's.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from beams_engine import MM, cantilever, lan, v_beam
 from network_cases import from_json, read_cases
 
-import cfmkit.elastica as elastica
 from cfmkit.elastica import (
     CLAMPED,
     Beam,
@@ -32,9 +30,9 @@ from cfmkit.elastica import (
     Rotation,
     Section,
     arc,
+    trace,
 )
 from cfmkit.elastica.mechanics.march import engine
-from cfmkit.elastica.tracing.trace_by_energy import trace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -80,32 +78,24 @@ def cases() -> Iterator[tuple[str, Callable[[], Network], Any, Control]]:
 
 
 def main() -> None:
-    """Print processor times of both and their ratio."""
+    """Print processor times."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", default="")
     parser.add_argument("--tolerance", type=float, default=1e-7)
     parser.add_argument("--turns", type=int, default=5)
     options = parser.parse_args()
-    print(f"runs on {engine()}, tolerance {options.tolerance:.0e}\n{'':40s} shooting functional  ratio  error told")
+    print(f"runs on {engine()}, tolerance {options.tolerance:.0e}\n{'':40s}     time   error told")
     for name, build, drive, control in cases():
         if options.only not in name:
             continue
-        control = replace(control, tolerance=options.tolerance)
-        found = [elastica.trace(build(), drive, control), trace(build(), drive, control)]
-        times: list[list[float]] = [[], []]
+        times = []
         for _ in range(options.turns):
-            for work, own in zip((elastica.trace, trace), times, strict=True):
-                start = time.process_time()
-                path = work(build(), drive, control)
-                assert len(path.effort)
-                own.append(time.process_time() - start)
-        before, after = (1e3 * min(own) for own in times)
-        names = "" if found[0].status is found[1].status else f"{found[0].status.name} {found[1].status.name}"
-        mesh = f"degree {found[1].network.degree}, {len(found[1].network.elements.length)} elements"
-        print(
-            f"{name:38s} {before:9.2f} {after:9.2f} ms {before / after:6.2f}  {found[1].error:.0e} {mesh} {names}",
-            flush=True,
-        )
+            start = time.process_time()
+            path = trace(build(), drive, replace(control, tolerance=options.tolerance))
+            assert len(path.effort)
+            times.append(time.process_time() - start)
+        mesh = f"degree {path.network.degree}, {len(path.network.elements.length)} elements"
+        print(f"{name:38s} {1e3 * min(times):9.2f} ms  {path.error:.0e} {mesh} {path.status.name}", flush=True)
 
 
 if __name__ == "__main__":
