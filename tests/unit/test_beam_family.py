@@ -956,6 +956,34 @@ def test_a_peak_at_a_bifurcation_is_there_however_many_points_and_if_one_is_on_i
     assert few["stress_limit_displacement"].value == pytest.approx(many["stress_limit_displacement"].value, rel=1e-5)
 
 
+BRACE = """\
+cfmkit: 1
+family: beam
+name: brace
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 1 mm
+  width: 10 mm
+  nodes:
+    a: {at: [0 mm, 0 mm], support: clamped}
+    b: {at: [30 mm, 0 mm]}
+    c: {at: [60 mm, 5 mm], support: clamped}
+  beams: {left: {start: a, end: b}, right: {start: b, end: c}}
+  drive: {kind: displacement, node: b, direction: 90 deg}
+analysis: {travel: 3 mm, points: 21, fidelity: inextensible}
+"""
+
+
+def test_beams_that_buckle_as_soon_as_they_bear_have_their_peak_where_they_buckle(tmp_path):
+    """The place just behind rest was no corner of the curve: a cubic across it had a peak of 604 kN."""
+    (tmp_path / "brace.yaml").write_text(BRACE, encoding="utf-8")
+    result = cfmkit.analyze(tmp_path / "brace.yaml")
+    curve, peak = result.curve, result.values["peak_force"].value
+    at_rest = float(np.polyval(np.polyfit(curve.displacement[1:4], curve.force[1:4], 2), 0.0))  # of the buckled beams
+    assert peak == pytest.approx(at_rest, rel=1e-3)
+    assert 0.0 < result.values["peak_displacement"].value < 1e-6 * MM
+
+
 @pytest.mark.parametrize("name", ["beam_lan2010", "beam_two_layers", "beam_design_arch"])
 def test_equilibria_between_points_are_those_of_a_path_through_them(name):
     """On the branch that the path took, too: the layers of one of them have buckled."""
