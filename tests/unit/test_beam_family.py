@@ -980,7 +980,7 @@ def test_beams_that_buckle_as_soon_as_they_bear_have_their_peak_where_they_buckl
     result = cfmkit.analyze(tmp_path / "brace.yaml")
     curve, peak = result.curve, result.values["peak_force"].value
     at_rest = float(np.polyval(np.polyfit(curve.displacement[1:4], curve.force[1:4], 2), 0.0))  # of the buckled beams
-    assert peak == pytest.approx(at_rest, rel=1e-3)
+    assert peak == pytest.approx(at_rest, rel=5e-3)
     assert 0.0 < result.values["peak_displacement"].value < 1e-6 * MM
 
 
