@@ -10,12 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cfmkit
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-PACKAGE = Path(cfmkit.__file__).parent
+PACKAGE = Path(__file__).parents[2] / "cfmkit"
 
 
 @cache
