@@ -176,7 +176,7 @@ def all_pairs() -> list[tuple[int, int]]:
 
 def test_the_smallest_gap_of_a_hundred_beams_is_found_in_milliseconds():
     lines = {f"b{k}": np.array([[0.0, k], [1.0, k]]) for k in range(160)}
-    with within(130, all_pairs):  # it takes 60 to 80 times as long; the bounds of one pair after another took 250 times
+    with within(130, all_pairs):  # it takes 60 to 80 times as long
         found = smallest_gap(lines, dict.fromkeys(lines, 0.05))
     assert found.size == pytest.approx(0.9)
 
