@@ -1,4 +1,4 @@
-"""Derivatives by design variables from the functional: beside those of the shooting engine, and differences."""
+"""Derivatives by design variables from the functional: beside those of traced paths, and differences."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("build", "x"), CASES)
-def test_effort_slopes_are_those_of_the_shooting_engine(build: Any, x: Any) -> None:
+def test_effort_slopes_are_those_of_the_gradient_of_a_trace(build: Any, x: Any) -> None:
     """By nodes, offsets, shapes, sections, springs, loads, supports: every kind of variable that there is."""
     net, drive = build(x)
     known = gradient(trace(net, drive, FINE), build, x).effort
@@ -117,7 +117,7 @@ def test_the_effort_s_slope_by_an_array_is_a_difference_of_the_functional() -> N
 
 
 @pytest.mark.parametrize(("build", "x"), [*CASES[:2], pytest.param(pushed, X, marks=pytest.mark.slow)])
-def test_slopes_of_other_outputs_are_those_of_the_shooting_engine(build: Any, x: Any) -> None:
+def test_slopes_of_other_outputs_are_those_of_the_gradient_of_a_trace(build: Any, x: Any) -> None:
     """Motions of nodes, energy, forces on the ends of beams, stresses at their ends."""
     net, drive = build(x)
     known = gradient(trace(net, drive, FINE), build, x)

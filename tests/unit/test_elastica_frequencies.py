@@ -66,7 +66,7 @@ def test_a_cantilever_has_the_frequencies_of_the_closed_form(axial: bool) -> Non
 
 
 @pytest.mark.parametrize("axial", [False, True])
-def test_frequencies_of_a_cantilever_with_a_mass_are_those_of_the_shooting_engine(axial: bool) -> None:
+def test_frequencies_of_a_cantilever_with_a_mass_do_not_depend_on_the_degree(axial: bool) -> None:
     masses = NetworkMasses({"x": DENSITY}, {"tip": (0.7 * PER_LENGTH * LENGTH, 1e-7)})
     net, drive = beam(axial=axial), Loading((PointLoad("tip", fx=-1.0, fy=0.3),), np.array([3.0]))
     old = trace(net, drive, Control(tolerance=1e-10))
@@ -77,7 +77,7 @@ def test_frequencies_of_a_cantilever_with_a_mass_are_those_of_the_shooting_engin
 
 
 @pytest.mark.parametrize(("seed", "number"), [(4, 0), (4, 1), (4, 2), (8, 3)])
-def test_networks_with_every_feature_have_the_frequencies_of_the_shooting_engine(seed: int, number: int) -> None:
+def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(seed: int, number: int) -> None:
     """Loads that follow among them: held, free, and whether they flutter."""
     net = beam_networks.network(seed)
     drive = beam_networks.drives(net, seed)[number]
@@ -174,7 +174,7 @@ def test_a_stubby_beam_has_the_frequencies_of_timoshenko() -> None:
 
 
 def test_a_coil_of_many_turns_has_the_frequencies_of_seven_beams() -> None:
-    """Of the shooting engine: a coil of one beam has others there, 1 % too high, and those of 7 beams are right."""
+    """The engine before this one had others for a coil of one beam, 1 % too high, and those of 7 beams are right."""
     turns, pieces, section = 5.25, 7, Section(2e9, 1e-2, 1e-4)
     sweep, drive = 2 * np.pi * turns, Rotation("b", np.array([0.5]))
     angles = sweep * (np.arange(pieces + 1) / pieces - 0.5)

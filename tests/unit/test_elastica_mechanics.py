@@ -1,4 +1,4 @@
-"""The functional of a network: its derivatives, its equilibria beside those of the shooting engine, its inertia."""
+"""The functional of a network: its derivatives, its equilibria beside those of a trace, its inertia."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_hessian_is_the_derivative_of_the_gradient(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 3, 4, 8])
-def test_networks_with_every_feature_have_the_forces_of_the_shooting_engine(seed: int) -> None:
+def test_equilibria_of_one_high_degree_have_the_forces_of_a_trace(seed: int) -> None:
     net = beam_networks.network(seed)
     for drive in beam_networks.drives(net, seed)[:3]:
         path = trace(net, drive, Control(tolerance=1e-9))

@@ -1,4 +1,4 @@
-"""Results of equilibria of the functional beside those of the shooting engine, and of closed forms."""
+"""Results of equilibria of the functional beside closed forms and statics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wide strips by the functional: their law, and paths, stresses and derivatives beside the shooting engine's.
+"""Wide strips by the functional: their law, and paths, stresses and derivatives beside those of a fine mesh.
 
 The law is no polynomial where a strip is bent from one side to the other: four elements a beam resolve it to 1e-8.
 """
