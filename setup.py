@@ -11,6 +11,7 @@ description become addresses there, and the package has project URLs; else they 
 
 import os
 import re
+import shutil
 from pathlib import Path
 
 from setuptools import Extension, find_packages, setup
@@ -43,6 +44,8 @@ class WheelForEveryPython(bdist_wheel):
 
     def run(self):
         """Compile first: the wheel's name says what came of it."""
+        # modules that are gone since an earlier build would come into the wheel
+        shutil.rmtree(self.get_finalized_command("build").build_lib, ignore_errors=True)
         self.run_command("build_ext")
         built = self.get_finalized_command("build_ext").get_outputs()
         if not any(Path(file).exists() for file in built):
