@@ -1,4 +1,4 @@
-"""Natural frequencies from the functional: beside today's, and closed forms (Blevins 1979, ch. 8; Beck 1952)."""
+"""Natural frequencies: beside those of another degree, and closed forms (Blevins 1979, ch. 8; Beck 1952)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from functional_paths import functional_path
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-import cfmkit.elastica.vibration as today
 from cfmkit.elastica import (
     CLAMPED,
     FREE,
@@ -70,7 +69,7 @@ def test_frequencies_of_a_cantilever_with_a_mass_do_not_depend_on_the_degree(axi
     masses = NetworkMasses({"x": DENSITY}, {"tip": (0.7 * PER_LENGTH * LENGTH, 1e-7)})
     net, drive = beam(axial=axial), Loading((PointLoad("tip", fx=-1.0, fy=0.3),), np.array([3.0]))
     old = trace(net, drive, Control(tolerance=1e-10))
-    known = today.frequencies(old, masses, 5, [len(old) - 1], ("tip", np.pi / 2))
+    known = frequencies(old, masses, 5, [len(old) - 1], ("tip", np.pi / 2))
     found = frequencies(functional_path(net, drive, 12), masses, 5, hold=("tip", np.pi / 2))
     assert found.free[0] == pytest.approx(known.free[0], rel=1e-7)
     assert found.held[0] == pytest.approx(known.held[0], rel=1e-7)
@@ -83,7 +82,7 @@ def test_frequencies_of_networks_with_every_feature_do_not_depend_on_the_degree(
     drive = beam_networks.drives(net, seed)[number]
     masses = NetworkMasses(dict.fromkeys(net.beams, 1000.0), {"b": (1e-3, 1e-7), "bb": (5e-4, 0.0)})
     old = trace(net, drive, Control(tolerance=1e-9))
-    known = today.frequencies(old, masses, 4, [len(old) - 1])
+    known = frequencies(old, masses, 4, [len(old) - 1])
     found = frequencies(functional_path(net, drive, 14), masses, 4, [1])
     assert found.free[0] == pytest.approx(known.free[0], rel=1e-6, nan_ok=True)
     assert found.held[0] == pytest.approx(known.held[0], rel=1e-6, nan_ok=True)
@@ -187,7 +186,7 @@ def test_a_coil_of_many_turns_has_the_frequencies_of_seven_beams() -> None:
     }
     beams = {f"x{k}": Beam(names[k], names[k + 1], section, arc(sweep / pieces)) for k in range(pieces)}
     chain = trace(Network(nodes, beams), drive, Control(tolerance=1e-9))
-    known = today.frequencies(chain, NetworkMasses(dict.fromkeys(beams, DENSITY)), 3, [len(chain) - 1])
+    known = frequencies(chain, NetworkMasses(dict.fromkeys(beams, DENSITY)), 3, [len(chain) - 1])
     ends = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
     coil = functional_path(Network(ends, {"x": Beam("a", "b", section, arc(sweep))}), drive, 10)
     found = frequencies(coil, WHOLE, 3)
