@@ -11,7 +11,7 @@ SI, variables last; each output is computed when it is first needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -20,15 +20,15 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import Equilibria, all_designs, effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays, effort_slopes, unknown_slopes
 from cfmkit.elastica.mechanics.designs import design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise_alike
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results import beam_states, stress_extremes
 from cfmkit.elastica.results.path import N_PLACES, load_displacement, node_motion, node_reaction, strain_energy
 from cfmkit.errors import InputError
+from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -119,7 +119,7 @@ class Gradient:
 
         def output(net: Network, at: Equilibria) -> Any:
             element = beam_states.elements_of(at.network, beam)[-1 if end else 0]
-            found = beam_states.element_states(net, at, beam, element, np.array([float(end)]))
+            found = beam_states.states_on(net, at, [element], np.array([float(end)]))
             return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
 
         return self.of(output)
@@ -137,32 +137,47 @@ class Gradient:
 
     def states(self, beam: str, fractions: Any = None) -> beam_states.BeamStates:
         """Return the derivatives of states at fractions of every element of a beam; arrays (p, n, k)."""
-        return beam_states.BeamStates(*map(self._slopes, self._states(beam, fractions)))
+        elements = beam_states.elements_of(self.path.network, beam)
+        return beam_states.BeamStates(*map(self._slopes, self.dual_states(elements, fractions)))
 
     def sections(self, beam: str, fractions: Any = None) -> beam_states.BeamSections:
         """Return the derivatives of section forces and stresses at fractions of every element; arrays (p, n, k)."""
-        widths = np.array([net.beams[beam].section.width for net, _ in self.designs.networks])[:, None, None]
-        found = beam_states.sections_of_width(widths, self._states(beam, fractions))
-        return beam_states.BeamSections(*map(self._slopes, found))
+        elements = beam_states.elements_of(self.path.network, beam)
+        return beam_states.BeamSections(*map(self._slopes, self.dual_sections(elements, fractions)))
 
-    def _states(self, beam: str, fractions: Any) -> beam_states.BeamStates:
-        """Return the states of all designs at fractions of every element of a beam, (k, p, n)."""
+    def dual_states(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamStates:
+        """Return states with their derivatives at fractions of elements, one after the other; dual arrays (p, n)."""
         places = tuple(np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions)
-        if (beam, places) not in self._known:
-            moved = self.at.z + 1j * COMPLEX_STEP * np.moveaxis(self.unknowns, 1, 0)
-            stepped = Equilibria(all_designs(self.designs), moved, self.at.drive)
-            self._known[beam, places] = beam_states.states_of_designs(self.designs, stepped, beam, places)
-        return self._known[beam, places]
+        known, key = self._known, (*elements, *places)
+        if key not in known:
+            known[key] = beam_states.states_of_designs(self.designs, self._dual, elements, places)
+        return known[key]
+
+    def dual_sections(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamSections:
+        """Return section forces and stresses with their derivatives, as of `dual_states`."""
+        found = self.dual_states(elements, fractions)
+        names = [self.path.network.elements.beam[element] for element in elements]
+        each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
+        own = np.array([self.path.net.beams[name].section.width for name in names])
+        count = len(found.place) // len(names)
+        width = DualArray(np.repeat(own, count), np.repeat(np.imag(each) / COMPLEX_STEP, count, axis=1))
+        return beam_states.sections_of_width(width, found)
 
     @cached_property
     def _known(self) -> dict[Any, beam_states.BeamStates]:
         """States of beams: their places and their stresses are requested one after the other."""
         return {}
 
+    @cached_property
+    def _dual(self) -> Equilibria:
+        """The equilibria with unknowns and arrays that are dual."""
+        z: Any = DualArray(self.at.z, np.moveaxis(self.unknowns, 1, 0))
+        return Equilibria(dual_arrays(self.designs), z, self.at.drive)
+
     def _slopes(self, values: Any) -> FloatArray:
-        """Return the derivatives (p, n, k) of values (k, p, n)."""
-        shape = self.designs.count, len(self.points), np.shape(values)[-1]
-        return read_only(np.moveaxis(np.broadcast_to(np.imag(values), shape), 0, -1) / COMPLEX_STEP)
+        """Return the derivatives (p, n, k) of values (p, n), or (n,) of those that are one at all points."""
+        shape = len(self.points), values.shape[-1]
+        return read_only(np.moveaxis(slopes_of(values, self.designs.count, shape), 0, -1))
 
     def stress_extremes(self, beam: str, axial: bool = True) -> FloatArray:
         """Return the derivatives of the values of `EquilibriumPath.stress_extremes`, (p, 2, 2, k).

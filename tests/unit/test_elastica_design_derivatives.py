@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,27 @@ import pytest
 from equilibria import equilibria
 from varied_networks import LAN, X, arms, lan, pushed, turned
 
-from cfmkit.elastica import Control, Displacement, gradient, trace
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Link,
+    Network,
+    Node,
+    Polynomial,
+    Section,
+    gradient,
+    guided,
+    trace,
+)
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.design_derivatives import effort_slopes, unknown_slopes
+from cfmkit.elastica.mechanics.design_derivatives import Equilibria, effort_slopes, unknown_slopes
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, design_of, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.results import beam_states
-from cfmkit.elastica.results.output_slopes import output_slopes
 from cfmkit.elastica.results.path import node_motion, strain_energy
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 FINE = Control(tolerance=1e-11)
 
@@ -70,18 +83,38 @@ def test_unknowns_have_the_slopes_of_differences() -> None:
         np.testing.assert_allclose(exact[:, k, node], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
 
 
-def test_networks_of_plain_beams_are_set_up_together_as_one_by_one() -> None:
+def hooked(x: Any) -> Any:
+    """Two beams of several elements: one at an arm, with an offset, that turns by 3.4 rad, and a thin one."""
+    section = Section(2e9, 10e-3, x[0], shear=True)
+    nodes = {
+        "arm": Node(5e-3, 0.0),
+        "a": Node(0.0, 0.0, CLAMPED),
+        "b": Node(30e-3, 20e-3 * x[3], guided(-np.pi / 2)),
+        "c": Node(60e-3, 0.0, CLAMPED),
+    }
+    beams = {
+        "hook": Beam("arm", "b", section, Polynomial((0.0, x[1], x[2])), end_offset=(1e-3, 2e-3)),
+        "thin": Beam("b", "c", replace(section, thickness=0.5 * x[0]), Polynomial((0.0, -x[1]))),
+    }
+    return Network(nodes, beams, links=(Link("a", "arm"),)), Displacement("b", -np.pi / 2, np.array([1e-3]))
+
+
+HOOK = np.array([1e-3, 2.8, 0.6, 1.0])
+
+
+@pytest.mark.parametrize(("build", "x", "pieces"), [(lan_pushed, LAN, 1), (lan_pushed, LAN, 2), (hooked, HOOK, 1)])
+def test_networks_of_plain_beams_are_set_up_together_as_one_by_one(build: Any, x: Any, pieces: int) -> None:
     """Real designs, and complex steps of each variable."""
-    net, drive = lan_pushed(LAN)
-    template = discretise(net, drive, 7)
-    steps = 1j * COMPLEX_STEP * np.diag(LAN)
-    moved = [LAN * (1 + 0.01 * k) for k in range(3)]
-    for variables in ([LAN + step for step in steps], moved):
-        networks = [lan_pushed(x) for x in variables]
+    net, drive = build(x)
+    template = discretise(net, drive, 7, pieces)
+    steps = 1j * COMPLEX_STEP * np.diag(x)
+    moved = [x * (1 + 0.01 * k) for k in range(3)]
+    for variables in ([x + step for step in steps], moved):
+        networks = [build(own) for own in variables]
         together = set_up(template, (net, drive), networks)
         assert not together.each
         for number, pair in enumerate(networks):
-            alone, mine = discretise(*pair, 7, scales=template.scales), design_of(together, number)
+            alone, mine = discretise(*pair, 7, pieces, scales=template.scales), design_of(together, number)
             for record, other in ((mine.elements, alone.elements), (mine.attachments, alone.attachments)):
                 for name in record._fields:
                     if name not in ("beam", "cuts") and getattr(alone.elements, name, 0) is not None:
@@ -139,7 +172,16 @@ def test_slopes_of_other_outputs_are_those_of_the_gradient_of_a_trace(build: Any
         "force": end_force,
         "stress": stress,
     }
-    found = output_slopes(at, stepped(at.network, build, x), outputs)
+    designs = stepped(at.network, build, x)
+    slopes = unknown_slopes(at, designs)
+    moved = [
+        Equilibria(design_of(designs, k), at.z + 1j * COMPLEX_STEP * slopes[:, k], at.drive) for k in range(len(x))
+    ]
+    pairs = list(zip(designs.networks, moved, strict=True))
+    found = {
+        name: np.stack([np.imag(output(net, one)) / COMPLEX_STEP for (net, _), one in pairs], axis=-1)
+        for name, output in outputs.items()
+    }
     sections = known.sections(beam)
     wanted = {
         "motion": known.motion[node],

@@ -26,8 +26,8 @@ from cfmkit.elastica import (
 )
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.discretise import discretise
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.march import CompiledEquations, equations
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 X = np.array([0.3, 0.02, 2e9, 0.35, 0.9])  # thickness [mm], width [m], modulus [Pa], Poisson's ratio, curvature
 

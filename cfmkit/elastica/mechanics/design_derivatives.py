@@ -26,11 +26,11 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import design_of
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, slopes_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -231,34 +231,44 @@ def _force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
 
     Held ones move with their support, to which every spring and load at them answers.
     """
-    network, moved = at.network, at.z
+    network, unknowns = at.network, at.network.elements.unknowns
+    moved: Any = at.z
+    stepped, held = dual_arrays(designs), None
     if designs.base is not None:
-        moved = at.z + 1j * np.imag(designs.base)[:, None]
-    stepped = all_designs(designs)
+        held = np.imag(designs.base) / COMPLEX_STEP
+        moved = DualArray(at.z, held[:, None])
     found = np.zeros((len(at.z), designs.count, network.size))
     together = max(1, MAX_TOGETHER // (designs.count * network.elements.angle.size))
     for first in range(0, len(at.z), together):
         some = slice(first, first + together)
-        own, _ = energy.element_gradients(stepped, moved[..., some, :], at.drive[some], 1.0)
-        change = np.moveaxis(np.broadcast_to(own.imag, (designs.count, *own.shape[-3:])), 0, 1) / COMPLEX_STEP
-        here: Any = (slice(None), slice(None), network.elements.unknowns)
-        np.add.at(found[some], here, change)
+        for columns, force in energy.element_forces(stepped, moved[some], at.drive[some], 1.0):
+            change = np.moveaxis(slopes_of(force, designs.count, force.shape), 0, 1)
+            here: Any = (slice(None), slice(None), unknowns[:, list(columns)])
+            np.add.at(found[some], here, change)
     for d, terms in enumerate(_moved_terms(at, designs)):
         for one, attached in terms:
             for k, drive in enumerate(at.drive.tolist()):
-                z = moved[d, k] if designs.base is not None else at.z[k]
+                z = at.z[k] if held is None else at.z[k] + 1j * COMPLEX_STEP * held[d]
                 part = TERMS[type(attached.item)](one, attached, z, 1.0, drive)
                 np.add.at(found[k, d], part.unknowns, np.imag(part.gradient) / COMPLEX_STEP)
     return found
 
 
-def all_designs(designs: NetworkDesigns) -> Discretisation:
-    """Return the arrays of all designs as one network: tables (d, 1, e, q) and places (d, 1, k, 2) that have a step."""
+def dual_arrays(designs: NetworkDesigns) -> Discretisation:
+    """Return the arrays of the template; those that a variable changes are dual."""
     network = designs.template
-    tables = {name: table[:, None] for name, table in designs.tables.items() if np.imag(table).any()}
-    places = {name: place[:, None] for name, place in designs.places.items() if np.imag(place).any()}
-    elements, attachments = network.elements._replace(**tables), network.attachments._replace(**places)
-    return replace(network, elements=elements, attachments=attachments)
+    elements, attachments = network.elements, network.attachments
+    return replace(
+        network,
+        elements=elements._replace(**_dual(elements, designs.tables)),
+        attachments=attachments._replace(**_dual(attachments, designs.places)),
+    )
+
+
+def _dual(owner: Any, stepped: dict[str, Any]) -> dict[str, Any]:
+    """Return the arrays of an owner that have a complex step."""
+    changed = {name: array.imag for name, array in stepped.items() if np.iscomplexobj(array) and array.imag.any()}
+    return {name: DualArray(getattr(owner, name), steps / COMPLEX_STEP) for name, steps in changed.items()}
 
 
 def _moved_terms(at: Equilibria, designs: NetworkDesigns) -> list[list[tuple[Discretisation, Attached]]]:

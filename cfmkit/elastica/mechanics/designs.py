@@ -78,13 +78,12 @@ def set_up(
 
 
 def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
-    """Return True if all networks have plain beams of one element and differ in nothing but nodes, beams and sections.
+    """Return True if all networks have plain beams and differ in nothing but nodes, beams and sections.
 
     Joints and links are those of one topology: they are not compared.
     """
     network, drive = origin
-    one_each = template.elements.beam == tuple(network.beams) and not template.elements.gap.any()
-    return one_each and all(
+    return not template.elements.gap.any() and all(
         all(is_plain(beam) and beam.closure != "raw" for beam in net.beams.values())
         and net.springs == network.springs
         and net.loads == network.loads
@@ -96,24 +95,26 @@ def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: S
 def _plain(
     template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
 ) -> NetworkDesigns:
-    scales, rule = template.scales, basis(template.degree)
+    scales, rule, e = template.scales, basis(template.degree), template.elements
     names = list(template.nodes)
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
     offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
-    node, master = _whose(origin, names)
+    row, ends, inside = _rows(template, list(origin[0].beams))
+    node, master = _whose(origin, names, inside, ends)
     arm = spots[:, node] - spots[:, master]
-    ends = template.elements.ends
-    arm[:, ends] += offsets[:, np.arange(len(ends))]
+    arm[:, ends] += offsets
+    arm[:, inside] = 0.0
     place = spots[:, master]
     reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
     coefficients = _coefficients(beams)
-    shapes, sections = _fitted(coefficients, reach), _sections(beams, scales)
-    rotation, length = shapes
-    angle = coefficients @ np.vander(rule.places, coefficients.shape[-1], increasing=True).T + rotation[..., None]
-    speed, ones = length[..., None], np.ones(len(rule.places))
-    bending, axial, shear = (values[..., None] for values in sections)
-    floor = template.elements.axial - _own_axial(origin, scales)[:, None]
+    (rotation, length), sections = _fitted(coefficients, reach), _sections(beams, scales)
+    width = e.cuts[:, 1:] - e.cuts[:, :1]
+    powers_of_t = (e.cuts[:, :1] + width * rule.places)[..., None] ** np.arange(coefficients.shape[-1])
+    angle = np.einsum("dem,eqm->deq", coefficients[:, row], powers_of_t) + rotation[:, row, None]
+    speed, ones = length[:, row, None] * width, np.ones(len(rule.places))
+    bending, axial, shear = (values[:, row, None] for values in sections)
+    floor = e.axial - _own_axial(origin, scales)[row, None]
     tables = {
         "angle": angle,
         "weight": speed * rule.weights,
@@ -121,17 +122,36 @@ def _plain(
         "axial": axial + floor,
         "shear": shear * ones,
         "ahead": speed * (1 - rule.places),
-        "length": length,
+        "length": speed[..., 0],
     }
+    if inside.size:  # bodies between the elements of a beam
+        chords = np.stack([(tables["weight"] * turn(angle)).sum(axis=-1) for turn in (np.cos, np.sin)], axis=-1)
+        for k in np.flatnonzero(e.cuts[:, 1] < 1.0):
+            place[:, e.ends[k, 1]] = (place + arm)[:, e.ends[k, 0]] + chords[:, k]
     frames, base = _supports(template, origin, pairs, [names[k] for k in master])
+    if frames is not None:
+        frames[:, inside] = template.attachments.frame[inside]
     places = {"origin": place, "arm": arm} | ({} if frames is None else {"frame": frames})
     return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs))
 
 
-def _whose(origin: tuple[Network, Drive], names: list[str]) -> tuple[Any, Any]:
-    """Return which node each attachment is at and which moves it, in the order of `discretise`."""
+def _rows(template: Discretisation, names: list[str]) -> tuple[Any, Any, Any]:
+    """Return the number of each element's beam, the attachments of the ends of beams (b, 2), and those inside beams."""
+    e = template.elements
+    row = np.array([names.index(name) for name in e.beam])
+    first, last = e.cuts[:, 0] == 0.0, e.cuts[:, 1] == 1.0
+    return row, np.stack([e.ends[first, 0], e.ends[last, 1]], axis=1), e.ends[~last, 1]
+
+
+def _whose(origin: tuple[Network, Drive], names: list[str], inside: Any, ends: Any) -> tuple[Any, Any]:
+    """Return which node each attachment is at and which moves it, in the order of `discretise`.
+
+    Those inside beams lie at no node: any will do.
+    """
     network, drive = origin
-    at = [name for beam in network.beams.values() for name in (beam.start, beam.end)]
+    at = [names[0]] * (2 * len(ends) + len(inside))
+    for beam, own in zip(network.beams.values(), ends.tolist(), strict=True):
+        at[own[0]], at[own[1]] = beam.start, beam.end
     for spring in network.springs:
         at += [spring.node] if isinstance(spring, SlideSpring) else [n for n in (spring.start, spring.end) if n]
     at += [load.node for load in (*network.loads, *drive.loads) if isinstance(load, PointLoad)]

@@ -15,6 +15,7 @@ from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.mechanics.poses import AttachmentPoses, poses
 from cfmkit.elastica.mechanics.terms import TERMS
 from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.numerics.dual_array import cos_sin, stack
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,7 +47,7 @@ def fields(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Fie
     rotation = own[..., rotation_columns(network.degree)]
     force = own[..., None, -2:] + line_load(network, drive, share)[..., None, :] * e.ahead[..., None]
     turn = e.angle + rotation @ rule.values.T
-    cos, sin = np.cos(turn), np.sin(turn)
+    cos, sin = cos_sin(turn)
     normal = force[..., 0] * cos + force[..., 1] * sin
     shear = force[..., 1] * cos - force[..., 0] * sin
     stretch, slip = 1 + e.axial * normal, e.shear * shear
@@ -89,7 +90,20 @@ def _end_poses(network: Discretisation, z: Any) -> tuple[AttachmentPoses, Attach
 def element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -> tuple[Any, Any]:
     """Return the gradients of the elements by their unknowns, (..., e, degree + 9), and their type.
 
-    Of one state (size,), of several (n, size), or with tables of several designs (d, 1, e, q), (d, n, e, degree + 9).
+    Of one state (size,) or of several (n, size).
+    """
+    parts = dict(element_forces(network, z, drive, share))
+    e, kind = network.elements, np.result_type(*parts.values())
+    own = np.zeros((*np.broadcast_shapes(*(part.shape[:-1] for part in parts.values())), e.unknowns.shape[1]), kind)
+    for columns, part in parts.items():
+        own[..., list(columns)] = part
+    return own, kind
+
+
+def element_forces(network: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[tuple[tuple[int, ...], Any]]:
+    """Yield columns of the elements' unknowns (c,), and the gradients of the elements by them, (..., e, c).
+
+    The arrays of the network, and the unknowns, may be dual.
     """
     e, rule, at = network.elements, basis(network.degree), fields(network, z, drive, share)
     start, end = _end_poses(network, z)
@@ -98,15 +112,12 @@ def element_gradients(network: Discretisation, z: Any, drive: Any, share: Any) -
     bend = e.weight * bending(e, at.curvature).moment
     turning = e.weight * at.shear * (1 + (e.axial - e.shear) * at.normal)
     turned = bend @ rule.slopes - turning @ rule.values
-    reach = np.stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)], axis=-1)
-    missed = end.place - start.place - reach - (1.0 - share) * e.gap
-    outer = np.broadcast_shapes(turned.shape[:-1], missed.shape[:-1], first.shape[:-1])
-    own = np.zeros((*outer, e.unknowns.shape[1]), np.result_type(bend, turning, start.place, first))
-    own[..., rotation_columns(network.degree)] = turned
-    own[..., 0:3] = -(first[..., None, :] @ start.jacobian)[..., 0, :]
-    own[..., 4:7] = (last[..., None, :] @ end.jacobian)[..., 0, :]
-    own[..., -2:] = missed
-    return own, own.dtype
+    reach = stack([(e.weight * at.slope_x).sum(axis=-1), (e.weight * at.slope_y).sum(axis=-1)])
+    count = e.unknowns.shape[1]
+    yield tuple(rotation_columns(network.degree).tolist()), turned
+    yield (0, 1, 2), -start.works(first)
+    yield (4, 5, 6), end.works(last)
+    yield (count - 2, count - 1), end.place - start.place - reach - (1.0 - share) * e.gap
 
 
 def hessian(network: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:

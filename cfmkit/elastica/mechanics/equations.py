@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.mechanics import energy
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.discretise import Discretisation
 
-COMPLEX_STEP = 1e-30  # nothing is subtracted, so that its square may vanish beside one
 MAX_ROUNDS = 14  # of Newton's method
 LARGEST_CORRECTION = 50.0  # of a motion: beyond that Newton's method has left the path
 SAME_EQUILIBRIUM = 1e-7  # motions that differ by less are one

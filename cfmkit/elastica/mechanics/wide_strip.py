@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cfmkit.numerics.dual_array import DualArray, each_of
+
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import BeamElements
 
@@ -44,12 +46,16 @@ def bending(elements: BeamElements, curvature: Any) -> Bending:
     if elements.curl is None:
         return Bending(narrow, elements.rigidity * curvature, elements.rigidity + 0.0 * curvature, 0.0, 0.0, 0.0)
     n, whole = elements.hindrance, curvature + elements.rest
-    g, first, second = curling_share(elements.curl * whole**2)
+    g, first, second = _share(elements.curl * whole**2)
     stiff, by = 1 + n * (1 - g), 2 * elements.curl * whole
     rising, curved = -n * first * by, -n * (second * by**2 + 2 * elements.curl * first)
     moment = elements.rigidity * (curvature * stiff + curvature**2 / 2 * rising)
     stiffness = elements.rigidity * (stiff + 2 * curvature * rising + curvature**2 / 2 * curved)
     return Bending(narrow * stiff, moment, stiffness, narrow * rising, -narrow * n * first * whole**2, narrow * (1 - g))
+
+
+def _share(z: Any) -> tuple[Any, ...]:
+    return each_of(curling_share, z) if isinstance(z, DualArray) else curling_share(z)
 
 
 def curling_share(z: Any) -> tuple[Any, Any, Any]:

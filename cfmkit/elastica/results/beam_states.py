@@ -19,16 +19,28 @@ import numpy as np
 
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import CURLING, design_of
-from cfmkit.elastica.mechanics.polynomials import basis, integrals, integrals_to_points, interpolation, shape_functions
+from cfmkit.elastica.mechanics.polynomials import (
+    basis,
+    integrals,
+    integrals_to_points,
+    interpolation,
+    shape_functions,
+)
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.mechanics.wide_strip import bending
+from cfmkit.numerics.dual_array import COMPLEX_STEP, DualArray, cos_sin
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
     from cfmkit.elastica.mechanics.designs import NetworkDesigns
     from cfmkit.elastica.mechanics.discretise import BeamElements, Discretisation
     from cfmkit.elastica.model.network import Network
+
+ON_POINTS = ("angle", "weight", "rigidity", "axial", "shear", "ahead", *CURLING)
+"""Tables of elements at their Gauss points."""
 
 
 class BeamStates(NamedTuple):
@@ -69,132 +81,157 @@ def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamState
     fractions : (k,) array
         Places on every element as fractions of its parameter, from 0 to 1.
     """
-    return _joined([element_states(net, at, beam, k, fractions) for k in elements_of(at.network, beam)])
+    return states_on(net, at, elements_of(at.network, beam), fractions)
 
 
-def _joined(parts: list[BeamStates]) -> BeamStates:
-    return BeamStates(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
-
-
-def element_states(net: Network, at: Equilibria, beam: str, element: int, fractions: Any) -> BeamStates:
-    """Return states at fractions (k,) of one element."""
+def states_on(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
+    """Return states at the same fractions (k,) of each of m elements, one after the other: (p, m k)."""
     given = np.asarray(fractions, float)
-    rest = _rest(net, at.network, beam, element, given)
-    return _element_states(at, element, given, rest)
+    found = _states(at, list(elements), given, _rest(net, at.network, elements, given))
+    return BeamStates(*map(_in_a_row, found))
 
 
-def states_of_designs(designs: NetworkDesigns, stepped: Equilibria, beam: str, fractions: Any) -> BeamStates:
-    """Return the states of all designs: arrays (d, p, k); those that do not change along the path (d, 1, k).
+def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
+    """Return states with their derivatives: dual arrays (p, m k), (m k) of those that do not change along the path.
 
     Parameters
     ----------
     designs : NetworkDesigns
-        A complex step in each of d variables.
-    stepped : Equilibria
-        Their equilibria as one: unknowns (d, p, size), tables of all designs (d, 1, e, q).
-    beam : str
-        Its name.
-    fractions : (k,) array
-        As of `states`.
+        A complex step in each variable.
+    at : Equilibria
+        Of `dual_arrays`, with dual unknowns.
+    elements, fractions : (m,), (k,) arrays
+        As of `states_on`.
     """
-    given, parts = np.asarray(fractions, float), []
-    for element in elements_of(designs.template, beam):
-        each = (_rest(net, design_of(designs, d), beam, element, given) for d, (net, _) in enumerate(designs.networks))
-        place, angle, thickness = (np.array(rows)[:, None] for rows in zip(*each, strict=True))
-        rest = _BeamAtRest(place[0, 0], angle, thickness)
-        parts.append(_element_states(stepped, element, given, rest))
-    return _joined(parts)
+    given, numbers = np.asarray(fractions, float), list(elements)
+    found = _states(at, numbers, given, _rest_of_designs(designs, at.network, numbers, given))
+    return BeamStates(*map(_in_a_row, found))
+
+
+def _in_a_row(values: Any) -> Any:
+    """Return values (..., m, k) of one element after the other, (..., m k)."""
+    if isinstance(values, DualArray):
+        return DualArray(_in_a_row(values.value), _in_a_row(values.every_slope))
+    return values.reshape(*values.shape[:-2], -1)
 
 
 class _BeamAtRest(NamedTuple):
-    """A beam at places of an element before any load, (k,) each, or (d, 1, k)."""
+    """Beams at k places of m elements before any load, (m, k) each."""
 
     place: Any
     angle: Any
     thickness: Any
 
 
-def _rest(net: Network, network: Discretisation, beam: str, element: int, given: FloatArray) -> _BeamAtRest:
-    """Return a beam at fractions of one element before any load."""
-    rule, e, fitted = basis(network.degree), network.elements, network.fits[beam]
-    _, _, through = _matrices(network.degree, tuple(given.tolist()))
-    left, right = e.cuts[element]
-    t, middle = left + (right - left) * given, 0.5 * (left + right)
-    known = left + (right - left) * rule.places
-    added = e.angle[element] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
-    place = fitted.arc(t)
-    thickness = net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(middle)))) + 0.0 * t
-    return _BeamAtRest(place, fitted.angle(t, middle) + 0.0 * t + through @ added, thickness)
-
-
-def _element_states(at: Equilibria, element: int, given: FloatArray, rest: _BeamAtRest) -> BeamStates:
-    """Return states at fractions (k,) of one element of one network, or of several designs."""
-    network, scales = at.network, at.network.scales
+def _rest(net: Network, network: Discretisation, elements: Sequence[int], given: FloatArray) -> _BeamAtRest:
+    """Return beams at fractions of elements before any load."""
     rule, e = basis(network.degree), network.elements
-    values, cumulated, _ = _matrices(network.degree, tuple(given.tolist()))
-    weight = e.weight[..., element, :]
-    speed, own = weight / rule.weights, at.z[..., e.unknowns[element]]
-    rotation = own[..., energy.rotation_columns(network.degree)]
-    load = energy.line_load(network, at.drive)[..., element, :]
-    fields = _fields(e, element, own, load, rotation @ rule.values.T)
-    first = weight * _bending_moment(e, element, rotation @ rule.slopes.T)
-    moment = -(first @ rule.slopes[:, 0] - (weight * fields.turning) @ rule.values[:, 0])[..., None]
-    turn = rotation @ values.T
-    if e.curl is None:
-        inside, stiff = integrals_to_points(network.degree), e.rigidity[..., element, :] * speed
-        for places, within in ((rule.places, inside), (given, cumulated)):
-            curvature = (moment - (fields.turning * speed) @ inside.T) / stiff
-            missed = rotation[..., 1] - rotation[..., 0] - curvature @ rule.weights
-            turn = rotation[..., :1] + curvature @ within.T + missed[..., None] * places
-            if within is inside:
-                fields = _fields(e, element, own, load, turn)
-    ahead = e.length[..., element, None] - speed @ cumulated.T
-    force = own[..., None, -2:] + load[..., None, :] * ahead[..., None]
-    start = poses(network.attachments, at.z, e.ends[element, :1]).place[..., 0, :]
+    through = _matrices(network.degree, tuple(given.tolist())).interpolation
+    rows = []
+    for element in elements:
+        beam, (left, right) = e.beam[element], e.cuts[element]
+        fitted, middle = network.fits[beam], 0.5 * (left + right)
+        t, known = left + (right - left) * given, left + (right - left) * rule.places
+        added = e.angle[element] - (fitted.angle(known, middle) + 0.0 * known)  # an imperfection
+        place = fitted.arc(t)
+        thickness = net.beams[beam].section.thickness_at(place, float(np.real(fitted.arc(middle)))) + 0.0 * t
+        rows.append((place, fitted.angle(t, middle) + 0.0 * t + through @ added, thickness))
+    return _BeamAtRest(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def _rest_of_designs(
+    designs: NetworkDesigns, network: Discretisation, elements: list[int], given: FloatArray
+) -> _BeamAtRest:
+    """Return beams at fractions of elements before any load with their derivatives, dual where they have some."""
+    template, names = designs.template, [designs.template.elements.beam[element] for element in elements]
+    if designs.each:
+        own = _rest(template.fits.network, template, elements, given)
+        each = [_rest(net, design_of(designs, d), elements, given) for d, (net, _) in enumerate(designs.networks)]
+        angle = np.imag([one.angle for one in each]) / COMPLEX_STEP
+        thickness = np.imag([one.thickness for one in each]) / COMPLEX_STEP
+        return _BeamAtRest(own.place, DualArray(own.angle, angle), DualArray(own.thickness, thickness))
+    # plain beams: their angle is a polynomial, their speed and thickness are even
+    cuts = template.elements.cuts[elements]
+    angle = network.elements.angle[elements] @ _matrices(template.degree, tuple(given.tolist())).interpolation.T
+    steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
+    first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
+    even = DualArray(first[:, None], np.imag(steps)[..., None] / COMPLEX_STEP)
+    return _BeamAtRest(cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * given, angle, even + 0.0 * given)
+
+
+def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamAtRest) -> BeamStates:
+    """Return states at k fractions of m elements, (p, m, k); dual if the equilibria are."""
+    network, scales, whole = at.network, at.network.scales, at.network.elements
+    rule, own = basis(network.degree), at.z[..., whole.unknowns[elements]]
+    tables = {name: getattr(whole, name) for name in ON_POINTS}
+    picked = {name: table[elements] for name, table in tables.items() if table is not None}
+    e = whole._replace(**picked, length=whole.length[elements])
+    load = energy.line_load(network, at.drive)[..., elements, :]
+    rotation, end = own[..., energy.rotation_columns(network.degree)], own[..., -2:]
+    speed, reached = e.weight / rule.weights, _matrices(network.degree, tuple(given.tolist()))
+    upto = reached.integrals.T
+    fields = _fields(e, end, load, rotation @ rule.values.T)
+    first = e.weight * bending(e, rotation @ rule.slopes.T).moment
+    moment = -(first @ rule.slopes[:, 0] - (e.weight * fields.turning) @ rule.values[:, 0])[..., None]
+    if e.curl is None:  # rotations from moments, and once more
+        inside = integrals_to_points(network.degree).T
+        curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
+        fields = _fields(e, end, load, rotation[..., :1] + curvature @ inside + missed * rule.places)
+        curvature, missed = _curvature(e, rotation, moment - (fields.turning * speed) @ inside)
+        turn = rotation[..., :1] + curvature @ upto + missed * given
+    else:
+        turn = rotation @ reached.values.T
+    ahead = e.length[..., None] - speed @ upto
+    start = poses(network.attachments, at.z, whole.ends[elements, 0]).place
     return BeamStates(
         rest.place,
-        (start[..., :1] + (fields.slope_x * speed) @ cumulated.T) * scales.length,
-        (start[..., 1:] + (fields.slope_y * speed) @ cumulated.T) * scales.length,
+        (start[..., :1] + (fields.slope_x * speed) @ upto) * scales.length,
+        (start[..., 1:] + (fields.slope_y * speed) @ upto) * scales.length,
         turn,
         rest.angle,
-        force[..., 0] * scales.force,
-        force[..., 1] * scales.force,
-        (moment - (fields.turning * speed) @ cumulated.T) * scales.moment,
+        (end[..., :1] + load[..., :1] * ahead) * scales.force,
+        (end[..., 1:] + load[..., 1:] * ahead) * scales.force,
+        (moment - (fields.turning * speed) @ upto) * scales.moment,
         rest.thickness,
     )
 
 
 class _Fields(NamedTuple):
-    """What is integrated along an element, at its Gauss points (..., q)."""
+    """What is integrated along elements, at their Gauss points (..., m, q)."""
 
     slope_x: Any  # dX/ds
     slope_y: Any
     turning: Any  # -dM/ds
 
 
-def _fields(e: BeamElements, element: int, own: Any, load: Any, turn: Any) -> _Fields:
-    """Return the fields of an element from the rotations at its Gauss points, (..., q)."""
-    angle, axial, shearing = (table[..., element, :] for table in (e.angle, e.axial, e.shear))
-    cos, sin = np.cos(angle + turn), np.sin(angle + turn)
-    h, v = (own[..., axis - 2, None] + load[..., axis, None] * e.ahead[..., element, :] for axis in (0, 1))
+def _fields(e: BeamElements, end: Any, load: Any, turn: Any) -> _Fields:
+    """Return the fields of elements from the forces on their ends (..., m, 2) and rotations at Gauss points."""
+    cos, sin = cos_sin(e.angle + turn)
+    h, v = (end[..., axis, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
     normal, shear = h * cos + v * sin, v * cos - h * sin
-    stretch, slip = 1 + axial * normal, shearing * shear
-    return _Fields(stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + (axial - shearing) * normal))
+    stretch, slip = 1 + e.axial * normal, e.shear * shear
+    return _Fields(stretch * cos - slip * sin, stretch * sin + slip * cos, shear * (1 + (e.axial - e.shear) * normal))
 
 
-def _bending_moment(e: BeamElements, element: int, curvature: Any) -> Any:
-    """Return the bending moment by the element's parameter at its Gauss points, (..., q)."""
-    if e.curl is None:
-        return e.rigidity[..., element, :] * curvature
-    one = {name: table[..., element, :] for name, table in e._asdict().items() if name in ("rigidity", *CURLING)}
-    return bending(e._replace(**one), curvature).moment
+def _curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
+    """Return the change of curvature by the parameter at Gauss points (..., q), and what it misses of the turn."""
+    rule = basis(rotation.shape[-1] - 1)
+    curvature = moment / (e.rigidity * e.weight / rule.weights)
+    return curvature, (rotation[..., 1] - rotation[..., 0] - curvature @ rule.weights)[..., None]
+
+
+class _Matrices(NamedTuple):
+    """What takes an element's unknowns and values at its Gauss points to k fractions of it."""
+
+    values: FloatArray  # (k, degree + 1) of the rotation
+    integrals: FloatArray  # (k, q) up to each
+    interpolation: FloatArray  # (k, q)
 
 
 @lru_cache(maxsize=64)
-def _matrices(degree: int, fractions: tuple[float, ...]) -> tuple[Any, Any, Any]:
-    """Return shape functions at fractions, integrals up to them and interpolation to them from the Gauss points."""
+def _matrices(degree: int, fractions: tuple[float, ...]) -> _Matrices:
     rule, ends = basis(degree), np.array(fractions)
-    return shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
+    return _Matrices(shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends))
 
 
 def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
@@ -234,11 +271,9 @@ def sections(net: Network, beam: str, found: BeamStates) -> BeamSections:
 
 
 def sections_of_width(width: Any, found: BeamStates) -> BeamSections:
-    """Return section forces and stresses from states of a beam of a width [m], or of designs with widths (d, 1, 1)."""
-    angle = found.angle + found.turn
-    cos, sin = np.cos(angle), np.sin(angle)
+    """Return section forces and stresses from states of a beam of a width [m], or of widths at all places."""
+    cos, sin = cos_sin(found.angle + found.turn)
     normal, shear = found.h * cos + found.v * sin, found.v * cos - found.h * sin
     area = width * found.thickness
     bending = 6 * found.moment / (area * found.thickness)
-    place = np.broadcast_to(found.place, found.moment.shape)
-    return BeamSections(place, found.moment, normal, shear, bending, normal / area)
+    return BeamSections(found.place + 0.0 * found.moment, found.moment, normal, shear, bending, normal / area)

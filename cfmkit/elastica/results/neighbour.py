@@ -14,11 +14,11 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
 from cfmkit.elastica.mechanics.discretise import discretise_alike
-from cfmkit.elastica.mechanics.equations import COMPLEX_STEP
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.path import PathStatus
 from cfmkit.errors import InputError
+from cfmkit.numerics.dual_array import COMPLEX_STEP
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

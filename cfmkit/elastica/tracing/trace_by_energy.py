@@ -40,7 +40,7 @@ DEGREE_OF_PIECES = 14  # where beams are cut
 DEGREE_OF_LAYERS = 10  # at least, where taut ones are
 MAX_PIECES = 4
 MAX_ROUNDS = 8
-FEW_BEAMS = {1: 4, 2: 2, 3: 2}  # degrees more to begin with
+FEW_BEAMS = {1: 4, 2: 2, 3: 2, 4: 2, 5: 2}  # degrees more to begin with
 SLOWEST_FALL = 0.9  # of coefficients from one degree to the next that a forecast is made from
 MAX_RAISED_ERROR, MAX_RAISED_MOTION = 1e-2, 0.05
 """Error of a path, and motion of its points, up to which it is raised to a higher degree as it is."""
@@ -143,7 +143,8 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             continue
         finer = _finer(path)
         attempt = _with_error(attempt, finer)
-        if tolerance < attempt.path.error < NEARLY * tolerance:
+        raised = mesh.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
+        if tolerance < attempt.path.error < NEARLY * tolerance and not raised:
             attempt = _with_error(attempt._replace(path=polish(path)), finer)
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
@@ -197,8 +198,8 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
 
     None if it is another path then.
     """
-    path, start, span = attempt.path, attempt.start, _span(attempt.path)
-    if path.status is not PathStatus.COMPLETE or start.events or not path.error < MAX_RAISED_ERROR or not span:
+    path, start = attempt.path, attempt.start
+    if not _can_be_raised(attempt):
         return None
     fine = raise_degree(path.network, mesh.degree)
     problem = replace(start.problem, network=fine)
@@ -223,6 +224,12 @@ def raise_attempt(attempt: TraceAttempt, mesh: DegreeAndPieces, control: Control
     lifted = tuple(_lift(event, drive, path.network, fine) for event, drive in zip(attempt.events, drives, strict=True))
     started = start._replace(problem=problem)
     return attempt._replace(path=raised, mesh=mesh, start=started, branches=branches, events=lifted)
+
+
+def _can_be_raised(attempt: TraceAttempt) -> bool:
+    path = attempt.path
+    complete = path.status is PathStatus.COMPLETE and not attempt.start.events
+    return complete and path.error < MAX_RAISED_ERROR and _span(path) > 0
 
 
 def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
@@ -312,7 +319,8 @@ def trace_on(
     while ending.end is WhyStopped.COMPLETE and points and points[-1].target < 0:
         points.pop()
     status, message = _explain(start, ending, unit)
-    points = [_at_event(point, events, drive, unit) for point in points]
+    if events:
+        points = [_at_event(point, events, drive, unit) for point in points]
     told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
     path = _without_locked_points(_path(network, drive, start, points, told, status, message))
     branches = tuple(point.branch for point in points[: len(path)])

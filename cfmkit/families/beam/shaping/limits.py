@@ -16,7 +16,6 @@ import numpy as np
 
 from cfmkit.designing.objective_and_constraints import LimitRows
 from cfmkit.families.beam.network_from_spec import thickest_of
-from cfmkit.families.beam.shaping.response import Spots
 from cfmkit.numerics.sampled_extremes import largest, largest_of_three, soft_least
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.families.beam.shaping.response import SlopesAtSpots, View
+    from cfmkit.families.beam.shaping.response import View
 
 
 SIDES = {
@@ -38,23 +37,20 @@ SIDES = {
 
 @dataclass(frozen=True)
 class PendingRows:
-    """Rows of one limit whose derivatives are computed later, those of all limits at once.
+    """Rows of one limit whose derivatives are computed when they are needed.
 
     Attributes
     ----------
     name, values, about
         As of `LimitRows`.
     slopes : callable
-        From the derivatives of the state at the spots to those of the rows, (m, k).
-    spots : tuple of Spots
-        Where those of the state are needed.
+        Returns the derivatives of the rows, (m, k).
     """
 
     name: str
     values: FloatArray
-    slopes: Callable[[SlopesAtSpots], FloatArray]
+    slopes: Callable[[], FloatArray]
     about: Callable[[], list[str]]
-    spots: tuple[Spots, ...] = ()
 
 
 def rows_of(view: View) -> list[LimitRows]:
@@ -64,10 +60,8 @@ def rows_of(view: View) -> list[LimitRows]:
         pending = view.kept["limits"] = [rows for make in LIMITS.values() for rows in make(view)]
     if not view.sloped:
         return [LimitRows(one.name, one.values.ravel(), None, one.about) for one in pending]
-    found = view.response.slopes_at(spots for one in pending for spots in one.spots)
     return [
-        LimitRows(one.name, one.values.ravel(), one.slopes(found).reshape(one.values.size, -1), one.about)
-        for one in pending
+        LimitRows(one.name, one.values.ravel(), one.slopes().reshape(one.values.size, -1), one.about) for one in pending
     ]
 
 
@@ -111,11 +105,11 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
     share = (weights * np.array([-1.0, 1.0])[:, None, None] / unit)[near]
     rows = np.stack([at.index[which] for at, which in zip(view.response.rows.values(), three, strict=True)])[near]
     pose = np.broadcast_to(poses, near.shape)[near]
-    spots = Spots(np.repeat(pose, 3), rows.ravel())
 
-    def slopes(found: SlopesAtSpots) -> FloatArray:
+    def slopes() -> FloatArray:
         out = np.zeros((*values.shape, len(view.response.x)))
-        out[near] = (share[:, :, None] * found.of(what, spots).reshape(*rows.shape, out.shape[-1])).sum(axis=1)
+        at_three = view.response.slopes_at(what, pose[:, None], rows)
+        out[near] = (share[:, :, None] * at_three).sum(axis=1)
         return out
 
     sides = SIDES[what]
@@ -124,7 +118,7 @@ def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float,
         at = view.poses.at[which]
         return [f"{beam}, {side}, at {1e3 * pose:.4g} mm" for beam in lines for side in sides for pose in at]
 
-    return PendingRows(name, values, slopes, about, (spots,))
+    return PendingRows(name, values, slopes, about)
 
 
 def _highest(places: list[FloatArray], values: list[FloatArray]) -> tuple[FloatArray, Any, FloatArray]:
@@ -146,7 +140,7 @@ def length_ratio(view: View) -> list[PendingRows]:
     many = {name: one for name, one in view.lengths.items() if name in task.shaped}
     values = np.array([one.straightness - least for one in many.values()])
     slopes = np.array([one.by_straightness for one in many.values()])
-    return [PendingRows("max_length_ratio", values, lambda _: slopes, lambda: list(many))]
+    return [PendingRows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
 
 
 def slenderness(view: View) -> list[PendingRows]:
@@ -158,7 +152,7 @@ def slenderness(view: View) -> list[PendingRows]:
     least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
     values = np.array([one.length for one in many.values()]) / least - 1.0
     slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
-    return [PendingRows("min_slenderness", values, lambda _: slopes, lambda: list(many))]
+    return [PendingRows("min_slenderness", values, lambda: slopes, lambda: list(many))]
 
 
 def radius(view: View) -> list[PendingRows]:
@@ -180,7 +174,7 @@ def radius(view: View) -> list[PendingRows]:
             slopes[first : first + variables.order] -= sign * least / one.length * (weights @ powers)
             values = np.atleast_1d(1.0 - least * value / one.length)
             found.append(
-                PendingRows("min_radius", values, lambda _, slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
+                PendingRows("min_radius", values, lambda slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
             )
     return found
 
@@ -207,7 +201,7 @@ def force(view: View) -> list[PendingRows]:
     if not rows:
         return []
 
-    def slopes(_: SlopesAtSpots) -> FloatArray:
+    def slopes() -> FloatArray:
         return np.outer([factor for _, factor, _ in rows], weights @ view.response.force_slopes)
 
     values = np.array([value for value, _, _ in rows])
@@ -277,15 +271,15 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
     share = np.where((soft - 1.0 < view.near)[..., None] & (weights > _NO_WEIGHT), weights, 0.0)
     at = p, q, i, j = np.nonzero(share.reshape(ratio.shape))
     pull = share.reshape(ratio.shape)[at] / required[p, i, j]
-    rows = (np.stack([one.row for one in side])[p, k] for side, k in ((first, i), (second, j)))
-    spots = tuple(Spots(shown[q], row) for row in rows)
+    rows = tuple(np.stack([one.row for one in side])[p, k] for side, k in ((first, i), (second, j)))
 
-    def slopes(found: SlopesAtSpots) -> FloatArray:
+    def slopes() -> FloatArray:
         push = np.where(near[p, i, j], opening * pull * ratio[at], 0.0)
         by = -push[:, None] * slopes_of_ways(ways, p, i, j)
         for axis, apart in (("x", dx), ("y", dy)):
             along = (apart[at] / distance[at] * pull)[:, None]
-            by += along * (found.of(axis, spots[0]) - found.of(axis, spots[1]))
+            one, other = (view.response.slopes_at(axis, shown[q], row) for row in rows)
+            by += along * (one - other)
         out = np.zeros((*soft.shape, len(view.response.x)))
         np.add.at(out, (p, q), by)
         return out
@@ -294,7 +288,7 @@ def separations(view: View, couples: list[Pair]) -> PendingRows:
         names = [" and ".join(dict.fromkeys(pair.beams)) for pair in couples]
         return [f"{both}, at {1e3 * at:.4g} mm" for both in names for at in view.poses.at[shown]]
 
-    return PendingRows("clearance", soft - 1.0, slopes, about, spots)
+    return PendingRows("clearance", soft - 1.0, slopes, about)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ leaves the band between two poses: that is seen at many more poses, where a desi
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from cfmkit.families.beam.shaping.variables import Length, has_vanished_beam, le
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path, Section
@@ -84,6 +84,12 @@ _PLACES = 24
 CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
 
 
+@cache
+def _fractions(elements: int) -> FloatArray:
+    """Return the places on each element of a beam of so many."""
+    return read_only(np.linspace(0.0, 1.0, -(-_PLACES // elements) + 1))
+
+
 class NoAnswer(Exception):
     """The engine has no derivatives here."""
 
@@ -139,14 +145,11 @@ class RowsOfBeam:
     ----------
     place : (r,) array
         Fraction of the arc length.
-    fractions : (n,) array
-        The same places on each of its elements.
     row, index : (r,) array
         Which of the beam's rows, and of all rows, they are.
     """
 
     place: FloatArray
-    fractions: FloatArray
     row: Any
     index: Any
 
@@ -175,19 +178,35 @@ class Response:
         found, first = {}, 0
         for name, states in self.states.items():
             once = np.flatnonzero(np.append(True, np.diff(states.place) > 0))
-            found[name] = RowsOfBeam(states.place[once], self._fractions(name), once, first + once)
+            found[name] = RowsOfBeam(states.place[once], once, first + once)
             first += len(states.place)
         return found
 
-    def _fractions(self, beam: str) -> FloatArray:
-        elements = len(beam_states.elements_of(self.path.network, beam))
-        return np.linspace(0.0, 1.0, -(-_PLACES // elements) + 1)
+    @cached_property
+    def _alike(self) -> list[dict[str, list[int]]]:
+        """Elements of each beam; those that are cut into as many elements together."""
+        network = self.path.network
+        elements = {name: beam_states.elements_of(network, name) for name in network.fits}
+        counts = sorted({len(own) for own in elements.values()})
+        return [{name: own for name, own in elements.items() if len(own) == count} for count in counts]
+
+    def _along_beams(self, compute: Callable[[list[int], FloatArray], Any]) -> dict[str, Any]:
+        """Return columns (p, r) or (r,) for each beam, computed for elements and fractions of them."""
+        found = {}
+        for alike in self._alike:
+            elements = [k for own in alike.values() for k in own]
+            together = compute(elements, _fractions(len(elements) // len(alike)))
+            width = together[0].shape[-1] // len(alike)
+            for k, name in enumerate(alike):
+                own = slice(k * width, (k + 1) * width)
+                found[name] = type(together)(*(part[..., own] for part in together))
+        return {name: found[name] for name in self.path.net.beams}
 
     @cached_property
     def states(self) -> dict[str, beam_states.BeamStates]:
         """States at all rows of every beam at the poses."""
         path = self.path.take(self.keep)
-        return {name: beam_states.states(path.net, path.at, name, self._fractions(name)) for name in path.net.beams}
+        return self._along_beams(lambda elements, places: beam_states.states_on(path.net, path.at, elements, places))
 
     @cached_property
     def state(self) -> NetworkAtPoses:
@@ -221,61 +240,30 @@ class Response:
         """
         return self._gradient.effort * self.variables.task.copies
 
-    def slopes_at(self, spots: Iterable[Spots]) -> SlopesAtSpots:
-        """Return the derivatives of the state at some spots.
+    @cached_property
+    def slopes(self) -> dict[str, FloatArray]:
+        """Derivatives (k, p, r) of x, y, stress, and of the stress on the left and right, at all rows of the sampling.
 
         Raises
         ------
         NoAnswer
             Where the engine has none.
         """
-        if any(len(one.row) for one in spots):
-            _ = self._gradient
-        return SlopesAtSpots(self)
+        known = self._gradient
+        states, sections = (self._along_beams(one).values() for one in (known.dual_states, known.dual_sections))
+        x, y = (np.concatenate([getattr(one, name).every_slope for one in states], axis=-1) for name in ("x", "y"))
+        bending, axial = (
+            np.concatenate([getattr(one, name).every_slope for one in sections], axis=-1)
+            for name in ("bending_stress", "axial_stress")
+        )
+        return {"x": x, "y": y, "stress": bending, "left": axial + bending, "right": axial - bending}
 
-    def slopes_along(self, beam: str) -> tuple[FloatArray, ...]:
-        """Return the derivatives of x, y, bending and axial stress at all rows of a beam, (p, r, k) each."""
-        known = self._slopes.get(beam)
-        if known is None:
-            fractions = self._fractions(beam)
-            states, sections = self._gradient.states(beam, fractions), self._gradient.sections(beam, fractions)
-            known = states.x, states.y, sections.bending_stress, sections.axial_stress
-            self._slopes[beam] = known
-        return known
-
-    @cached_property
-    def _slopes(self) -> dict[str, tuple[FloatArray, ...]]:
-        return {}
-
-
-@dataclass(frozen=True)
-class Spots:
-    """Places along beams, each at a pose: indices (n,) of poses, and of all rows of the sampling."""
-
-    pose: Any
-    row: Any
-
-
-@dataclass(frozen=True, eq=False)
-class SlopesAtSpots:
-    """Derivatives of the state by the variables at spots on some beams."""
-
-    response: Response
-
-    def of(self, what: str, spots: Spots) -> FloatArray:
-        """Return the derivatives (n, k) of x, y, stress, or of the stress on the left or right (see `BeamAtPoses`)."""
-        found = np.empty((len(spots.row), len(self.response.x)))
-        first = 0
-        for name, states in self.response.states.items():
-            here = np.flatnonzero((spots.row >= first) & (spots.row < first + len(states.place)))
-            if len(here):
-                x, y, bending, axial = (
-                    part[spots.pose[here], spots.row[here] - first] for part in self.response.slopes_along(name)
-                )
-                by = {"x": x, "y": y, "stress": bending, "left": axial + bending, "right": axial - bending}
-                found[here] = by[what]
-            first += len(states.place)
-        return found
+    def slopes_at(self, what: str, pose: Any, row: Any) -> FloatArray:
+        """Return the derivatives (..., k) of one of `slopes` at poses and rows of the sampling, (...) each."""
+        shape = np.broadcast_shapes(np.shape(pose), np.shape(row))
+        if 0 in shape:
+            return np.empty((*shape, len(self.x)))
+        return np.asarray(np.moveaxis(self.slopes[what][:, pose, row], 0, -1))
 
 
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
