@@ -96,13 +96,10 @@ class Gradient:
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
-        own, free = equations(self.path.network), self.path.free[self.points]
-        states = [own.solve(y, drive) for y, drive in zip(free, self.at.drive.tolist(), strict=True)]
-        found = [np.full(own.n, np.nan) if state is None else state.rate for state in states]
-        rates = np.array(found).reshape(free.shape)
-        if not np.isfinite(rates).all():
+        found = equations(self.path.network).solve_each(self.path.free[self.points], self.at.drive)
+        if not (found.converged.all() and np.isfinite(found.rate).all()):
             raise InputError(SINGULAR)
-        return rates
+        return found.rate
 
     @property
     def motion(self) -> Mapping[str, FloatArray]:
