@@ -14,7 +14,7 @@ from cfmkit.elastica import (
     gradient,
     trace,
 )
-from cfmkit.elastica.mechanics.equations import NumpyEquations
+from cfmkit.elastica.mechanics.equations import NumpyEquations, SolvedStates
 from cfmkit.elastica.mechanics.march import CompiledEquations
 from cfmkit.errors import InputError
 
@@ -64,10 +64,16 @@ def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3])), Control(tolerance=1e-5))
     found = gradient(path, lan, LAN)
     for kind in (NumpyEquations, CompiledEquations):
-        monkeypatch.setattr(kind, "solve", lambda *_: None)
+        monkeypatch.setattr(kind, "solve_each", nowhere)
         monkeypatch.setattr(kind, "resolve", singular)
     with pytest.raises(InputError, match="singular"):
         getattr(found, output)
+
+
+def nowhere(_: Any, free: Any, way: Any) -> SolvedStates:
+    """Return what is told where Newton's method does not converge."""
+    unknown = np.full(free.shape, np.nan)
+    return SolvedStates(np.zeros(len(way), bool), unknown, unknown, np.zeros(len(way), int), unknown[:, 0])
 
 
 def singular(*_: Any) -> None:

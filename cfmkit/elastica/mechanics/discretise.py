@@ -115,6 +115,14 @@ class Discretisation:
         return {name: value for name, value in self.__dict__.items() if name != "known"}
 
     @property
+    def cuts(self) -> dict[str, list[float]]:
+        """Parameters between which the elements of each beam lie, ascending."""
+        cuts = {name: [0.0] for name in self.fits}
+        for name, (_, end) in zip(self.elements.beam, self.elements.cuts.tolist(), strict=True):
+            cuts[name].append(end)
+        return cuts
+
+    @property
     def n_motions(self) -> int:
         """Number of unknowns that are motions; forces come behind them."""
         return self.size - 2 * len(self.elements.length)
@@ -128,6 +136,7 @@ def discretise(
     tension: Mapping[str, float] | None = None,
     scales: MechanicsUnits | None = None,
     fits: BeamFits | None = None,
+    cuts: Mapping[str, list[float]] | None = None,
 ) -> Discretisation:
     """Return the arrays of a network under a drive.
 
@@ -145,6 +154,8 @@ def discretise(
         Units; found from the beams unless given.
     fits : BeamFits, optional
         Those of the same network, if it was set up before.
+    cuts : mapping, optional
+        Parameters between which the elements of each beam lie; found from degree, pieces and tension unless given.
 
     Raises
     ------
@@ -152,7 +163,7 @@ def discretise(
         If the driven node cannot move along the drive, or beams with offsets hang at a node that is pinned to an arm.
     """
     fits = fits or BeamFits(network)
-    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build()
+    return _ArrayBuilder(network, drive, degree, pieces, tension or {}, scales, fits).build(cuts)
 
 
 class _ArrayBuilder:
@@ -174,10 +185,10 @@ class _ArrayBuilder:
         self.turns = {name: body[2] for name, body in self.bodies.items()}
         self.own = {name: self._own_place(name) for name in network.nodes}
 
-    def build(self) -> Discretisation:
+    def build(self, given_cuts: Mapping[str, list[float]] | None) -> Discretisation:
         """Return the arrays."""
         beams = self.network.beams
-        cuts = {name: self._cuts(name, beam) for name, beam in beams.items()}
+        cuts = given_cuts or {name: self._cuts(name, beam) for name, beam in beams.items()}
         tables = element_tables(self.fits, self.scales, self.degree, cuts)
         ends = np.array([pair for name, beam in beams.items() for pair in self._beam(beam, cuts[name], tables)])
         springs = tuple(Attached(spring, self._spring_places(spring)) for spring in self.network.springs)
@@ -423,5 +434,7 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
 
 def discretise_alike(template: Discretisation, network: Network, drive: Drive) -> Discretisation:
     """Return the arrays of another network of the same make-up: degree, cuts, floors and units of the template's."""
-    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales)
+    found = discretise(
+        network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=template.cuts
+    )
     return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

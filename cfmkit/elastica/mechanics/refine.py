@@ -18,10 +18,7 @@ def raise_degree(network: Discretisation, degree: int) -> Discretisation:
     if degree == network.degree:
         return network
     e = network.elements
-    cuts = {name: [0.0] for name in network.fits}
-    for name, (_, end) in zip(e.beam, e.cuts.tolist(), strict=True):
-        cuts[name].append(end)
-    tables = element_tables(network.fits, network.scales, degree, cuts)
+    tables = element_tables(network.fits, network.scales, degree, network.cuts)
     stretches = {name: beam.section.axial for name, beam in network.fits.network.beams.items()}
     floors = np.where([stretches[name] for name in e.beam], 0.0, e.axial[:, 0])
     if floors.any():
