@@ -382,12 +382,14 @@ class Spec(Model):
         Values may be SI numbers or text with a unit (``"190 mm"``). `as_made`: the values are those of one manufactured
         part, which need not agree with each other as stated ones do: a spring's rate is not exactly that of its wire.
 
+        Blocks in which nothing changes are not validated again: they come to validators that run before as they are.
+
         Raises
         ------
         cfmkit.errors.SpecError
             If the changed specification is not valid.
         """
-        data = self.model_dump(exclude_unset=True) | {"family": self.family}
+        data = self.given | {"family": self.family}
         for path, value in changes.items():
             data = _with(data, path.split("."), value, path)
         try:
@@ -395,7 +397,10 @@ class Spec(Model):
         except ValidationError as error:
             from cfmkit.specs.yamlio import spec_error
 
-            raise spec_error(error, type(self), data) from None
+            whole = self.model_dump(exclude_unset=True) | {"family": self.family}
+            for path, value in changes.items():
+                whole = _with(whole, path.split("."), value, path)
+            raise spec_error(error, type(self), whole) from None
 
     def leaves(self) -> Iterator[tuple[str, float | int]]:
         """Yield every numeric leaf of the mechanism and its analysis as (dotted path, SI value)."""
@@ -442,6 +447,8 @@ def _with(data: Any, parts: list[str], value: Any, path: str) -> Any:
         items = list(data)
         items[int(head)] = _with(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
+    if isinstance(data, Model):
+        data = data.given
     if data is not None and not isinstance(data, Mapping):
         raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})

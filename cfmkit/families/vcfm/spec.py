@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
 from cfmkit.metrics.fatigue_and_relaxation import Durability
+from cfmkit.specs.block import keys_of
 from cfmkit.specs.spec import (
     Analysis,
     DesignBlock,
@@ -164,8 +165,8 @@ class Mechanism(CutLeaves, Model):
     @model_validator(mode="before")
     @classmethod
     def _allowable_stress_is_given_once(cls, data: Any) -> Any:
-        block = data if isinstance(data, Mapping) else {}
-        old = block["material"].get("allowable_stress") if isinstance(block.get("material"), Mapping) else None
+        block = keys_of(data)
+        old = keys_of(block.get("material")).get("allowable_stress")
         if old is not None and block.get("safety_factor") not in (None, 1):
             reported = "is deprecated and has no effect beside 'safety_factor': give 'yield_strength' instead"
             refuse("Mechanism", {("material", "allowable_stress"): reported})
@@ -347,12 +348,12 @@ class VcfmSpec(Spec):
     @classmethod
     def _hybrid_leaves_are_exact(cls, data: Any) -> Any:
         """Choose the exact model for hybrid leaves unless another is named: no law has flexures that buckle."""
-        match data:
-            case {"mechanism": {"bistable": {"structure": "hybrid"}}, "analysis": Mapping() | None as analysis}:
-                return dict(data) | {"analysis": {"fidelity": "exact"} | dict(analysis or {})}
-            case {"mechanism": {"bistable": {"structure": "hybrid"}}} if "analysis" not in data:
-                return dict(data) | {"analysis": {"fidelity": "exact"}}
-        return data
+        whole = keys_of(data)
+        structure = keys_of(keys_of(whole.get("mechanism")).get("bistable")).get("structure")
+        analysis = whole.get("analysis")
+        if structure != "hybrid" or not (analysis is None or isinstance(analysis, Mapping | Model)):
+            return data
+        return dict(whole) | {"analysis": {"fidelity": "exact"} | dict(keys_of(analysis))}
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:

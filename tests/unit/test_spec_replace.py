@@ -1,0 +1,57 @@
+"""`Spec.replace` validates only what changes: the outcome is that of the whole file with the change in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from cfmkit import SpecError
+from cfmkit.api import load
+from cfmkit.specs.spec import Spec, _with
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+FILES = sorted({*CONFIGS.glob("*.yaml"), *CONFIGS.glob("studies/*.yaml")} - {CONFIGS / "studies" / "figure.yaml"})
+SWITCHES = [
+    ("mechanism.bistable.structure", "hybrid"),
+    ("mechanism.safety_factor", 2.0),
+    ("analysis.fidelity", "exact"),
+    ("analysis.points", 33),
+    ("requirements", ()),
+    ("mechanism.width", "11 mm"),
+]
+
+
+def replaced_whole(spec: Spec, path: str, value: Any) -> Spec | None:
+    """Return the specification read from everything that was given, changed at a path; None if it is invalid."""
+    data = _with(spec.model_dump(exclude_unset=True) | {"family": spec.family}, path.split("."), value, path)
+    try:
+        return type(spec).model_validate(data, context={"as_made": False})
+    except ValidationError:
+        return None
+
+
+def replaced(spec: Spec, path: str, value: Any) -> Spec | None:
+    try:
+        return spec.replace({path: value})
+    except SpecError:
+        return None
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_replaced_value_gives_what_the_whole_file_with_it_gives(file: Path) -> None:
+    """Every number of the mechanism and the analysis in turn, and switches that other blocks depend on."""
+    spec = load(file)
+    given = {path: value for path, value in spec.leaves() if isinstance(value, float)}
+    changes = [(path, 1.01 * value + 1e-4) for path, value in list(given.items())[::3]]
+    for path, value in [*changes, *SWITCHES]:
+        try:
+            whole = replaced_whole(spec, path, value)
+        except KeyError:
+            continue
+        own = replaced(spec, path, value)
+        assert own == whole, path
+        if own is not None and whole is not None:
+            assert own.model_dump(exclude_unset=True) == whole.model_dump(exclude_unset=True), path
