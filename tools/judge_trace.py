@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from network_cases import differences, from_json, pick, read_cases
 
-from cfmkit.elastica.tracing.trace_by_energy import trace
+from cfmkit.elastica.tracing.trace import trace
 
 LEVELS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 

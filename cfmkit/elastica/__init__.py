@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.results.path import EquilibriumPath as Path
     from cfmkit.elastica.results.path import Event, PathStatus
     from cfmkit.elastica.sensitivity import Gradient, gradient
-    from cfmkit.elastica.tracing.trace_by_energy import trace
+    from cfmkit.elastica.tracing.trace import trace
     from cfmkit.elastica.tracing.trace_many import NetworkOutcome, trace_many
 
 _HOMES = {
@@ -64,7 +64,7 @@ _HOMES = {
     "results.curling_stiffening": ("HinderedCurling", "hindered_curling"),
     "sensitivity": ("Gradient", "gradient"),
     "results.path": ("Event", "Path", "PathStatus"),
-    "tracing.trace_by_energy": ("trace",),
+    "tracing.trace": ("trace",),
     "tracing.trace_many": ("NetworkOutcome", "trace_many"),
 }
 _HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import cfmkit.elastica.tracing.trace as tracing
 from cfmkit.elastica import (
     CLAMPED,
     PINNED,
@@ -20,7 +21,6 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.tracing import trace_by_energy
 
 DOWN = -np.pi / 2
 BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))
@@ -39,8 +39,8 @@ def strip() -> Network:
 
 def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a path of one degree that is too low for the tolerance."""
-    monkeypatch.setattr(trace_by_energy, "MAX_ROUNDS", 1)
-    monkeypatch.setattr(trace_by_energy, "_first_degree", lambda *_: 5)
+    monkeypatch.setattr(tracing, "MAX_ROUNDS", 1)
+    monkeypatch.setattr(tracing, "_first_degree", lambda *_: 5)
     return trace(strip(), BENDING, Control(tolerance=1e-10))
 
 

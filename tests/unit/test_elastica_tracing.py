@@ -25,7 +25,7 @@ from cfmkit.elastica import (
     Section,
     guided,
 )
-from cfmkit.elastica.tracing.trace_by_energy import DegreeAndPieces, raise_attempt, trace, trace_on
+from cfmkit.elastica.tracing.trace import DegreeAndPieces, raise_attempt, trace, trace_on
 from cfmkit.elastica.vibration import frequencies
 
 if TYPE_CHECKING:

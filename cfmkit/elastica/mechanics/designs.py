@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
-from cfmkit.elastica.mechanics.polynomials import basis
-from cfmkit.elastica.model.beam import GAUSS
+from cfmkit.elastica.mechanics.element_tables import plain_tables
 from cfmkit.elastica.model.network import PointLoad, SlideSpring
-from cfmkit.elastica.model.plain_beams_at_once import is_plain, powers
-from cfmkit.elastica.model.shapes import direction
+from cfmkit.elastica.model.plain_beams_at_once import between, chords, coefficients_of, is_plain, rigidities_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -95,7 +93,7 @@ def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: S
 def _plain(
     template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]
 ) -> NetworkDesigns:
-    scales, rule, e = template.scales, basis(template.degree), template.elements
+    scales, e = template.scales, template.elements
     names = list(template.nodes)
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
@@ -107,27 +105,19 @@ def _plain(
     arm[:, inside] = 0.0
     place = spots[:, master]
     reach = (place + arm)[:, ends[:, 1]] - (place + arm)[:, ends[:, 0]]
-    coefficients = _coefficients(beams)
-    (rotation, length), sections = _fitted(coefficients, reach), _sections(beams, scales)
-    width = e.cuts[:, 1:] - e.cuts[:, :1]
-    powers_of_t = (e.cuts[:, :1] + width * rule.places)[..., None] ** np.arange(coefficients.shape[-1])
-    angle = np.einsum("dem,eqm->deq", coefficients[:, row], powers_of_t) + rotation[:, row, None]
-    speed, ones = length[:, row, None] * width, np.ones(len(rule.places))
-    bending, axial, shear = (values[:, row, None] for values in sections)
-    floor = e.axial - _own_axial(origin, scales)[row, None]
-    tables = {
-        "angle": angle,
-        "weight": speed * rule.weights,
-        "rigidity": bending / speed**2 * ones,
-        "axial": axial + floor,
-        "shear": shear * ones,
-        "ahead": speed * (1 - rule.places),
-        "length": speed[..., 0],
-    }
+    every = [beam for each in beams for beam in each]
+    shape = len(beams), len(beams[0])
+    coefficients = coefficients_of(every).reshape(*shape, -1)
+    rotation, length = between(*chords(coefficients), reach)
+    turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
+    rigidities = rigidities_of(every).reshape(3, *shape)
+    tables = plain_tables(turned, length * scales.length, rigidities, scales, template.degree, row, e.cuts)
+    tables["axial"] = tables["axial"] + template.floor[:, None]
     if inside.size:  # bodies between the elements of a beam
-        chords = np.stack([(tables["weight"] * turn(angle)).sum(axis=-1) for turn in (np.cos, np.sin)], axis=-1)
+        steps = [(tables["weight"] * turn(tables["angle"])).sum(axis=-1) for turn in (np.cos, np.sin)]
+        ahead = np.stack(steps, axis=-1)
         for k in np.flatnonzero(e.cuts[:, 1] < 1.0):
-            place[:, e.ends[k, 1]] = (place + arm)[:, e.ends[k, 0]] + chords[:, k]
+            place[:, e.ends[k, 1]] = (place + arm)[:, e.ends[k, 0]] + ahead[:, k]
     frames, base = _supports(template, origin, pairs, [names[k] for k in master])
     if frames is not None:
         frames[:, inside] = template.attachments.frame[inside]
@@ -159,42 +149,6 @@ def _whose(origin: tuple[Network, Drive], names: list[str], inside: Any, ends: A
     number = {name: k for k, name in enumerate(names)}
     node = np.array([number[name] for name in at])
     return node, np.array([number[network.master_of(name)] for name in at])
-
-
-def _coefficients(beams: list[list[Any]]) -> Any:
-    """Return the coefficients of the angles, (d, b, m)."""
-    given = [[beam.shape.coefficients or (0.0,) for beam in each] for each in beams]
-    most = max(len(own) for each in given for own in each)
-    return np.array([[(*own, *(0.0,) * (most - len(own))) for own in each] for each in given])
-
-
-def _fitted(coefficients: Any, reach: Any) -> tuple[Any, Any]:
-    """Return rotations and lengths of shapes between their ends, as `Bundle` has them, (d, b)."""
-    angle = coefficients @ powers(coefficients.shape[-1])
-    cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
-    dx, dy = reach[..., 0], reach[..., 1]
-    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
-    return rotation, np.sqrt((dx * dx + dy * dy) / (cx * cx + cy * cy))
-
-
-def _sections(beams: list[list[Any]], scales: Any) -> tuple[Any, Any, Any]:
-    """Return EI, 1/EA and 1/GA, dimensionless, (d, b)."""
-    values = [
-        [
-            (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
-            for s in (beam.section for beam in each)
-        ]
-        for each in beams
-    ]
-    modulus, width, thickness, axial, shear, poisson, factor = np.moveaxis(np.array(values), -1, 0)
-    pull = modulus * width * thickness
-    slip = shear * 2 * (1 + poisson) / (factor * pull)
-    rigidity = scales.force * scales.length**2
-    return pull * thickness**2 / 12 / rigidity, axial / pull * scales.force, slip * scales.force
-
-
-def _own_axial(origin: tuple[Network, Drive], scales: Any) -> Any:
-    return np.real(_sections([list(origin[0].beams.values())], scales)[1][0])
 
 
 def _supports(

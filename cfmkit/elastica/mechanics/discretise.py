@@ -115,6 +115,12 @@ class Discretisation:
         return {name: value for name, value in self.__dict__.items() if name != "known"}
 
     @property
+    def floor(self) -> FloatArray:
+        """1/EA of the elements of beams that do not stretch, (e,): what is left of their floors."""
+        stretches = {name: beam.section.axial for name, beam in self.fits.network.beams.items()}
+        return np.asarray(np.where([stretches[name] for name in self.elements.beam], 0.0, self.elements.axial[:, 0]))
+
+    @property
     def cuts(self) -> dict[str, list[float]]:
         """Parameters between which the elements of each beam lie, ascending."""
         cuts = {name: [0.0] for name in self.fits}

@@ -1,7 +1,7 @@
 """What elements are at their Gauss points: angle, rigidity, compliances, arc length; dimensionless, (e, q) each.
 
-Most beams have a polynomial angle and one thickness and are one element: their tables are made together. The others'
-are made for all elements of a smooth part at once.
+Most beams have a polynomial angle and one thickness: their tables are made together. The others' are made for all
+elements of a smooth part at once.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, powers_at_points, slopes_at_points
+from cfmkit.elastica.mechanics.polynomials import basis, integrals_to_points, slopes_at_points
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.units import MechanicsUnits
     from cfmkit.elastica.model.beam import Beam, Fit
     from cfmkit.elastica.model.beam_fits import BeamFits
-    from cfmkit.elastica.model.plain_beams_at_once import Bundle
 
 SAME_PLACE = 1e-12  # parameters of a shape that differ by less are one
 
@@ -41,34 +41,56 @@ def element_tables(
     cuts : mapping
         Parameters of a beam's shape between which its elements lie, ascending, by the beam's name.
     """
-    beams, names = fits.network.beams, [fits.bundle.names[k] for k in fits.bundle.plain]
+    beams, bundle = fits.network.beams, fits.bundle
     wide = any(beam.section.wide for beam in beams.values())
-    plain = {} if wide else {name: row for row, name in enumerate(names) if len(cuts[name]) == 2}
-    together = _plain_tables(fits.bundle, scales, degree) if plain else {}
+    plain = [] if wide else [bundle.names[k] for k in bundle.plain]
+    counts = [len(cuts[name]) - 1 for name in plain]
+    together = {}
+    if plain:
+        own = np.array([pair for name in plain for pair in itertools.pairwise(cuts[name])])
+        row = np.repeat(np.arange(len(plain)), counts)
+        together = plain_tables(bundle.coefficients, bundle.length, bundle.rigidities, scales, degree, row, own)
     if len(plain) == len(cuts):
         return together
+    ends = np.cumsum(counts).tolist()
+    of_beam = {name: slice(end - count, end) for name, count, end in zip(plain, counts, ends, strict=True)}
     parts: list[dict[str, Any]] = []
     for name, beam in beams.items():
-        if name in plain:
-            parts.append({column: values[plain[name]][None] for column, values in together.items()})
+        if name in of_beam:
+            parts.append({column: values[of_beam[name]] for column, values in together.items()})
         else:
             parts += _smooth_tables(beam, fits[name], scales, degree, cuts[name], wide)
     return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
 
 
-def _plain_tables(bundle: Bundle, scales: MechanicsUnits, degree: int) -> dict[str, Any]:
-    """Return the tables of plain beams of one element each."""
-    rule, length, force = basis(degree), scales.length, scales.force
-    speed, ones = bundle.length[:, None] / length, np.ones(len(rule.places))
-    axial, shear = (values[:, None] * force * ones for values in (bundle.stretch, bundle.slip))
+def plain_tables(
+    coefficients: Any, length: Any, rigidities: Any, scales: MechanicsUnits, degree: int, row: Any, cuts: FloatArray
+) -> dict[str, Any]:
+    """Return the tables of elements of plain beams, of one network or of d: (e, q) or (d, e, q) each.
+
+    Parameters
+    ----------
+    coefficients, length, rigidities : (..., b, m), (..., b), (3, ..., b) arrays
+        As of `Bundle`, [rad], [m], [N m2], [1/N].
+    scales, degree : MechanicsUnits, int
+        As of `element_tables`.
+    row, cuts : (e,), (e, 2) arrays
+        Number of each element's beam, and the parameters between which it lies.
+    """
+    rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
+    t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
+    for k in reversed(range(own.shape[-1])):
+        angle = angle * t + own[..., k, None]
+    speed, ones = length[..., row, None] / scales.length * width, np.ones(len(rule.places))
+    bending, axial, shear = (values[..., row, None] for values in rigidities)
     return {
-        "angle": bundle.coefficients @ powers_at_points(degree, bundle.coefficients.shape[1]),
+        "angle": angle + 0.0 * t,
         "weight": speed * rule.weights,
-        "rigidity": bundle.bending[:, None] / (force * length**2) / speed**2 * ones,
-        "axial": axial,
-        "shear": shear,
+        "rigidity": bending / (force * scales.length**2) / speed**2 * ones,
+        "axial": axial * force * ones,
+        "shear": shear * force * ones,
         "ahead": speed * (1 - rule.places),
-        "length": speed[:, 0],
+        "length": speed[..., 0],
     }
 
 

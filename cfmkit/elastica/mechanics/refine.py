@@ -19,10 +19,8 @@ def raise_degree(network: Discretisation, degree: int) -> Discretisation:
         return network
     e = network.elements
     tables = element_tables(network.fits, network.scales, degree, network.cuts)
-    stretches = {name: beam.section.axial for name, beam in network.fits.network.beams.items()}
-    floors = np.where([stretches[name] for name in e.beam], 0.0, e.axial[:, 0])
-    if floors.any():
-        tables["axial"] = tables["axial"] + floors[:, None]
+    if network.floor.any():
+        tables["axial"] = tables["axial"] + network.floor[:, None]
     count, ends = len(e.length), _n_end_motions(network)
     bubbles = ends + np.arange(count * (degree - 1)).reshape(count, -1)
     forces = ends + count * (degree - 1) + np.arange(2 * count).reshape(count, -1)

@@ -1,7 +1,7 @@
 """All plain beams of a network at once: shapes fitted between their ends.
 
-Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams. The
-others are fitted one by one (`cfmkit.elastica.model.beam`).
+Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams, of one
+network or of several of one topology. The others are fitted one by one (`cfmkit.elastica.model.beam`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section
@@ -36,6 +38,8 @@ class Bundle:
         Of the angle, rotation of the fit included in the first.
     length : (plain,) array
         Arc length as used [m].
+    rigidities : (3, plain) array
+        Of bending, and the compliances of stretching and shearing, as `Section.rigidities` has them.
     """
 
     def __init__(self, network: Network, ends: Any, beam_end: Any) -> None:
@@ -49,32 +53,20 @@ class Bundle:
 
     def _fit_plain(self, ends: Any, beam_end: Any) -> None:
         beams = [self.beams[k] for k in self.plain]
-        shapes: list[Any] = [beam.shape for beam in beams]
-        given = [shape.coefficients or (0.0,) for shape in shapes]
-        most = max(map(len, given))
-        if any(len(own) < most for own in given):
-            given = [(*own, *(0.0,) * (most - len(own))) for own in given]
-        c = np.array(given) + 0.0
+        c = coefficients_of(beams) + 0.0
         both = ends[beam_end]
         reach = both[:, 1] - both[:, 0]
-        dx, dy = reach.T
-        distance = np.sqrt(dx * dx + dy * dy)
-        if most == 1:
-            cx, cy = np.cos(c[:, 0]), np.sin(c[:, 0])
-            own = np.ones(len(beams))
-        else:
-            angle = c @ powers(most)
-            cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
-            own = np.sqrt(cx * cx + cy * cy)
+        distance = np.sqrt(reach[:, 0] * reach[:, 0] + reach[:, 1] * reach[:, 1])
+        cx, cy = chords(c)
+        own = np.sqrt(cx * cx + cy * cy)
         self._check(distance, own)
-        nominal = [shape.length for shape in shapes]
+        nominal = [beam.shape.length for beam in beams]  # type: ignore[union-attr]
         first = distance
         if any(nominal):
             first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
         self.reach, self.drawn = reach, (first, cx, cy)
-        turned = most > 1 or c.any()
-        rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy) if turned else direction(dx, dy)
-        self.length, self.scale = distance / own, distance / (own * first)
+        rotation, self.length = between(cx, cy, reach)
+        self.scale = distance / (own * first)
         closures = [beam.closure for beam in beams]
         if "raw" in closures:
             raw = np.array([closure == "raw" for closure in closures])
@@ -83,19 +75,13 @@ class Bundle:
         self.rotation = rotation
         self.coefficients = c if c.dtype == rotation.dtype else c + 0j
         self.coefficients[:, 0] += rotation
-        self._set_rigidities()
+        self.rigidities = rigidities_of(beams)
 
     @property
     def gap(self) -> Any:
         """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
         first, cx, cy = self.drawn
         return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
-
-    def _set_rigidities(self) -> None:
-        """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
-        sections = [self.beams[k].section for k in self.plain]
-        known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
-        self.bending, self.stretch, self.slip = np.array([known[id(section)] for section in sections]).T
 
     def _check(self, distance: Any, own: Any) -> None:
         """Refuse beams without length, and shapes that return to their start."""
@@ -131,6 +117,33 @@ def is_plain(beam: Beam) -> bool:
 def coils(beam: Beam) -> bool:
     """Tell whether the angle of a beam, a polynomial, may turn by more than COILED."""
     return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > COILED
+
+
+def coefficients_of(beams: Sequence[Beam]) -> Any:
+    """Return the coefficients of the angles of plain beams, (b, m)."""
+    given = [beam.shape.coefficients or (0.0,) for beam in beams]  # type: ignore[union-attr]
+    most = max(map(len, given))
+    return np.array([(*own, *(0.0,) * (most - len(own))) for own in given])
+
+
+def chords(coefficients: Any) -> tuple[Any, Any]:
+    """Return the chords of shapes of length 1 with coefficients (..., b, m), x and y (..., b) each."""
+    angle = coefficients @ powers(coefficients.shape[-1])
+    return np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
+
+
+def between(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:
+    """Return by how much shapes with chords are turned to fit between their ends, (..., b, 2), and their lengths."""
+    dx, dy = reach[..., 0], reach[..., 1]
+    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+    return rotation, np.sqrt((dx * dx + dy * dy) / (cx * cx + cy * cy))
+
+
+def rigidities_of(beams: Sequence[Beam]) -> Any:
+    """Return bending rigidities and the compliances of stretching and shearing of plain beams, (3, b)."""
+    sections = [beam.section for beam in beams]
+    known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
+    return np.array([known[id(section)] for section in sections]).T
 
 
 def _rigidities(s: Section) -> tuple[Any, Any, Any]:

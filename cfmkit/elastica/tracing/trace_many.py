@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.tracing.trace_by_energy import trace
+from cfmkit.elastica.tracing.trace import trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
