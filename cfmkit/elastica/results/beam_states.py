@@ -220,7 +220,7 @@ def _curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
     return curvature, (rotation[..., 1] - rotation[..., 0] - curvature @ rule.weights)[..., None]
 
 
-class _Matrices(NamedTuple):
+class _AtFractions(NamedTuple):
     """What takes an element's unknowns and values at its Gauss points to k fractions of it."""
 
     values: FloatArray  # (k, degree + 1) of the rotation
@@ -229,9 +229,11 @@ class _Matrices(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _matrices(degree: int, fractions: tuple[float, ...]) -> _Matrices:
+def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
     rule, ends = basis(degree), np.array(fractions)
-    return _Matrices(shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends))
+    return _AtFractions(
+        shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
+    )
 
 
 def unloaded(net: Network, at: Equilibria, beam: str, fractions: Any) -> Any:
