@@ -26,7 +26,7 @@ RUN_ITSELF = "manifest.json"
 
 
 def _cases():
-    return [pytest.param(path, marks=pytest.mark.slow) if path.stem in LONG else path for path in CONFIGS]
+    return [pytest.param(path, marks=pytest.mark.long) if path.stem in LONG else path for path in CONFIGS]
 
 
 def contents(folder):
