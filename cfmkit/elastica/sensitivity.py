@@ -5,6 +5,8 @@ what an output depends on besides has a complex step already, and is differentia
 by a motion need no solution: the slope of the path is the adjoint (`cfmkit.elastica.mechanics.design_derivatives`).
 Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
 and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
+States along beams, of which there are many, are computed as dual arrays; what depends on them otherwise, variable by
+variable with the complex step.
 
 SI, variables last; each output is computed when it is first needed.
 """
