@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.arrays import Named, Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.results.between_points import between_loads, between_points
-from cfmkit.elastica.results.folding_path_between_points import along_the_way
+from cfmkit.elastica.results.folding_path_between_points import Observed, along_the_way
 from cfmkit.elastica.results.member_efforts import effort_error, largest_member_efforts
 from cfmkit.elastica.results.path import most_stressed
 from cfmkit.families.beam.network_from_spec import Assembly, mirror_axis, thickest_of
@@ -239,8 +239,8 @@ class Solution(ShortRepr):
         return read_only(-self.path.end_force(beam, 1)[self.keep])
 
 
-class OnCurve(Protocol):
-    """What a solved mechanism of any model knows at the points of its curve."""
+class OnCurve(Observed, Protocol):
+    """What a solved mechanism of any model knows at the points of its curve; forces are those of all copies."""
 
     @property
     def spec(self) -> BeamSpec:
@@ -249,22 +249,6 @@ class OnCurve(Protocol):
     @property
     def assembly(self) -> Assembly:
         """The network and what is done to it."""
-
-    @property
-    def motion(self) -> FloatArray:
-        """Displacement or rotation along the drive (n,) [m or rad]."""
-
-    @property
-    def effort(self) -> FloatArray:
-        """Force or torque of all copies (n,) [N or N m]."""
-
-    @property
-    def stress(self) -> FloatArray:
-        """The largest stress (n,) [Pa]."""
-
-    @property
-    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """Of each beam, or of the part, the largest stress (n,) [Pa] and its place."""
 
     @property
     def effort_error(self) -> float | None:
