@@ -319,7 +319,10 @@ def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() ->
     task = lan("paper", (8.8e-3, 4e-3))
     program = Shaping(Variables(task, 2), 6.8e-3, Compared())
     assert program.values(program.begin(table_3(task)))[0] == pytest.approx(0.30214615, abs=2e-5)
-    ended = improved(task, found_of(task, table_3(task)), StartBudget(flattening=15))
+    # a search from their result itself may end in a local optimum: from shapes that are bent 1 % less, or more
+    shapes = np.arange(len(table_3(task))) >= len(task.coordinates)
+    begun = [found_of(task, table_3(task) * (1 + off * shapes)) for off in (-0.01, 0.01)]
+    ended = min((improved(task, one, StartBudget(flattening=15)) for one in begun), key=lambda one: one.objective)
     view = program.view(ended.x)
     force = view.response.state.force[view.poses.window]
     assert ended.objective < 0.15

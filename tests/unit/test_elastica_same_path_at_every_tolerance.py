@@ -56,9 +56,9 @@ def arch(rng: Any) -> tuple[Network, Any]:
 LONG = (9, 91)
 """Seeds whose arches wind up and take eight seconds and more."""
 
-RIGID = (25, 86)
-"""Seeds of straight beams that do not stretch, far beyond the load that they bear: no path of them is complete, and
-whether a step fails or an error stays depends on the tolerance."""
+RIGID = (25, 73, 83, 86)
+"""Seeds of two straight beams that do not stretch under a load: a triangle that does not move, whose forces are known
+to a few per cent because places are rounded; whether a step fails or that error is told depends on the tolerance."""
 
 
 @pytest.mark.parametrize(

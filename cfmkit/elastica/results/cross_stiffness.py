@@ -83,7 +83,7 @@ def _blocks(
     loose = replace(network, attachments=network.attachments._replace(frame=frame))
     loose = without_floor(loose, np.flatnonzero(network.floored))
     cos, sin = frame[place][0] @ old, old[0] * frame[place][0][1] - old[1] * frame[place][0][0]
-    kept = np.setdiff1d(network.free, [x, y])
+    kept = network.free[(network.free != x) & (network.free != y)]
     own = equations(loose)
     for k in chosen.tolist():
         z = path.at.z[k].copy()
