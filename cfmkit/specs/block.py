@@ -28,20 +28,16 @@ class Model(BaseModel):
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
     )
 
-    @property
-    def given(self) -> dict[str, Any]:
-        """What was given, and what validators set, by key."""
-        return {name: getattr(self, name) for name in self.model_fields_set}
-
     removed_keys: ClassVar[dict[str, str]] = {}
     """Keys of earlier versions -> what to write instead."""
 
 
 def keys_of(block: Any) -> Mapping[str, Any]:
-    """Return what is given in a block that is not validated yet, by key; nothing if it is no block.
+    """Return what is given in a block, and what its validators set, by key; nothing if it is no block.
 
-    For validators that run before: `Spec.replace` gives them validated blocks beside what a file says.
+    It need not be validated: for validators that run before, to which `Spec.replace` gives validated blocks beside what
+    a file says.
     """
     if isinstance(block, Model):
-        return block.given
+        return {name: getattr(block, name) for name in block.model_fields_set}
     return block if isinstance(block, Mapping) else {}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
-from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength
+from cfmkit.specs.block import Model, NonNegativeLength, PositiveForce, PositiveLength, keys_of
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
@@ -389,7 +389,7 @@ class Spec(Model):
         cfmkit.errors.SpecError
             If the changed specification is not valid.
         """
-        data = self.given | {"family": self.family}
+        data = {**keys_of(self), "family": self.family}
         for path, value in changes.items():
             data = _with(data, path.split("."), value, path)
         try:
@@ -448,7 +448,7 @@ def _with(data: Any, parts: list[str], value: Any, path: str) -> Any:
         items[int(head)] = _with(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
     if isinstance(data, Model):
-        data = data.given
+        data = keys_of(data)
     if data is not None and not isinstance(data, Mapping):
         raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})
