@@ -242,7 +242,9 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
             raise InputError(
                 f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
             )
-    designs = set_up(path.network, (path.net, path.given), pairs, partial(discretise_alike, path.network))
+    designs = set_up(
+        path.network, (path.net, path.given), pairs, partial(discretise_alike, path.network, cuts=path.network.cuts)
+    )
     chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
     return Gradient(path, read_only(chosen, np.int64), designs)
 

@@ -438,9 +438,12 @@ def without_floor(discretisation: Discretisation, elements: Any) -> Discretisati
     return stiff
 
 
-def discretise_alike(template: Discretisation, network: Network, drive: Drive) -> Discretisation:
-    """Return the arrays of another network of the same make-up: degree, cuts, floors and units of the template's."""
-    found = discretise(
-        network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=template.cuts
-    )
+def discretise_alike(
+    template: Discretisation, network: Network, drive: Drive, cuts: Mapping[str, list[float]] | None = None
+) -> Discretisation:
+    """Return the arrays of another network of the same make-up: degree, floors and units of the template's.
+
+    It has the template's `cuts` if they are given: where they differ by complex steps only.
+    """
+    found = discretise(network, drive, template.degree, template.pieces, template.tension, template.scales, cuts=cuts)
     return without_floor(found, np.flatnonzero(found.floored & ~template.floored))

@@ -102,6 +102,8 @@ def _smooth_tables(
     tapers = isinstance(beam.section.thickness, Taper)
     for begin, end in itertools.pairwise(smooth_marks(beam, fitted)):
         own = np.array([pair for pair in itertools.pairwise(cuts) if begin <= 0.5 * sum(pair) < end])
+        if not len(own):  # marks at one place but for rounding
+            continue
         left, width, inside = own[:, :1], own[:, 1:] - own[:, :1], 0.5 * (begin + end)
         t = left + width * rule.places
         along = (fitted.arc(t), float(np.real(fitted.arc(inside)))) if tapers else (t, inside)
