@@ -286,10 +286,10 @@ def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool)
         np.testing.assert_allclose(exact, slope, atol=2e-5 * np.abs(slope).max() + 1e-9)
 
 
-def test_a_strip_that_is_pulled_to_many_times_its_length_has_no_answer_or_misses_all_limits() -> None:
+def test_a_strip_that_is_pulled_to_many_times_its_length_has_no_answer_or_one_far_beyond_its_limits() -> None:
     program = StripProgram(StripTask(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
     answer = program.values(np.array([1.0, 1.0, 1.0, 1000.0]))  # [mm]; the strip is 125 mm long, and stretches
-    assert answer is None or answer[1].max() < -1.0
+    assert answer is None or answer[1].min() < -1000.0
 
 
 def test_polynomials_through_nodes_are_exact() -> None:
