@@ -1,7 +1,7 @@
 """Dimension drawings: a family's mechanism with its dimensions named, as files that come with the family's package.
 
-Each text of the class ``row`` in the SVG is a row of the table of dimensions: a `tspan` with the symbol, one with the key
-of the specification, and the lines of what it is.
+Each text of the class ``row`` in the SVG is a row of the table of dimensions: a `tspan` with the symbol, one with the
+key of the specification, and the lines of what it is.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def find_drawn_family(name: str | None) -> Family:
 
 
 def read_drawing(record: Family) -> dict[str, bytes]:
-    """Return the drawing of a family by the ending of the file: ``.svg``, and others of `FORMATS` that lie beside it."""
+    """Return the drawing of a family by the ending of its file: ``.svg``, and those of `FORMATS` that lie beside it."""
     from cfmkit.families.base import package_file
 
     stem = record.dimension_drawing.removesuffix(".svg")
@@ -62,5 +62,5 @@ def read_dimensions(record: Family) -> list[dict[str, str]]:
             symbol, key, *meaning = ("".join(part.itertext()) for part in text)
             rows.append({"symbol": symbol, "key": key, "meaning": " ".join(meaning)})
     except (ElementTree.ParseError, ValueError) as error:
-        raise UsageError(f"{record.dimension_drawing} is no drawing with rows of symbol, key, meaning: {error}") from None
+        raise UsageError(f"{record.dimension_drawing} has no rows of symbol, key, meaning: {error}") from None
     return rows
