@@ -13,7 +13,7 @@ import pytest
 from cfmkit import families
 from cfmkit.cli.main import main
 from cfmkit.errors import UsageError
-from cfmkit.families.base import package_file, packaged
+from cfmkit.families.base import packaged
 from cfmkit.runs.dimension_drawing import FORMATS, read_dimensions, read_drawing
 from cfmkit.specs.keys_and_schema import keys
 
@@ -94,14 +94,6 @@ def test_png_and_pdf_show_the_drawing_as_it_is_now(name):
 def test_the_docs_show_the_same_drawing(name):
     shown = Path(__file__).parents[2] / "docs" / "images" / f"{name.replace('-', '_')}_dimensions.svg"
     assert shown.read_bytes() == read_drawing(families.family(name))[".svg"]
-
-
-@own_drawings
-def test_the_package_takes_every_file_of_a_drawing_along(name):
-    project = (Path(__file__).parents[2] / "pyproject.toml").read_text()
-    folder = families.family(name).dimension_drawing.split("/")[-2]
-    assert '"families/*/dimensions.*"' in project
-    assert all(package_file(f"cfmkit/families/{folder}/dimensions{ending}").is_file() for ending in FORMATS)
 
 
 @pytest.mark.parametrize("ending", FORMATS)
