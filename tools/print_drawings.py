@@ -1,4 +1,4 @@
-"""Print the dimension drawings of the families: the PNG and the PDF beside each SVG, and its copy in the documentation.
+"""Print the dimension drawings of the families: the PNG and the PDF beside each SVG.
 
     python tools/print_drawings.py     # after a change of cfmkit/families/NAME/dimensions.svg
 
@@ -23,7 +23,7 @@ PRINT_DPI, SCREEN_DPI = 200, 96
 
 
 def print_drawing(page: Page, drawing: Path) -> None:
-    """Write the PNG, the PDF and the copy of one drawing."""
+    """Write the PNG and the PDF of one drawing."""
     svg = drawing.read_bytes()
     digest = hashlib.sha256(svg).hexdigest()
     width, height = re.findall(rb'(?:width|height)="([\d.]+mm)"', svg)[:2]
@@ -36,7 +36,6 @@ def print_drawing(page: Page, drawing: Path) -> None:
     picture = Image.open(io.BytesIO(page.locator("svg").screenshot())).convert("RGB")
     picture = picture.quantize(128, Image.Quantize.MAXCOVERAGE)  # a third of the bytes
     picture.save(drawing.with_suffix(".png"), optimize=True, pnginfo=info, dpi=(PRINT_DPI, PRINT_DPI))
-    (ROOT / "docs" / "images" / f"{drawing.parent.name}_dimensions.svg").write_bytes(svg)
 
 
 def main() -> None:
