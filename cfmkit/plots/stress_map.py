@@ -85,10 +85,11 @@ class StressView:
         return self.solved.course.poses[self.pose]
 
 
-def stress_views(solved: MeshSolution, fillets: Mapping[int, FilletArc], dimension: str) -> list[StressView]:
-    """Return a part half way, where its stress is largest (there with its fillets), and at the end of its travel."""
+def stress_views(
+    solved: MeshSolution, middle: int, fillets: Mapping[int, FilletArc], dimension: str
+) -> list[StressView]:
+    """Return a part on its way, where its stress is largest (there with its fillets), and at its last pose."""
     travel, worst = solved.course.travel, int(solved.peaks[0].argmax())
-    middle = int(np.abs(travel - 0.5 * travel[-1]).argmin())
     return [
         StressView(solved, pose, value_text(float(travel[pose]), dimension), fillets if pose == worst else {})
         for pose in sorted({middle, worst, len(travel) - 1})

@@ -99,7 +99,8 @@ def curve(result: Result) -> Figure:
 def stress_map(result: Result) -> Figure:
     """Return the stress of the part as a solid at up to three poses, in one scale, with the place of its peak."""
     solution: SolidSolution = result.state
-    views = stress_views(solution.fine, numbered(solution.fillets), result.curve.motion_dimension)
+    middle = len(solution.fine.course.poses) // 2
+    views = stress_views(solution.fine, middle, numbered(solution.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "equivalent stress of the part as cut")
 
 

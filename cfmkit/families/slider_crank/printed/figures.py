@@ -54,7 +54,9 @@ def curve(result: Result) -> Figure:
 
 def stress_map(result: Result) -> Figure:
     """Return the stress of the part as drawn half way, where it is largest and at the end of its travel."""
-    views = stress_views(result.state.fine, numbered(result.state.fillets), result.curve.motion_dimension)
+    travel = result.state.fine.course.travel
+    middle = int(np.abs(travel - 0.5 * travel[-1]).argmin())
+    views = stress_views(result.state.fine, middle, numbered(result.state.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "stress of the part as drawn")
 
 
