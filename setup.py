@@ -55,7 +55,16 @@ class WheelForEveryPython(bdist_wheel):
 
 
 class BuildPages(build_py):
-    """Build without the programs that stand beside the pages of `docs`: they make the site."""
+    """Build without the programs that stand beside the pages of `docs`: they make the site.
+
+    Links of the pages to files of the package lead there from inside of it.
+    """
+
+    def run(self):
+        """Build, then shorten those links."""
+        super().run()
+        for page in Path(self.build_lib, "cfmkit", "docs").glob("*.md"):
+            page.write_text(page.read_text(encoding="utf-8").replace("](../cfmkit/", "](../"), encoding="utf-8")
 
     def find_package_modules(self, package, package_dir):
         """Return the modules of a package, as (package, name, file)."""

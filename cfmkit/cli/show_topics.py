@@ -213,7 +213,7 @@ def family_page(name: str) -> Answer:
         ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": known, "values": values, "findings": findings, "references": references}
-    drawn = f"; `cfmkit show {name} --figure` draws it with its dimensions named" if record.scheme else ""
+    drawn = f"; `cfmkit show {name} --figure` draws it with its dimensions named" if record.dimension_drawing else ""
     text = f"{record.summary}. `cfmkit new {name}` starts a file{drawn}"
     return _page(name, text, sections, data)
 
@@ -277,15 +277,15 @@ def found(name: str) -> Answer | None:
 
 
 def _symbols(name: str) -> list[Record]:
-    """Return what a symbol such as ``theta2`` is in the drawings of the families; they are imported for it."""
-    from cfmkit.runs.nomenclature_figure_file import scheme
+    """Return what a symbol such as ``theta2`` is in the drawings of the families."""
+    from cfmkit.runs.dimension_drawing import read_dimensions
 
     return [
-        {"name": one.symbol, "family": record.name, "key": one.key, "meaning": one.meaning}
+        {"name": row["symbol"], "family": record.name, "key": row["key"], "meaning": row["meaning"]}
         for record in families.records()
-        if record.scheme
-        for one in scheme(record.name).dimensions
-        if name in re.split(r", | \.\.\. ", one.symbol)
+        if record.dimension_drawing
+        for row in read_dimensions(record)
+        if name in re.split(r", | \.\.\. ", row["symbol"])
     ]
 
 

@@ -13,6 +13,7 @@ from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from importlib.resources.abc import Traversable
 
     from numpy.typing import NDArray
 
@@ -327,9 +328,9 @@ class Family:
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
     draw : str, optional
         ``"module"`` with ``figures(result)``, imported when drawing.
-    scheme : str, optional
-        ``"module"`` with ``figure()``: a drawing of the mechanism with its dimensions named, and `DIMENSIONS`, which
-        key of the specification each of them is; imported when it is shown.
+    dimension_drawing : str
+        The mechanism with its dimensions and their keys named: a file of a package, ``"package/folder/file.svg"``;
+        a PNG and a PDF of the same name may stand beside it.
     outline : str, optional
         ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
         `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
@@ -379,7 +380,7 @@ class Family:
     errors: str | None = None
     attribution: str | None = None
     draw: str | None = None
-    scheme: str | None = None
+    dimension_drawing: str = ""
     outline: str | None = None
     elastic_parts: str | None = None
     elastic_networks: str | None = None
@@ -463,7 +464,12 @@ def sized(result: Result, space: Room | None) -> Result:
 
 def packaged(name: str) -> str:
     """Return the text of a file that comes with a package, by ``"package/folder/file"``."""
+    return package_file(name).read_text(encoding="utf-8")
+
+
+def package_file(name: str) -> Traversable:
+    """Return a file that comes with a package, by ``"package/folder/file"``; it need not be there."""
     from importlib.resources import files
 
     package, _, path = name.partition("/")
-    return files(package).joinpath(path).read_text(encoding="utf-8")
+    return files(package).joinpath(path)

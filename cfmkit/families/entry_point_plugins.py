@@ -200,7 +200,7 @@ def _fault_of(record: Any, offer: InstalledFamily) -> str:
     for one in fields(Family):
         if not _is_of_kind(getattr(record, one.name), str(one.type)):
             return f"the field {one.name!r} of its record must be of the type {one.type}"
-    for name in filter(None, (record.template, record.bibliography)):
+    for name in filter(None, (record.template, record.bibliography, record.dimension_drawing)):
         packaged(name)
     return ""
 

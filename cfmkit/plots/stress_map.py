@@ -85,6 +85,17 @@ class StressView:
         return self.solved.course.poses[self.pose]
 
 
+def stress_views(
+    solved: MeshSolution, middle: int, fillets: Mapping[int, FilletArc], dimension: str
+) -> list[StressView]:
+    """Return a part on its way, where its stress is largest (there with its fillets), and at its last pose."""
+    travel, worst = solved.course.travel, int(solved.peaks[0].argmax())
+    return [
+        StressView(solved, pose, value_text(float(travel[pose]), dimension), fillets if pose == worst else {})
+        for pose in sorted({middle, worst, len(travel) - 1})
+    ]
+
+
 @styled
 def stress_map_figure(result: Result, views: Sequence[StressView], subject: str) -> Figure:
     """Return a figure of parts at poses, coloured by stress in one scale, each with the place of its peak.

@@ -175,7 +175,6 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
 ROOMS = {
     "design": "design",
     "draw": "figures",
-    "scheme": "nomenclature_figure",
     "outline": "outline",
     "propose": "proposals_for_wish",
     "room": "bounding_box",
@@ -196,6 +195,7 @@ def test_every_family_has_the_same_rooms(name):
     assert len(homes) > 6
     inner = {field: home.removeprefix(f"{folder}.").removeprefix("printed.") for field, home in homes.items()}
     assert inner == {field: ROOMS[field] for field in homes}
+    assert record.dimension_drawing == f"{folder.replace('.', '/')}/dimensions.svg"
     for room in ("spec", "findings"):
         assert (ROOT / "families" / folder.rpartition(".")[2] / f"{room}.py").exists()
 

@@ -11,13 +11,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "adding_a_family.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(?:py|toml)\n# (\S+)\n(.*?)^```", PAGE, re.M | re.S)
+BLOCKS = re.findall(r"^```(?:py|toml|xml)\n(?:#|<!--) (\S+)(?: -->)?\n(.*?)^```", PAGE, re.M | re.S)
 
 
 def test_the_page_shows_code_of_every_room():
     shown = {Path(name).name for name, _ in BLOCKS}
     files = {path.name for path in (ROOT / "plugins" / "oblique" / "cfmkit_oblique").glob("*.py")}
-    assert files | {"pyproject.toml"} == shown
+    assert files | {"pyproject.toml", "dimensions.svg"} == shown
 
 
 @pytest.mark.parametrize(("name", "code"), BLOCKS)

@@ -110,6 +110,13 @@ def test_a_notebook_user_sees_numbers_and_a_figure(run):
     assert run("-c", NOTEBOOK).stdout.split() == ["complete", "50.0", "2"]
 
 
+def test_everybody_has_the_dimension_drawings(cfmkit, tmp_path):
+    drawings = sorted(Path(INSTALLED, "cfmkit", "families").glob("*/dimensions.*"))
+    assert [path.suffix for path in drawings] == [".pdf", ".png", ".svg"] * 4
+    cfmkit("show", "vcfm", "--figure", "mine.pdf")
+    assert (tmp_path / "mine.pdf").read_bytes() == drawings[-3].read_bytes()
+
+
 def test_everybody_has_the_documentation_without_a_network(cfmkit):
     pages = {one["name"]: Path(one["path"]) for one in json.loads(cfmkit("docs", "--json").stdout)["pages"]}
     assert {"tutorial", "howto", "reference", "cam", "ci"} <= set(pages)

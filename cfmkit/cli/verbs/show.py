@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import shell_completion
@@ -46,7 +46,7 @@ def run(options: ShowOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli.show_topics import explain, skipped
 
     if options.figure is not None:
-        return _drawn(options.topic, options.figure)
+        return _copy_drawing(options.topic, options.figure)
     try:
         found = explain(options.topic)
     except UsageError:
@@ -69,22 +69,24 @@ def _refer_to_help(name: str | None) -> None:
         raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it") from None
 
 
-def _drawn(name: str | None, given: str) -> Answer:
-    """Write the drawing of a family to a file that is not there yet."""
+def _copy_drawing(name: str | None, given: str) -> Answer:
+    """Copy the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
-    from cfmkit.runs.nomenclature_figure_file import drawn, scheme
+    from cfmkit.runs.dimension_drawing import find_drawn_family, read_dimensions, read_drawing
     from cfmkit.store.safe_disk_changes import reporting, write_new
 
-    found = scheme(name)
-    path = Path(given or f"{found.family}.png")
-    content = drawn(found, path.suffix)
+    record = find_drawn_family(name)
+    files = read_drawing(record)
+    path = Path(given or record.name + next(iter(files)))
+    if path.suffix.lower() not in files:
+        raise UsageError(f"a figure ends with {', '.join(files)}, not {visible(path.suffix)!r}")
+    rows = read_dimensions(record)
     with reporting(path):
-        write_new(path, content)
-    known = [asdict(one) for one in found.dimensions]
+        write_new(path, files[path.suffix.lower()])
     page = (
-        *listed("", known, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
+        *listed("", rows, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
         BLANK,
         Paragraph("written", visible(str(path)), GOOD),
     )
-    return Answer({"show": name, "dimensions": known, "file": str(path)}, page)
+    return Answer({"show": name, "dimensions": rows, "file": str(path)}, page)

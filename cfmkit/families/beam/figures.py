@@ -25,7 +25,7 @@ from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.rounding_noise import vanishing
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, MarkedRange, Scale, Series, diagram_figure
-from cfmkit.plots.stress_map import StressView, stress_map_figure
+from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -99,18 +99,8 @@ def curve(result: Result) -> Figure:
 def stress_map(result: Result) -> Figure:
     """Return the stress of the part as a solid at up to three poses, in one scale, with the place of its peak."""
     solution: SolidSolution = result.state
-    solved, poses = solution.fine, solution.fine.course.poses
-    worst = int(solved.peaks[0].argmax())
-    shown = sorted({len(poses) // 2, worst, len(poses) - 1})
-    views = [
-        StressView(
-            solved,
-            pose,
-            value_text(poses[pose].travel, result.curve.motion_dimension),
-            numbered(solution.fillets) if pose == worst else {},
-        )
-        for pose in shown
-    ]
+    middle = len(solution.fine.course.poses) // 2
+    views = stress_views(solution.fine, middle, numbered(solution.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "equivalent stress of the part as cut")
 
 

@@ -16,6 +16,7 @@ FAMILY = Family(
     values=DEFINITIONS,
     resolve=resolve,
     draw="cfmkit_oblique.figures",
+    dimension_drawing="cfmkit_oblique/dimensions.svg",
     outline="cfmkit_oblique.outline",
     headline=("plateau_force", "plateau_position", "plateau_stiffness", "stiffness_ratio", "band_range_1pct"),
     branches=("load",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from cfmkit.plots.curve_with_enlarged_band import loop_figure
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.poses_in_one_svg import Moving, chosen
 from cfmkit.plots.stacked_line_diagrams import Diagram, Limit, Scale, Series, diagram_figure
-from cfmkit.plots.stress_map import StressView, stress_map_figure
+from cfmkit.plots.stress_map import stress_map_figure, stress_views
 from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.solution import Solution
@@ -53,16 +54,9 @@ def curve(result: Result) -> Figure:
 
 def stress_map(result: Result) -> Figure:
     """Return the stress of the part as drawn half way, where it is largest and at the end of its travel."""
-    solved = result.state.fine
-    poses = solved.course.poses
-    middle = int(np.abs(solved.course.travel - 0.5 * solved.course.travel[-1]).argmin())
-    worst = int(solved.peaks[0].argmax())
-    shown = sorted({middle, worst, len(poses) - 1})
-    fillets = numbered(result.state.fillets)
-    views = [
-        StressView(solved, pose, value_text(poses[pose].travel, "length"), fillets if pose == worst else {})
-        for pose in shown
-    ]
+    travel = result.state.fine.course.travel
+    middle = int(np.abs(travel - 0.5 * travel[-1]).argmin())
+    views = stress_views(result.state.fine, middle, numbered(result.state.fillets), result.curve.motion_dimension)
     return stress_map_figure(result, views, "stress of the part as drawn")
 
 
@@ -97,14 +91,11 @@ def part(result: Result) -> Figure:
     """Return the part to scale at some travels, with the place of the largest stress at the end."""
     solution: Solution = result.state
     chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
-    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[k]))) for k in chosen]
+    shapes, box, room = _shapes_in_box(solution, chosen)
     figure = new_figure(160.0, 120.0)
     heading = Heading.of(result, "the part to scale while it is pressed")
     write_heading(figure, heading)
     ax = axes_mm(figure, (17.0, 12.0, 138.0, 106.0 - heading.height_mm))
-    everything = np.concatenate([points for shape in shapes for points, _ in shape])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    room = 0.08 * float((high - low).max())
     for number, shape in enumerate(shapes):
         for points, half in shape:
             _body(ax, points, half, number == len(shapes) - 1)
@@ -114,7 +105,7 @@ def part(result: Result) -> Figure:
     parts.slider(ax, tuple(ends[-1]), 0.5 * room)
     worst = _place(solution, shapes[-1], float(solution.place[chosen[-1]]))
     parts.contact(ax, tuple(worst))
-    parts.to_scale(ax, (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room))
+    parts.to_scale(ax, box)
     ax.set_ylabel("y [mm]")
     names = [
         Label(value_text(float(solution.travel[k]), "length"), INK, parts.mm(end)[None], toward=(0.0, 1.0))
@@ -125,6 +116,17 @@ def part(result: Result) -> Figure:
     names.append(Label(f"largest stress, {top}", VERMILLION, parts.mm(worst)[None], toward=(-1.0, 1.0)))
     place_labels(ax, names)
     return figure
+
+
+def _shapes_in_box(
+    solution: Solution, points: NDArray[Any]
+) -> tuple[list[list[tuple[FloatArray, FloatArray]]], parts.Box, float]:
+    """Return the `_shapes` at points of the travel, the box of all with a margin, and the margin's unit [m]."""
+    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[point]))) for point in points]
+    everything = np.concatenate([line for shape in shapes for line, _ in shape])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    room = 0.08 * float((high - low).max())
+    return shapes, (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room), room
 
 
 def _shapes(solution: Solution, index: int) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -180,11 +182,7 @@ def moving(result: Result) -> Moving | None:
         return None
     solution: Solution = result.state
     points = chosen(len(solution.travel))
-    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[k]))) for k in points]
-    everything = np.concatenate([line for shape in shapes for line, _ in shape])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    room = 0.08 * float((high - low).max())
-    box = (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room)
+    shapes, box, room = _shapes_in_box(solution, points)
 
     def draw(ax: Axes, number: int) -> None:
         for line, half in shapes[number]:
