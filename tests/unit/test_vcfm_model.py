@@ -20,7 +20,6 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
-from cfmkit.families.vcfm.pose_outlines import centre_line
 from cfmkit.families.vcfm.quantities import QUANTITIES
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import Window, evaluate
@@ -507,7 +506,7 @@ def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
     from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
-    drawn = centre_line(parts(spec).leaf, travel * MM)
+    drawn = parts(spec).leaf.bent_line(travel * MM)
     drive = Displacement("shuttle", DOWN, travel * MM * np.linspace(0, 1, 7)[1:])
     apart = []
     for sign in (1, -1):

@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
 from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, traced
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, share_of, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, leaf_law, parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, VcfmSpec
+    from cfmkit.families.vcfm.leaves_spec import Bistable
+    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
     from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
@@ -57,17 +58,15 @@ def leaf_network(spec: VcfmSpec) -> Network:
 
 
 def _network_of(about: Bistable, made_of: LeafMaterial, wide: bool) -> Network:
-    from cfmkit.elastica import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
+    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, guided
 
-    strip = strip_of(about, made_of)
+    law = leaf_law(about, made_of)
+    strip = law.strip
     x, h = strip.reach, strip.rise
     nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, guided(0.5 * np.pi, rotates=not about.guided))}
-    thickness, shape, mirrored = strip.thickness, STRAIGHT, STRAIGHT
-    if about.structure == "cosine":
-        shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
-    if about.structure == "hybrid":
-        thickness = Taper(*(np.array(item) for item in about.profile))
-    made = section(strip, thickness, wide)
+    shape, mirrored = law.beam_shapes()
+    shares, thicknesses = law.profile
+    made = section(strip, Taper(np.array(shares), np.array(thicknesses)) if len(set(thicknesses)) > 1 else None, wide)
     beams = {"leaf": Beam("wall", "shuttle", made, shape)}
     if not about.guided:
         nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)

@@ -13,10 +13,10 @@ from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
-from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, spring_room
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE
-from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE, LINEAR_ABOVE, NEGATIVE_ABOVE, VBeam
+from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
 from cfmkit.families.vcfm.range_of_closed_forms import (
     is_stocky,
     leaves_out_of_range,
@@ -96,8 +96,8 @@ def _slenderness(solution: Solution) -> FloatArray:
 
 
 def _contradicts(solution: Solution) -> Any:
-    if solution.spec.analysis.measured is None or solution.structure == "hybrid":
-        return False  # flexures push where such leaves are flat
+    if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
+        return False  # such leaves push where they are flat
     balance = solution.of_mechanisms(solution.parts.balance)
     stated = [spec.analysis.measured for spec in solution.specs]
     stiffness, force = np.array([(one.positive_stiffness, one.force) for one in stated if one is not None]).T
@@ -149,7 +149,11 @@ def closed_spring(solution: Solution) -> Sentence:
 
 
 def _truss(solution: Solution) -> Sentence:
-    law, places = VBeam(solution.parts.strip), np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise)
+    about = solution.spec.mechanism
+    law, places = (
+        leaf_law(about.bistable, about.material),
+        np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise),
+    )
     bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
     high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
@@ -163,12 +167,13 @@ def _truss(solution: Solution) -> Sentence:
 
 def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     """Return of which leaves the stiffness is negative anywhere, and constant there, (m,) each."""
-    if solution.structure == "hybrid" or solution.fidelity == "truss":
+    limits = solution.leaf_kind.limits
+    if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
-    if solution.structure == "cosine":  # whose limits depend on the angle: as the curve has it
+    if limits is None:  # or they depend on more than the slenderness: as the curve has it
         return solution.of_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(solution.linear[0])
     q = _slenderness(solution)
-    return q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
+    return q >= limits.negative, q > limits.constant
 
 
 def _only_rises(solution: Solution) -> Any:
@@ -181,7 +186,8 @@ def _is_rounded(solution: Solution) -> Any:
 
 
 def _rising_force(solution: Solution) -> Sentence:
-    limit = f", below {NEGATIVE_ABOVE}" if solution.structure == "v-beam" else ""
+    limits = solution.leaf_kind.limits
+    limit = "" if limits is None else f", below {limits.negative}"
     return (
         f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the force of the leaves only rises and cannot "
         "cancel that of the spring; use thinner or steeper leaves",
@@ -189,7 +195,8 @@ def _rising_force(solution: Solution) -> Sentence:
 
 
 def _rounded_force(solution: Solution) -> Sentence:
-    limit = ", not above pi" if solution.structure == "v-beam" else ""
+    limits = solution.leaf_kind.limits
+    limit = "" if limits is None else f", not above {limits.constant_text}"
     return (
         f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the leaves do not buckle and their force "
         "curve is rounded; the constant-force window is only its maximum. Use thinner or steeper leaves",

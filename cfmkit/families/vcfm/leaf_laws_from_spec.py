@@ -8,32 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils, Diamond, StraightSpring, UShape, folded
-from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
-from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.leaves.truss import TrussDiamond
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
+    from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Spring
-    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
+    from cfmkit.families.vcfm.leaves_spec import Bistable, Positive
+    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
 
 
 RIM = 0.75
 """Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
-
-Leaf = VBeam | CosineLeaf | HybridLeaf | TrussLeaf
 
 
 @dataclass(frozen=True)
 class Parts:
     """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
 
-    leaf: Leaf  # law of one half-beam of the snap-through structure
+    leaf: LeafLaw  # law of one half-beam of the snap-through structure
     spring: Spring | TrussDiamond  # law of the spring, as much of it as is loaded
     half_beams: Any  # leaves that carry the shuttle
 
@@ -105,14 +102,19 @@ def closed_length(springs: BoughtSprings) -> float:
 def parts(spec: VcfmSpec) -> Parts:
     """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
     mechanism = spec.mechanism
-    bistable, other = mechanism.bistable, strip_of(mechanism.bistable, mechanism.material)
+    bistable, leaf = mechanism.bistable, leaf_law(mechanism.bistable, mechanism.material)
     if mechanism.springs is not None:
-        return Parts(_LEAVES[bistable.structure](other, bistable), coils(mechanism.springs), bistable.half_beams)
+        return Parts(leaf, coils(mechanism.springs), bistable.half_beams)
     positive = mechanism.flexures
     one, share = strip_of(positive, mechanism.material), share_of(positive)
-    if spec.analysis.fidelity == "truss":
-        return Parts(TrussLeaf(other), TrussDiamond(one, share), bistable.half_beams)
-    return Parts(_LEAVES[bistable.structure](other, bistable), _springs(one, positive, share), bistable.half_beams)
+    if spec.analysis.fidelity == "truss" and bistable.kind.truss is not None:
+        return Parts(bistable.kind.truss(leaf.strip), TrussDiamond(one, share), bistable.half_beams)
+    return Parts(leaf, _springs(one, positive, share), bistable.half_beams)
+
+
+def leaf_law(bistable: Bistable, made_of: LeafMaterial) -> LeafLaw:
+    """Return the closed form of one snap-through leaf, with its shape."""
+    return bistable.kind.law(strip_of(bistable, made_of), bistable)
 
 
 def coils(springs: BoughtSprings) -> Coils:
@@ -128,10 +130,3 @@ def _springs(strip: LeafStrip, positive: Positive, share: float) -> Spring:
         "u-shape": lambda: UShape(strip, positive.radius, share),
     }
     return kinds[positive.structure]()
-
-
-_LEAVES: dict[str, Callable[[LeafStrip, Any], Leaf]] = {
-    "v-beam": lambda strip, _about: VBeam(strip),
-    "cosine": lambda strip, _about: CosineLeaf(strip),
-    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),
-}

@@ -32,7 +32,7 @@ from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
-from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, leaf_law, strip_of
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import CutPart
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 GAP = 0.01
@@ -52,9 +53,6 @@ FITS = 1.02
 FINE = 2e-4
 """How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
 
-POINTS = 201
-"""Of the edge of a cosine arch."""
-
 Point = tuple[float, float]
 Item = Point | Arc | Smooth
 """A corner, or an edge that is not straight."""
@@ -65,7 +63,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     sizes = sizes_of_frame(spec)
     leaves, low = leaves_contours(spec)
     bought = spec.mechanism.springs is not None
-    places, heights, _ = _centre_line(spec)
+    places, heights, _ = _leaf(spec).centre_line
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
     spring = [] if bought else spring_contours(spec, low - GAP)
     dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
@@ -192,9 +190,10 @@ def _check_levels(spec: VcfmSpec) -> None:
         With the place where they are closest, and the spacing at which they just touch.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    x, y, slope = _centre_line(spec)
+    law = _leaf(spec)
+    x, y, slope = law.centre_line
     steepest = int(np.abs(slope).argmax())
-    least = max(about.profile[1]) * float(np.hypot(1.0, slope[steepest]))
+    least = max(law.profile[1]) * float(np.hypot(1.0, slope[steepest]))
     if about.half_beams > 2 and frame.spacing <= least:
         at = (0.5 * frame.shuttle_width + float(x[steepest]), float(y[steepest]) + 0.5 * frame.spacing)
         raise GeometryError(
@@ -245,32 +244,23 @@ def sizes_of_frame(spec: VcfmSpec) -> FrameSizes:
     return frame_sizes(spec, spring_contours(spec, 0.0)[0].extents if seated else None)
 
 
-def _centre_line(spec: VcfmSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return x, y [m] and slope of a leaf as made, from the shuttle at (0, 0) to the wall."""
-    about = spec.mechanism.bistable
-    strip = strip_of(about, spec.mechanism.material)
-    reach, rise = float(strip.reach), float(strip.rise)
-    if about.structure == "cosine":
-        x = np.linspace(0.0, reach, POINTS)
-        wave = np.pi * x / reach
-        return x, -0.5 * rise * (1.0 - np.cos(wave)), -0.5 * np.pi * rise / reach * np.sin(wave)
-    x = np.linspace(0.0, reach, 2)
-    return x, -rise * x / reach, np.full(2, -rise / reach)
+def _leaf(spec: VcfmSpec) -> LeafLaw:
+    return leaf_law(spec.mechanism.bistable, spec.mechanism.material)
 
 
 def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
     """Return the upper (1) or lower (-1) edge of a leaf from the shuttle at `apex` to the wall."""
-    about = spec.mechanism.bistable
-    x, y, slope = _centre_line(spec)
+    law = _leaf(spec)
+    x, y, slope = law.centre_line
     stretch = np.hypot(1.0, slope)
-    if about.structure == "cosine":
-        half = 0.5 * side * about.thickness
+    if len(x) > 2:
+        half = 0.5 * side * law.strip.thickness
         points = np.column_stack([x - half * slope / stretch, y + half / stretch]) + np.array(apex)
         return [Smooth(points, np.column_stack([1.0 / stretch, slope / stretch]))]
     up = 0.5 * side * float(stretch[0])
     return [
         (apex[0] + share * float(x[-1]), apex[1] + share * float(y[-1]) + up * height)
-        for share, height in zip(*about.profile, strict=True)
+        for share, height in zip(*law.profile, strict=True)
     ]
 
 
@@ -298,16 +288,16 @@ class SolvedPiece:
 
 def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     """Return one leaf between shuttle and wall; both leaves of a V where the shuttle can turn."""
-    about, fillet = spec.mechanism.bistable, spec.mechanism.fillet
-    strip = strip_of(about, spec.mechanism.material)
+    law, fillet = _leaf(spec), spec.mechanism.fillet
+    strip = law.strip
     half, far = 0.5 * spec.mechanism.frame.shuttle_width, 0.5 * spec.mechanism.frame.shuttle_width + float(strip.reach)
-    rise, over = float(strip.rise), 2.0 * (max(about.profile[1]) + fillet)
+    rise, over = float(strip.rise), 2.0 * (max(law.profile[1]) + fillet)
     upper, lower = (_edge(spec, side, (half, 0.0)) for side in (1.0, -1.0))
     out = far + spec.mechanism.frame.block
     right: list[Item] = [(0.0, over), (half, over), *upper, (far, over - rise), (out, over - rise)]
     right += [(out, -over - rise), (far, -over - rise), *_back(lower), (half, -over), (0.0, -over)]
     wall = np.array([[far, over - rise], [out, over - rise], [out, -over - rise], [far, -over - rise]])
-    if about.guided:
+    if spec.mechanism.bistable.guided:
         shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
         return SolvedPiece(filleted(_contour(right), fillet)[0], shuttle, (wall,), True)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])

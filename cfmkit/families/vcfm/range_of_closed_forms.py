@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import RELIABLE, STEEP, STOCKY, THICK
 from cfmkit.families.vcfm.solution import goes_beyond
@@ -40,7 +39,7 @@ def leaves_out_of_range(solution: Solution) -> Any:
     """Return which leaves the closed form is not for, (m,)."""
     if solution.fidelity != "analytic":
         return False
-    if solution.structure == "hybrid":
+    if solution.leaf_kind.shortcoming is not None:
         return ~is_stocky(solution)
     reach = RELIABLE * solution.of_mechanisms(solution.parts.balance)
     steep = solution.of_mechanisms(solution.parts.strip.angle) > STEEP
@@ -52,15 +51,8 @@ def range_of_leaves(solution: Solution) -> Sentence:
     """Return why the closed form is not for these leaves."""
     strip, share, cure = solution.parts.strip, float(_slimness(solution)[0]), "analysis.fidelity=exact"
     verify = "verify with 'analysis.fidelity: exact'"
-    if isinstance(law := solution.parts.leaf, HybridLeaf):
-        much = (
-            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
-            f"{percent(law.crushing)} of the flexures' own buckling load these bend and buckle, which "
-            "pseudo-rigid bodies cannot: the force is overestimated, by up to several times"
-            if law.flexures_buckle
-            else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
-        )
-        return f"{much}; their stress is underestimated, by up to a half. V{verify[1:]}", cure
+    if (shortcoming := solution.leaf_kind.shortcoming) is not None:
+        return f"{shortcoming(solution.parts.leaf)}. V{verify[1:]}", cure
     if share > THICK:
         return (
             f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "

@@ -12,19 +12,23 @@ for one V: here they count the chains and leaves that are there.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS
+from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
+
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 @dataclass(frozen=True)
-class TrussLeaf:
+class TrussLeaf(LeafLaw):
     """One leaf as a bar on two pins [D, eq. 18]: half of E S u (u - s)(u - 2 s), u = d/L, s = sin(theta)."""
 
-    strip: LeafStrip
+    one_by_one: ClassVar[bool] = False
 
     def force(self, travel: Any) -> Any:
         """Return the force of one leaf along the motion [N].
@@ -45,11 +49,6 @@ class TrussLeaf:
         return self.strip.youngs_modulus * np.abs(s * u - 0.5 * u * u)
 
     @property
-    def balance(self) -> Any:
-        """Travel at which the bar carries nothing [m]: flat."""
-        return self.strip.rise
-
-    @property
     def first_stiffness(self) -> Any:
         """Stiffness as made [N/m]."""
         return self.strip.axial * np.sin(self.strip.angle) ** 2 / self.strip.length
@@ -59,14 +58,11 @@ class TrussLeaf:
         """Size of the largest negative stiffness [N/m]: where the bar is flat."""
         return 0.5 * self.first_stiffness
 
-    @property
-    def linear(self) -> tuple[Any, Any]:
-        """NaN: the law is nowhere straight."""
-        return np.nan, np.nan
-
-    def buckled(self, travel: Any) -> Any:
-        """Return False everywhere: the law does not know buckling."""
-        return np.zeros(np.shape(travel), dtype=bool)
+    def bent_line(self, travel: float) -> FloatArray:
+        """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]: straight."""
+        share = np.linspace(0.0, 1.0, POINTS)[:, None]
+        line: FloatArray = share * np.array([self.strip.reach, self.strip.rise - travel])
+        return line
 
 
 @dataclass(frozen=True)
