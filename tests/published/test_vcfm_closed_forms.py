@@ -136,7 +136,7 @@ def test_u_shape_is_softer_than_the_diamond(radius, stiffness):
 
 
 def test_folded_beams():
-    assert positive_stiffness_springs.folded(side(1.0, degrees=0.0)).stiffness == pytest.approx(1.881169, abs=5e-7)
+    assert positive_stiffness_springs.Folded(side(1.0, degrees=0.0)).stiffness == pytest.approx(1.881169, abs=5e-7)
 
 
 def test_straight_beam_stiffens_as_it_bends():

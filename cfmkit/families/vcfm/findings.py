@@ -13,7 +13,7 @@ from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
-from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, leaf_spring, spring_room
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE
 from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
@@ -119,8 +119,6 @@ def _contradiction(solution: Solution) -> Sentence:
 
 def is_closed(solution: Solution) -> NDArray[np.bool_]:
     """Return whether the spring is pressed together within the travel, (m,) of bool."""
-    if solution.spec.mechanism.kinds[0] in ("folded", "straight"):
-        return np.zeros(len(solution), dtype=bool)
     most = solution.column(lambda spec: max(spec.analysis.preloads))
     return np.asarray(most + solution.travel > solution.column(spring_room) * (1 + ROUNDING))
 
@@ -129,14 +127,14 @@ def closed_spring(solution: Solution) -> Sentence:
     """Return up to which travel the worst preload leaves the spring open, with what keeps it open."""
     spec, room = solution.spec, spring_room(solution.spec)
     most = max(spec.analysis.preloads)
-    positive, bought, needed = spec.mechanism.positive, spec.mechanism.springs, most + spec.travel - room
+    bought, needed = spec.mechanism.springs, most + spec.travel - room
     place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
     if bought is not None:
-        key, size = "mechanism.springs.free_length", at_least(closed_length(bought) + most + spec.travel)
-    elif positive is not None and positive.structure == "u-shape":
-        key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
+        key, least = "springs.free_length", closed_length(bought) + most + spec.travel
     else:
-        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
+        spring = leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
+        key, least = spring.opening(spec.mechanism.frame.corner, needed)
+    key, size = f"mechanism.{key}", at_least(least)
     return (
         f"the spring closes: its {'blocks' if bought is None else 'turns'} touch when it is compressed by {mm(room)}, "
         f"with a preload of {mm(most)} {place}, and curves end there; use less preload ('analysis.preloads') or travel "

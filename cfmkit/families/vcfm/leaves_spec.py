@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from cfmkit.families.vcfm.leaves.cosine import COSINE
 from cfmkit.families.vcfm.leaves.hybrid import HYBRID
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import DIAMOND, FOLDED, STRAIGHT, U_SHAPE
 from cfmkit.families.vcfm.leaves.v_beam import V_BEAM
 from cfmkit.specs.spec import Model, NonNegativeLength, PositiveLength
 from cfmkit.specs.units import Angle, Ratio
@@ -17,26 +18,36 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind
+    from cfmkit.families.vcfm.leaves.spring_kind import SpringKind
+    from cfmkit.families.vcfm.leaves.structure_kind import StructureKind
 
 LEAF_KINDS: dict[str, LeafKind] = {kind.name: kind for kind in (V_BEAM, COSINE, HYBRID)}
-"""Every kind of snap-through leaf, in the order of the documentation: a new one is its file in `leaves/` and its record
-here."""
+SPRING_KINDS: dict[str, SpringKind] = {kind.name: kind for kind in (DIAMOND, FOLDED, STRAIGHT, U_SHAPE)}
+"""Every kind of snap-through leaf, and of springs of leaves, in the order of the documentation.
+
+A new one is its file in `leaves/`, and its record here.
+"""
 
 if TYPE_CHECKING:
     LeafName = str
+    SpringName = str
 else:
     LeafName = Literal[tuple(LEAF_KINDS)]
+    SpringName = Literal[tuple(SPRING_KINDS)]
 
 LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
 SteepAngle = Annotated[Angle, Field(gt=0, le=radians(40))]
 
 
-def _slender(length: float, thickness: float) -> None:
-    if thickness >= length:
+def _check_sizes(block: Positive | Bistable) -> None:
+    if block.thickness >= block.length:
         raise ValueError("'thickness' must be smaller than 'length': a leaf is long and thin")
+    for key, what in block.kind.needs.items():
+        if getattr(block, key) is None:
+            raise ValueError(f"'structure: {block.structure}' needs '{key}', {what}")
 
 
-def _described(kinds: Iterable[LeafKind]) -> str:
+def _described(kinds: Iterable[StructureKind]) -> str:
     *others, last = (kind.description for kind in kinds)
     return f"{', '.join(others)}, or {last}"
 
@@ -44,9 +55,7 @@ def _described(kinds: Iterable[LeafKind]) -> str:
 class Positive(Model):
     """The spring: the structure with a positive stiffness, whose far end the preload moves."""
 
-    structure: Literal["diamond", "folded", "straight", "u-shape"] = Field(
-        "diamond", description="two chains of inclined leaves, eight folded ones, one straight beam, or two U-shapes"
-    )
+    structure: SpringName = Field(DIAMOND.name, description=_described(SPRING_KINDS.values()))
     loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
     length: PositiveLength = Field(description="of one flexible leaf, L1")
     angle: LeafAngle = Field(0.0, description="of a diamond's leaves from the direction across the motion, theta1")
@@ -56,11 +65,14 @@ class Positive(Model):
         None, description="of the flexible semicircle of a u-shape; the others have none"
     )
 
+    @property
+    def kind(self) -> SpringKind:
+        """Record of the kind of this spring."""
+        return SPRING_KINDS[self.structure]
+
     @model_validator(mode="after")
-    def _bend_has_a_radius(self) -> Self:
-        _slender(self.length, self.thickness)
-        if self.structure == "u-shape" and self.radius is None:
-            raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
+    def _sizes_fit(self) -> Self:
+        _check_sizes(self)
         return self
 
 
@@ -91,10 +103,7 @@ class Bistable(Model):
 
     @model_validator(mode="after")
     def _sizes_fit(self) -> Self:
-        _slender(self.length, self.thickness)
-        for key, what in self.kind.needs.items():
-            if getattr(self, key) is None:
-                raise ValueError(f"'structure: {self.structure}' needs '{key}', {what}")
+        _check_sizes(self)
         if self.flexure_length and 2.0 * self.flexure_length >= self.length:
             raise ValueError("two flexures of 'flexure_length' must be shorter than 'length'")
         return self

@@ -32,7 +32,7 @@ from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
-from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, leaf_law, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring, strip_of
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import CutPart
@@ -42,13 +42,11 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
+    from cfmkit.families.vcfm.leaves.spring_kind import LeafSpring
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 GAP = 0.01
 """Between the two parts of the drawing [m]."""
-
-FITS = 1.02
-"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
 
 FINE = 2e-4
 """How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
@@ -110,12 +108,12 @@ def _marks(spec: VcfmSpec, spring: Sequence[Contour], sizes: FrameSizes) -> Iter
     if not spring:
         return
     x0, y0, x1, y1 = spring[0].extents
-    half, kind = 0.5 * frame.block, spec.mechanism.flexures
-    yield mark(_box(-half, y0 if kind.structure == "straight" else y1 - frame.block, half, y1), driven=True)
-    if kind.structure != "straight":
+    half, own = 0.5 * frame.block, spec.mechanism.flexures
+    yield mark(_box(-half, y0 if own.kind.stands_on_ends else y1 - frame.block, half, y1), driven=True)
+    if not own.kind.stands_on_ends:
         yield mark(_box(-half, y0, half, y0 + frame.block), driven=False)
         return
-    for x in (x1 - frame.block, *([x0] if kind.loaded == "whole" else [])):
+    for x in (x1 - frame.block, *([x0] if own.loaded == "whole" else [])):
         yield mark(_box(x, y1 - 1.5 * frame.block, x + frame.block, y1 - 0.5 * frame.block), driven=False)
 
 
@@ -169,8 +167,8 @@ def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
 def _notes(spec: VcfmSpec) -> Iterator[str]:
     """Yield what the contours do not show."""
     about, count = spec.mechanism.positive, spec.mechanism.bistable.half_beams
-    if about is not None and about.structure == "folded" and about.loaded == "whole":
-        yield "one half of the eight folded beams is drawn: make it twice"
+    if about is not None and about.kind.drawing_note and about.loaded == "whole":
+        yield about.kind.drawing_note
     if count % 2:
         yield f"leaves are drawn as whole Vs: {count + 1} instead of {count}; leave one off"
     if about is None:
@@ -306,103 +304,31 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
-    about, frame, fillet = spec.mechanism.flexures, spec.mechanism.frame, spec.mechanism.fillet
+    law, frame, fillet = _spring(spec), spec.mechanism.frame, spec.mechanism.fillet
     half = 0.5 * frame.block
-    if about.structure == "straight":
-        right, bottom = _straight(spec, 0.0)
-        x, middle, out = half + about.length, -frame.block, half + about.length + frame.block
-        end = np.array([[x, middle + half], [out, middle + half], [out, middle - half], [x, middle - half]])
-        top = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
-        return SolvedPiece(filleted(_contour(right), fillet)[0], top, (end,), False)
-    if about.structure == "u-shape":
-        outer, inner, base = _bend(spec, 0.0)
-        low, high = _corners(inner)[1][1], _corners(inner)[0][1]
-        around: list[Item] = [(0.0, 0.0), (half, 0.0), *outer, (half, base - frame.block), (0.0, base - frame.block)]
-        around += [(0.0, low), *_back(inner), (0.0, high)]
-        top = np.array([[0.0, 0.0], [half, 0.0], [half, high], [0.0, high]])
-        foot = np.array([[0.0, low], [half, low], [half, base - frame.block], [0.0, base - frame.block]])
-        return SolvedPiece(filleted(_contour(around), fillet)[0], top, (foot,), False)
-    outer, inner, base = _diamond(spec, 0.0)
-    middle, (leaf, corner) = 0.5 * (base - frame.block), (inner[0], inner[1])
-    out, x = _corners(outer[3:4])[0][0], _corners(outer[1:2])[0][0]
-    around = [(0.0, 0.0), (half, 0.0), *outer[:4], (out, middle), (x, middle), corner, leaf]
-    start = _corners([leaf])[0][1]
-    top = np.array([[0.0, 0.0], [half, 0.0], [half, start], [0.0, start]])
-    line = np.array([[x, middle], [out, middle]])
-    return SolvedPiece(filleted(_contour([*around, (0.0, start)]), fillet)[0], top, (line,), False, True)
+    around, bottom, held, glides = law.solved_half(law.edges(frame.block, frame.corner, fillet, 0.0), half)
+    block = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
+    contour = _contour([(0.0, 0.0), (half, 0.0), *around])
+    return SolvedPiece(filleted(contour, fillet)[0], block, (np.array(held),), False, glides)
 
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
     """Return the spring with its rigid blocks, its upper end at `top` [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half = 0.5 * frame.block
-    if about.structure == "straight":
-        right, bottom = _straight(spec, top)
-        return [_contour([(-half, top), *right[1:-1], (-half, bottom)])] if about.loaded == "half" else [_whole(right)]
-    outer, inner, base = (_bend if about.structure == "u-shape" else _diamond)(spec, top)
-    low = base - frame.block
-    if about.loaded == "half":
-        ends = _corners(inner)
-        hollow: list[Item] = [(-half, ends[1][1]), *_back(inner), (-half, ends[0][1])]
+    frame, half = spec.mechanism.frame, 0.5 * spec.mechanism.frame.block
+    outer, inner, low = _spring(spec).edges(frame.block, frame.corner, spec.mechanism.fillet, top)
+    if spec.mechanism.flexures.loaded == "half":
+        hollow = [(-half, inner[-1][1]), *_back(inner), (-half, inner[0][1])] if inner else []
         return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
     whole = _whole([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
-    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)]
+    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)] if inner else [whole]
 
 
-def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
-    """Return outer and inner edge of the right chain from its top down, and the height of its lower end [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    strip = strip_of(about, spec.mechanism.material)
-    half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
-    rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
-    # high enough for the fillet beside it; where the spring closes, its inner edges meet, not these
-    room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * spec.mechanism.fillet
-    rim = max(RIM * about.thickness, v + FITS * room)
-    high = top - frame.block
-    up, down = high - rise, high - rise - frame.corner
-    base, out = down - rise, x + frame.block
-    outer: list[Item] = [(half, high + v), (x, up + v), (x, up + rim), (out, up + rim)]
-    outer += [(out, down - rim), (x, down - rim), (x, down - v), (half, base - v)]
-    return outer, [(half, high - v), (x, up - v), (x, down + v), (half, base + v)], base
-
-
-def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
-    """Return the same of a U-shaped chain."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half, v, radius = 0.5 * frame.block, 0.5 * about.thickness, float(about.radius or 0.0)
-    if radius <= v:
-        raise GeometryError(
-            f"a bend of radius {mm(radius)} cannot be cut in a leaf of {mm(about.thickness)}: its inside would cross "
-            f"itself; use a radius above {mm(v)} ('mechanism.positive.radius')"
-        )
-    high, x = top - frame.block, 0.5 * frame.block + about.length
-    center, base = (x, high - radius), high - 2.0 * radius
-    edges: list[list[Item]] = []
-    for side in (1.0, -1.0):
-        arc = Arc(center, radius + side * v, 0.5 * np.pi, -0.5 * np.pi)
-        edges.append([(half, high + side * v), arc, (half, base - side * v)])
-    return edges[0], edges[1], base
-
-
-def _straight(spec: VcfmSpec, top: float) -> tuple[list[Item], float]:
-    """Return the right half of a straight beam with its blocks, and its lowest point [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half, v = 0.5 * frame.block, 0.5 * about.thickness
-    x, middle = half + about.length, top - frame.block
-    out, bottom = x + frame.block, top - frame.block - half
-    right: list[Item] = [(0.0, top), (half, top), (half, middle + v), (x, middle + v), (x, middle + half)]
-    right += [(out, middle + half), (out, middle - half), (x, middle - half), (x, middle - v), (half, middle - v)]
-    return [*right, (half, bottom), (0.0, bottom)], bottom
+def _spring(spec: VcfmSpec) -> LeafSpring:
+    return leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
 
 
 def _whole(right: list[Item]) -> Contour:
     return _contour([*right, *_mirrored(right)])
-
-
-def _corners(items: Sequence[Item]) -> tuple[Point, Point]:
-    """Return where a chain begins and ends."""
-    (first, _), (_, last) = _ends(items[0]), _ends(items[-1])
-    return first, last
 
 
 def _ends(item: Item) -> tuple[Point, Point]:

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
-from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import UShape
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring
+from cfmkit.families.vcfm.leaves.spring_kind import RIM
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
     from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
     from cfmkit.families.vcfm.solution import Solution
 
@@ -103,18 +101,12 @@ def _add_spring(found: Scene, solution: Solution, top: float, compression: float
         return
     about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, rim = 0.5 * frame.block, RIM * about.thickness
-    if about.structure == "straight":
-        _add_straight(found, solution, top, compression)
+    lines, height = leaf_spring(about, solution.spec.mechanism.material).bent_lines(compression, frame.corner)
+    if about.kind.stands_on_ends:
+        _add_on_ends(found, solution, top, lines[0], height)
         return
-    if about.structure == "u-shape":
-        chain = u_chain(strip_of(about, solution.spec.mechanism.material), float(about.radius or 0.0), compression)
-        lines, corners, height = [chain], [], float(chain[-1, 1])
-    else:
-        lower = bent_leaf(strip_of(about, solution.spec.mechanism.material), 0.5 * compression, free=True)
-        height = 2.0 * float(lower[-1, 1]) + frame.corner
-        lines = [lower, lower * np.array([1.0, -1.0]) + np.array([0.0, height])]
-        x, y = lower[-1]
-        corners = [rectangle(x, y - rim, x + frame.block, y + frame.corner + rim)]
+    ends = [line[-1] for line in lines[:-1]]
+    corners = [rectangle(x, y - rim, x + frame.block, y + frame.corner + rim) for x, y in ends]
     shift = np.array([half, top - frame.block - height])
     sides = (1.0,) if about.loaded == "half" else (1.0, -1.0)
     for side in sides:
@@ -162,11 +154,10 @@ def _add_coils(found: Scene, solution: Solution, bottom: float, deflection: floa
     found.base = (0.5 * (left + right), end + away)
 
 
-def _add_straight(found: Scene, solution: Solution, top: float, compression: float) -> None:
-    """Add a straight beam clamped at both ends, with the shuttle on its middle."""
+def _add_on_ends(found: Scene, solution: Solution, top: float, line: FloatArray, compression: float) -> None:
+    """Add a beam clamped at both ends, with the shuttle on its middle."""
     about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, length = 0.5 * frame.block, about.length
-    line = bent_leaf(strip_of(about, solution.spec.mechanism.material), -compression)
     middle = top - half
     for side in (1.0, -1.0):
         mirror = np.array([side, 1.0])
@@ -176,28 +167,3 @@ def _add_straight(found: Scene, solution: Solution, top: float, compression: flo
         found.rigid.append(rectangle(ends[0], end - half, ends[1], end + half))
     found.rigid.append(rectangle(-half, middle - half, half, top))
     found.base = (half + length + half, middle + compression - half)
-
-
-def u_chain(strip: LeafStrip, radius: float, compression: float) -> FloatArray:
-    """Return the centre line of one U-shaped chain from the clamped end (0, 0) up to the guided one.
-
-    The moment is linear across the motion, about the chain's centroid [Castigliano].
-    """
-    length = float(strip.length)
-    half = np.pi * radius
-    legs = np.linspace(0, length, 40)
-    s = np.concatenate([legs, length + np.linspace(0, half, 61)[1:], length + half + legs[1:]])
-    arc = np.clip((s - length) / radius, 0.0, np.pi)
-    middle = 0.5 * (s[1:] + s[:-1])
-    turn_as_made = np.interp(middle, s, arc)
-    x = np.concatenate([[0.0], np.cumsum(np.cos(turn_as_made) * np.diff(s))])
-    developed, centroid, second = UShape(strip, radius).moments
-    over_ei = 0.5 * compression / (second - centroid**2 * developed)  # force of one chain over EI
-    curvature = -over_ei * (0.5 * (x[1:] + x[:-1]) - centroid)
-    turn = np.concatenate([[0.0], np.cumsum(curvature * np.diff(s))])
-    angles = turn_as_made - 0.5 * (turn[1:] + turn[:-1])
-    steps = np.column_stack([np.cos(angles), np.sin(angles)]) * np.diff(s)[:, None]
-    line = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
-    end = np.array([0.0, 2.0 * radius - compression])
-    found: FloatArray = line + (s / s[-1])[:, None] * (end - line[-1])
-    return found

@@ -27,8 +27,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import is_too_wide
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
-from cfmkit.families.vcfm.leaves.leaf_kind import ProposedStructure
-from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS
+from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
@@ -59,13 +58,11 @@ THICKER = (1.0, 1.6, 2.4)
 MIDDLE = (0.8, 0.9)
 """Share of the linear region that is used: the exact leaves depart from the line at its ends."""
 
-FOLDED = ProposedStructure(
-    "folded spring", "2 Vs, folded spring", 1, lambda _leaf: {"structure": "folded", "angle": 0.0}
-)
 STRUCTURES = {
-    one.name: (key, one)
-    for key, one in (("positive", FOLDED), *(("bistable", kind.proposal) for kind in LEAF_KINDS.values()))
-    if one is not None
+    kind.proposal.name: (block, kind.proposal)
+    for block, kinds in (("positive", SPRING_KINDS.values()), ("bistable", LEAF_KINDS.values()))
+    for kind in kinds
+    if kind.proposal is not None
 }
 """Name -> the block that is changed, and what is proposed in place of a designed diamond or its Vs."""
 

@@ -251,13 +251,13 @@ class Solution(ShortRepr):
         Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
         constant stiffness. Then no single number stands for the curve.
         """
-        kinds, curves = self.spec.mechanism.kinds, self.nominal
+        about, curves = self.spec.mechanism.positive, self.nominal
         place = self.of_mechanisms(self.parts.balance)[:, None]
         force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
         buckles = np.isfinite(self.linear[0]) & self.leaf_kind.buckles
         bears = (np.abs(curves.sampler.leaf_force(place)[:, 0]) > self._flatness * np.abs(force)) & ~buckles
-        return np.where(bears | (kinds[0] == "straight"), np.nan, force)
+        return np.where(bears | (about is not None and not about.kind.is_linear), np.nan, force)
 
     @cached_property
     def constant_force(self) -> FloatArray:

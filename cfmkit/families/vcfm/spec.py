@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import sin
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
-from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, Bistable, Positive
+from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.block import keys_of
 from cfmkit.specs.spec import (
@@ -234,10 +234,6 @@ OTHER_DEFAULTS = "; ".join(
 """Of `analysis.fidelity`."""
 
 
-def _quoted(names: Iterable[str]) -> str:
-    return " and ".join(f"'{name}'" for name in names)
-
-
 class VcfmAnalysis(Analysis):
     """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
 
@@ -345,10 +341,12 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
-        spring, leaves = self.mechanism.kinds[0], self.mechanism.bistable.kind
-        if self.analysis.fidelity == "truss" and (spring != "diamond" or leaves.truss is None):
-            names = _quoted(kind.name for kind in LEAF_KINDS.values() if kind.truss is not None)
-            raise ValueError(f"the truss laws are for 'diamond' and {names}; choose another 'analysis.fidelity'")
+        both = self.mechanism.positive, self.mechanism.bistable
+        if self.analysis.fidelity == "truss" and any(one is None or one.kind.truss is None for one in both):
+            names = [
+                f"'{kind.name}'" for kind in (*SPRING_KINDS.values(), *LEAF_KINDS.values()) if kind.truss is not None
+            ]
+            raise ValueError(f"the truss laws are for {' and '.join(names)}; choose another 'analysis.fidelity'")
         return self
 
     @model_validator(mode="after")
@@ -368,11 +366,15 @@ class VcfmSpec(Spec):
     def _design_has_laws(self) -> Self:
         if self.design is None:
             return self
-        spring, leaves = self.mechanism.kinds[0], self.mechanism.bistable.kind
-        if not leaves.can_be_designed or (spring not in ("diamond", "springs") and not self.design.catalogue):
-            names = _quoted(kind.name for kind in LEAF_KINDS.values() if kind.can_be_designed)
-            raise ValueError(f"only {names} with a 'diamond' or with 'springs' can be designed; remove 'design'")
-        free = spring == "springs" or bool(self.design.catalogue)
+        spring, leaves = self.mechanism.positive, self.mechanism.bistable
+        fixed = spring is not None and not self.design.catalogue
+        if not leaves.kind.can_be_designed or (spring is not None and fixed and not spring.kind.can_be_designed):
+            names, springs = (
+                " or ".join(f"'{kind.name}'" for kind in kinds.values() if kind.can_be_designed)
+                for kinds in (LEAF_KINDS, SPRING_KINDS)
+            )
+            raise ValueError(f"only {names} with a {springs} or with 'springs' can be designed; remove 'design'")
+        free = not fixed
         if not free and self.design.preload is None and self.design.rise is None:
             raise ValueError(
                 "'design' needs either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"

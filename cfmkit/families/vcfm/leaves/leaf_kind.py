@@ -8,15 +8,16 @@ compares names.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
+from cfmkit.families.vcfm.leaves.structure_kind import StructureKind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
@@ -114,27 +115,12 @@ class SlendernessLimits:
 
 
 @dataclass(frozen=True)
-class ProposedStructure:
-    """Another structure in place of the designed leaves, or of the designed diamond, as `suggest` proposes it."""
-
-    name: str
-    variant: str  # what two Vs and a diamond are called with it
-    turn: int  # the order in which variants are tried, see `proposals_for_wish.TURNS`
-    changes: Callable[[Any], dict[str, Any]]  # from the leaf as designed: keys of its own block -> values
-
-
-@dataclass(frozen=True)
-class LeafKind:
+class LeafKind(StructureKind):
     """A kind of snap-through leaf: everything that distinguishes it from the others."""
 
-    name: str  # in `mechanism.bistable.structure`
-    description: str  # a plural noun
     law: Callable[[LeafStrip, Any], LeafLaw]  # from dimensions and material, and the keys of `mechanism.bistable`
-    needs: Mapping[str, str] = field(default_factory=dict)  # keys that must be given -> what of
+    truss: Callable[[LeafStrip], LeafLaw] | None = None
     fidelity: str | None = None  # default of `analysis.fidelity`; None: that of the family
-    truss: Callable[[LeafStrip], LeafLaw] | None = None  # law of the fidelity `truss`; None if it has none
-    can_be_designed: bool = False  # whether `cfmkit design` has sizing rules for it
     buckles: bool = True  # whether a constant negative stiffness means that it is buckled, and carries nothing if flat
     limits: SlendernessLimits | None = None  # None: the curve shows whether its stiffness is negative, and constant
     shortcoming: Callable[[Any], str] | None = None  # from its law: why that is rough for all sizes; None if it is not
-    proposal: ProposedStructure | None = None  # None: not proposed

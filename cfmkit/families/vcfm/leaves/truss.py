@@ -18,6 +18,7 @@ import numpy as np
 
 from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS
 from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
+from cfmkit.families.vcfm.leaves.spring_kind import leaf_stress
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -83,6 +84,4 @@ class TrussDiamond:
 
     def stress(self, compression: Any) -> Any:
         """Return the largest bending stress [Pa]."""
-        from cfmkit.families.vcfm.leaves.positive_stiffness_springs import leaf_stress
-
         return leaf_stress(self.strip, 0.5 * compression)
