@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+    from cfmkit.families.vcfm.leaves.kinds import SpringChain
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-    from cfmkit.families.vcfm.leaves.spring_kind import SpringChain
     from cfmkit.families.vcfm.leaves_spec import Bistable
     from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
     from cfmkit.results import Result

@@ -13,8 +13,7 @@ from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
-    from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
-    from cfmkit.families.vcfm.leaves.spring_kind import LeafSpring, SpringLaw
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.leaves_spec import Bistable, Positive
     from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
 
@@ -24,7 +23,7 @@ class Parts:
     """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
 
     leaf: LeafLaw  # law of one half-beam of the snap-through structure
-    spring: SpringLaw  # law of the spring, as much of it as is loaded
+    spring: LeafSpring | Coils  # law of the spring, as much of it as is loaded
     half_beams: Any  # leaves that carry the shuttle
 
     @property

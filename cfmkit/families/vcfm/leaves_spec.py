@@ -17,9 +17,7 @@ from cfmkit.specs.units import Angle, Ratio
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind
-    from cfmkit.families.vcfm.leaves.spring_kind import SpringKind
-    from cfmkit.families.vcfm.leaves.structure_kind import StructureKind
+    from cfmkit.families.vcfm.leaves.kinds import LeafKind, SpringKind, StructureKind
 
 LEAF_KINDS: dict[str, LeafKind] = {kind.name: kind for kind in (V_BEAM, COSINE, HYBRID)}
 SPRING_KINDS: dict[str, SpringKind] = {kind.name: kind for kind in (DIAMOND, FOLDED, STRAIGHT, U_SHAPE)}

@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
-    from cfmkit.families.vcfm.leaves.spring_kind import LeafSpring
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 GAP = 0.01

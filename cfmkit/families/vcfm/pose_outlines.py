@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring
-from cfmkit.families.vcfm.leaves.spring_kind import RIM
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import RIM
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw
     from cfmkit.families.vcfm.solution import Solution
 
 

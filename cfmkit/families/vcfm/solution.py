@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.curves_in_rows import Characteristics, PartSampler, Rows
     from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
-    from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind
+    from cfmkit.families.vcfm.leaves.kinds import LeafKind
     from cfmkit.families.vcfm.spec import VcfmSpec
 
     Ends = tuple[FloatArray, FloatArray]

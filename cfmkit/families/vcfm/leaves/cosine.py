@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
-from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind, LeafLaw
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
 from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
-from cfmkit.families.vcfm.leaves.structure_kind import ProposedStructure
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

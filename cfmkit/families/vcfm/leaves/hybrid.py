@@ -18,8 +18,7 @@ import numpy as np
 
 from cfmkit.families.findings import percent
 from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
-from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind, LeafLaw
-from cfmkit.families.vcfm.leaves.structure_kind import ProposedStructure
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -25,16 +25,14 @@ import numpy as np
 from cfmkit.errors import GeometryError
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
+from cfmkit.families.vcfm.leaves.kinds import LeafSpring, ProposedStructure, SpringChain, SpringKind
 from cfmkit.families.vcfm.leaves.s_form import s_force
-from cfmkit.families.vcfm.leaves.spring_kind import RIM, LeafSpring, SpringChain, SpringKind, leaf_chain, leaf_stress
-from cfmkit.families.vcfm.leaves.structure_kind import ProposedStructure
-from cfmkit.families.vcfm.leaves.truss import TrussDiamond
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Section
+    from cfmkit.elastica import Section, Support
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-    from cfmkit.families.vcfm.leaves.spring_kind import Edge
+    from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
 
 def leaf_compliance(strip: LeafStrip) -> Any:
@@ -54,6 +52,24 @@ def leaf_compliance(strip: LeafStrip) -> Any:
 
 FITS = 1.02
 """Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
+
+
+def leaf_stress(strip: LeafStrip, deflection: Any) -> Any:
+    """Return the bending stress at the ends of a leaf that is deflected by so much [m], in Pa."""
+    e, t, length = strip.youngs_modulus, strip.thickness, strip.length
+    return 3.0 * e * t * np.abs(deflection) * np.cos(strip.angle) / length**2
+
+
+def leaf_chain(strip: LeafStrip, section: Section, support: Support, travel: float, count: float) -> SpringChain:
+    """Return one leaf, clamped at one end, as what is traced of a spring."""
+    from cfmkit.elastica import CLAMPED, Beam, Network, Node
+
+    nodes = {"wall": Node(0, 0, CLAMPED), "end": Node(strip.reach, strip.rise, support)}
+    return SpringChain(Network(nodes, {"leaf": Beam("wall", "end", section)}), "end", travel, count)
+
+
+RIM = 0.75
+"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +104,7 @@ class Diamond(LeafSpring):
 
         return leaf_chain(self.strip, section, Support(rotation=True), 0.5, 2.0 * self.pairs * self.share)
 
-    def edges(self, block: float, corner: float, fillet: float, top: float) -> tuple[Edge, Edge, float]:
+    def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
         """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
         strip = self.strip
         half, x = 0.5 * block, 0.5 * block + float(strip.reach)
@@ -103,7 +119,7 @@ class Diamond(LeafSpring):
         outer += [(out, down - rim), (x, down - rim), (x, down - v), (half, base - v)]
         return outer, [(half, high - v), (x, up - v), (x, down + v), (half, base + v)], base - block
 
-    def solved_half(self, edges: tuple[Edge, Edge, float], _half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_half(self, edges: Edges, _half: float) -> tuple[Edge, float, Edge, bool]:
         """Return the upper half of a chain, which is held by the middle of its corner."""
         outer, inner, low = edges
         middle, (leaf, corner) = 0.5 * low, inner[:2]
@@ -126,6 +142,16 @@ class Folded(Diamond):
     def room(self, _corner: float) -> float:
         """Return infinity: no blocks meet."""
         return np.inf
+
+
+@dataclass(frozen=True)
+class TrussDiamond(Diamond):
+    """The diamond by bending alone [D, eq. 19]: E b t^3/(2 (L cos)^3) for each chain."""
+
+    @property
+    def stiffness(self) -> Any:
+        """K_p [N/m]."""
+        return 2.0 * self.share * 6.0 * self.strip.bending / self.strip.reach**3
 
 
 @dataclass(frozen=True)
@@ -187,7 +213,7 @@ class UShape(LeafSpring):
         }
         return SpringChain(Network(nodes, beams), "end", 1.0, 2.0 * self.share)
 
-    def edges(self, block: float, _corner: float, _fillet: float, top: float) -> tuple[Edge, Edge, float]:
+    def edges(self, block: float, _corner: float, _fillet: float, top: float) -> Edges:
         """Return outer and inner edge of the right chain from its top down, and its lowest point [m]."""
         from cfmkit.export.contours import Arc
 
@@ -204,7 +230,7 @@ class UShape(LeafSpring):
         inner = [(half, high - v), bends[1], (half, base + v)]
         return outer, inner, base - block
 
-    def solved_half(self, edges: tuple[Edge, Edge, float], half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_half(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
         """Return one chain, which is held by its lower block."""
         outer, inner, low = edges
         (_, high), arc, (_, foot) = inner
@@ -274,7 +300,7 @@ class StraightSpring(LeafSpring):
 
         return leaf_chain(self.strip, section, guided(0.5 * np.pi), 1.0, 2.0 * self.share)
 
-    def edges(self, block: float, _corner: float, _fillet: float, top: float) -> tuple[Edge, Edge, float]:
+    def edges(self, block: float, _corner: float, _fillet: float, top: float) -> Edges:
         """Return the edge of the right half, with its end block, and its lowest point [m]."""
         half, v = 0.5 * block, 0.5 * self.strip.thickness
         x, middle = half + self.strip.length, top - block
@@ -283,7 +309,7 @@ class StraightSpring(LeafSpring):
         outer += [(out, middle - half), (x, middle - half), (x, middle - v), (half, middle - v)]
         return outer, [], bottom
 
-    def solved_half(self, edges: tuple[Edge, Edge, float], half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_half(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
         """Return the right half, which is held by its end block."""
         outer, _, low = edges
         return [*outer, (half, low), (0.0, low)], low, outer[2:6], False

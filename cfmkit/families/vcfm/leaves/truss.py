@@ -1,12 +1,11 @@
-"""The paper's own laws as intended: a bar that only compresses, and a diamond that only bends. For comparison.
+"""The paper's own law of a leaf as intended: a bar that only compresses. For comparison.
 
 The bar ignores buckling and clamping. For the leaf of Table I of [D] its peak is 36 % too high and at twice the travel,
 and its steepest slope is 2.8 times that of the real leaf. It is nowhere straight.
 
 Reference
 ---------
-[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 18 and 19. The formula of eq. 19 is for one chain of the diamond, eq. 18
-for one V: here they count the chains and leaves that are there.
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 18, which is for one V: here the leaves count that are there.
 """
 
 from __future__ import annotations
@@ -17,12 +16,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS
-from cfmkit.families.vcfm.leaves.leaf_kind import LeafLaw
-from cfmkit.families.vcfm.leaves.spring_kind import leaf_stress
+from cfmkit.families.vcfm.leaves.kinds import LeafLaw
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 @dataclass(frozen=True)
@@ -64,24 +61,3 @@ class TrussLeaf(LeafLaw):
         share = np.linspace(0.0, 1.0, POINTS)[:, None]
         line: FloatArray = share * np.array([self.strip.reach, self.strip.rise - travel])
         return line
-
-
-@dataclass(frozen=True)
-class TrussDiamond:
-    """The diamond by bending alone [D, eq. 19]: E b t^3/(2 (L cos)^3) for each chain."""
-
-    strip: LeafStrip
-    share: Any = 1.0
-
-    @property
-    def stiffness(self) -> Any:
-        """K_p [N/m]."""
-        return 2.0 * self.share * 6.0 * self.strip.bending / self.strip.reach**3
-
-    def force(self, compression: Any) -> Any:
-        """Return the force [N] at a compression [m]."""
-        return self.stiffness * compression
-
-    def stress(self, compression: Any) -> Any:
-        """Return the largest bending stress [Pa]."""
-        return leaf_stress(self.strip, 0.5 * compression)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
-from cfmkit.families.vcfm.leaves.leaf_kind import LeafKind, LeafLaw, SlendernessLimits
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, SlendernessLimits
 from cfmkit.families.vcfm.leaves.s_form import pose, s_force
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 
