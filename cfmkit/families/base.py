@@ -163,6 +163,8 @@ def function_named(name: str) -> Any:
     --------
     >>> function_named("math:hypot")(3.0, 4.0)
     5.0
+    >>> function_named("operator:add:a")("b")
+    'ab'
     """
     module, function, *words = name.split(":")
     found = getattr(import_module(module), function)

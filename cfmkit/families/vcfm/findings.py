@@ -148,10 +148,8 @@ def closed_spring(solution: Solution) -> Sentence:
 
 def _truss(solution: Solution) -> Sentence:
     about = solution.spec.mechanism
-    law, places = (
-        leaf_law(about.bistable, about.material),
-        np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise),
-    )
+    law = leaf_law(about.bistable, about.material)
+    places = np.linspace(0.0, 1.0, 401) * float(law.strip.rise)
     bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
     high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf

@@ -107,12 +107,12 @@ def _marks(spec: VcfmSpec, spring: Sequence[Contour], sizes: FrameSizes) -> Iter
     if not spring:
         return
     x0, y0, x1, y1 = spring[0].extents
-    half, own = 0.5 * frame.block, spec.mechanism.flexures
-    yield mark(_box(-half, y0 if own.kind.stands_on_ends else y1 - frame.block, half, y1), driven=True)
-    if not own.kind.stands_on_ends:
+    half, flexures = 0.5 * frame.block, spec.mechanism.flexures
+    yield mark(_box(-half, y0 if flexures.kind.stands_on_ends else y1 - frame.block, half, y1), driven=True)
+    if not flexures.kind.stands_on_ends:
         yield mark(_box(-half, y0, half, y0 + frame.block), driven=False)
         return
-    for x in (x1 - frame.block, *([x0] if own.loaded == "whole" else [])):
+    for x in (x1 - frame.block, *([x0] if flexures.loaded == "whole" else [])):
         yield mark(_box(x, y1 - 1.5 * frame.block, x + frame.block, y1 - 0.5 * frame.block), driven=False)
 
 
@@ -305,7 +305,7 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
     law, frame, fillet = _spring(spec), spec.mechanism.frame, spec.mechanism.fillet
     half = 0.5 * frame.block
-    around, bottom, held, glides = law.solved_half(law.edges(frame.block, frame.corner, fillet, 0.0), half)
+    around, bottom, held, glides = law.solved_piece(law.edges(frame.block, frame.corner, fillet, 0.0), half)
     block = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
     contour = _contour([(0.0, 0.0), (half, 0.0), *around])
     return SolvedPiece(filleted(contour, fillet)[0], block, (np.array(held),), False, glides)

@@ -174,6 +174,7 @@ HYBRID = LeafKind(
     "flexures with a stiff middle",
     lambda strip, keys: HybridLeaf(strip, keys.flexure_length, keys.stiffening or STIFFENING),
     needs={"flexure_length": "of each of its two flexures"},
+    lengths=("flexure_length",),
     fidelity="exact",
     buckles=False,
     shortcoming=_shortcoming,

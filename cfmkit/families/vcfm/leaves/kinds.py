@@ -159,7 +159,7 @@ class LeafSpring(ABC):
         """
 
     @abstractmethod
-    def solved_half(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_piece(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
         """Return what symmetry leaves for the model of solids, from the edges of a spring with its upper end at zero.
 
         Its edge from the upper block down and around to x = 0, the lower end of the block that is driven, the corners
@@ -199,6 +199,7 @@ class StructureKind:
     needs: Mapping[str, str] = field(default_factory=dict)  # keys that must be given -> what of
     truss: Callable[..., Any] | None = None  # law of the fidelity `truss`; None if it has none
     is_inclined: bool = True  # whether its leaves have an angle
+    lengths: tuple[str, ...] = ()  # keys of its own that grow with its leaves
     can_be_designed: bool = False  # whether `cfmkit design` has sizing rules for it
     proposal: ProposedStructure | None = None  # None: not proposed
 

@@ -119,7 +119,7 @@ class Diamond(LeafSpring):
         outer += [(out, down - rim), (x, down - rim), (x, down - v), (half, base - v)]
         return outer, [(half, high - v), (x, up - v), (x, down + v), (half, base + v)], base - block
 
-    def solved_half(self, edges: Edges, _half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_piece(self, edges: Edges, _half: float) -> tuple[Edge, float, Edge, bool]:
         """Return the upper half of a chain, which is held by the middle of its corner."""
         outer, inner, low = edges
         middle, (leaf, corner) = 0.5 * low, inner[:2]
@@ -230,7 +230,7 @@ class UShape(LeafSpring):
         inner = [(half, high - v), bends[1], (half, base + v)]
         return outer, inner, base - block
 
-    def solved_half(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_piece(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
         """Return one chain, which is held by its lower block."""
         outer, inner, low = edges
         (_, high), arc, (_, foot) = inner
@@ -309,7 +309,7 @@ class StraightSpring(LeafSpring):
         outer += [(out, middle - half), (x, middle - half), (x, middle - v), (half, middle - v)]
         return outer, [], bottom
 
-    def solved_half(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
+    def solved_piece(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
         """Return the right half, which is held by its end block."""
         outer, _, low = edges
         return [*outer, (half, low), (0.0, low)], low, outer[2:6], False
