@@ -42,20 +42,10 @@ N_FLEXURE_POINTS = 15
 
 @dataclass(frozen=True)
 class HybridLeaf(LeafLaw):
-    """The law of one hybrid leaf. Some force is left where the line between its ends is flat.
+    """The law of one hybrid leaf, of flexures as thick as its strip; some force is left where its chord is flat."""
 
-    Parameters
-    ----------
-    strip : LeafStrip
-        Of the flexures; its length is that of the whole leaf.
-    flexure : float
-        Length of each flexure [m].
-    stiffening : float
-        Thickness of the bar over that of the flexures.
-    """
-
-    flexure: Any
-    stiffening: Any = STIFFENING
+    flexure: Any  # length of each flexure [m]
+    stiffening: Any = STIFFENING  # thickness of the bar over that of the flexures
 
     @property
     def pivot(self) -> Any:
