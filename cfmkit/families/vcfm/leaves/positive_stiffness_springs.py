@@ -35,6 +35,13 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.leaves.kinds import Edge, Edges
 
 
+RIM = 0.75
+"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
+
+FITS = 1.02
+"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
+
+
 def leaf_compliance(strip: LeafStrip) -> Any:
     """Return the compliance of a leaf whose far end is guided and free to move across [m/N].
 
@@ -50,26 +57,12 @@ def leaf_compliance(strip: LeafStrip) -> Any:
     return bent + strip.length * c2 / strip.shear + strip.length * s2 / strip.axial
 
 
-FITS = 1.02
-"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
-
-
-def leaf_stress(strip: LeafStrip, deflection: Any) -> Any:
-    """Return the bending stress at the ends of a leaf that is deflected by so much [m], in Pa."""
-    e, t, length = strip.youngs_modulus, strip.thickness, strip.length
-    return 3.0 * e * t * np.abs(deflection) * np.cos(strip.angle) / length**2
-
-
 def leaf_chain(strip: LeafStrip, section: Section, support: Support, travel: float, count: float) -> SpringChain:
     """Return one leaf, clamped at one end, as what is traced of a spring."""
     from cfmkit.elastica import CLAMPED, Beam, Network, Node
 
     nodes = {"wall": Node(0, 0, CLAMPED), "end": Node(strip.reach, strip.rise, support)}
     return SpringChain(Network(nodes, {"leaf": Beam("wall", "end", section)}), "end", travel, count)
-
-
-RIM = 0.75
-"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +84,9 @@ class Diamond(LeafSpring):
         return self.pairs * self.share / leaf_compliance(self.strip)
 
     def stress(self, compression: Any) -> Any:
-        """Return the largest bending stress [Pa]."""
-        return leaf_stress(self.strip, 0.5 * compression)
+        """Return the largest bending stress [Pa]: at the ends of the leaves, each of which takes half."""
+        e, t, length = self.strip.youngs_modulus, self.strip.thickness, self.strip.length
+        return 3.0 * e * t * np.abs(0.5 * compression) * np.cos(self.strip.angle) / length**2
 
     def room(self, corner: float) -> float:
         """Return by how much it can be compressed until the blocks meet [m]."""
