@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from cfmkit.families.vcfm.flattening_widths_or_window import extreme_sums
 from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.kinds import LeafLaw
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
 from cfmkit.families.vcfm.leaves.laws_in_rows import stacked
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
@@ -530,6 +531,20 @@ def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
     assert two.force(travel)[1] == pytest.approx(2.0 * leaf.force(travel)[0], rel=1e-12)
     assert two.state(travel)[1].shape == two.buckled(travel).shape == (2, 9)
     assert two.balance[:, 0].tolist() == [bar.balance] * 2
+
+
+def test_the_example_of_the_page_is_a_kind_of_leaf():
+    page = (CONFIGS.parent / "docs" / "vcfm.md").read_text(encoding="utf-8")
+    code = page.split("## Adding a kind of leaf or spring")[1].split("```python\n")[1].split("```")[0]
+    given = {"Any": Any, "LeafKind": LeafKind, "LeafLaw": LeafLaw, "VBeam": VBeam}
+    names: dict[str, Any] = given | {"dataclass": dataclass, "replace": replace, "__name__": __name__}
+    exec(code, names)  # the page's own code
+    travel, kind = np.linspace(0.0, 2.0, 41) * LEAF.rise, names["TAPERED"]
+    even = VBeam(replace(LEAF, thickness=1.1 * LEAF.thickness))
+    law = kind.law(LEAF, None)
+    for read in ("force", "stress", "buckled"):
+        assert getattr(law, read)(travel).tolist() == getattr(even, read)(travel).tolist()
+    assert law.profile[1] == (LEAF.thickness, 1.2 * LEAF.thickness, LEAF.thickness)
 
 
 def test_the_law_of_a_record_is_that_of_its_specification():
