@@ -196,7 +196,7 @@ class StructureKind:
     name: str  # in `structure` of its block
     description: str  # as the documentation of that key lists it
     law: Callable[..., Any]
-    needs: Mapping[str, str] = field(default_factory=dict)  # keys that must be given -> what they describe, for the message
+    needs: Mapping[str, str] = field(default_factory=dict)  # keys that must be given -> what they are of
     truss: Callable[..., Any] | None = None  # law of the fidelity `truss`; None if it has none
     is_inclined: bool = True  # whether its leaves have an angle
     lengths: tuple[str, ...] = ()  # keys of its own that grow with its leaves
