@@ -153,8 +153,7 @@ def _kind(spec: VcfmSpec) -> Hashable | None:
         return None
     stated = analysis.window is None, analysis.measured is None
     settings = analysis.points, len(analysis.preloads), analysis.flatness, analysis.band
-    kinds = spec.mechanism.positive and spec.mechanism.positive.structure, spec.mechanism.bistable.structure
-    return analysis.fidelity, kinds, *stated, *settings
+    return analysis.fidelity, spec.mechanism.kinds, *stated, *settings
 
 
 def _solved(specs: Sequence[VcfmSpec]) -> Solution:

@@ -117,6 +117,11 @@ class Mechanism(CutLeaves, Model):
         return self.positive
 
     @property
+    def kinds(self) -> tuple[str, str]:
+        """Structure of the spring, "springs" where it is bought, and of the leaves."""
+        return "springs" if self.positive is None else self.positive.structure, self.bistable.structure
+
+    @property
     def allowable_stress(self) -> float | None:
         """Yield strength over safety factor [Pa]; None where no strength is known."""
         return self.material.allowable(self.safety_factor)
