@@ -158,13 +158,18 @@ class Analyzer(Protocol):
 def function_named(name: str) -> Any:
     """Return the function that ``"module:function"`` names; the module is imported for it.
 
+    ``"module:function:word"`` names the function with that word as its first argument.
+
     Examples
     --------
     >>> function_named("math:hypot")(3.0, 4.0)
     5.0
+    >>> function_named("operator:add:a")("b")
+    'ab'
     """
-    module, _, function = name.partition(":")
-    return getattr(import_module(module), function)
+    module, function, *words = name.split(":")
+    found = getattr(import_module(module), function)
+    return partial(found, *words) if words else found
 
 
 def when_called(name: str) -> Callable[..., Any]:

@@ -99,7 +99,8 @@ class Candidate:
         Whether it is to be designed.
     finish : str
         ``"module:function"``, ``function(spec, wish) -> spec``: what makes the designed one the one that is judged, its
-        window and travel written out. Empty: nothing has to be done.
+        window and travel written out; ``"module:function:word"``, ``function(word, spec, wish)``. Empty: nothing has to
+        be done.
     promise : float
         The smaller, the sooner it is worth a try.
     free : tuple of str

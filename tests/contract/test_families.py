@@ -107,6 +107,15 @@ def test_the_template_mentions_every_key_of_the_mechanism_the_design_and_the_ana
 
 
 @every_family
+def test_a_template_lists_the_words_of_a_choice(name):
+    text = template(name)
+    assert "{words of" not in text
+    if name == "vcfm":
+        assert "structure: v-beam             # v-beam, cosine, hybrid\n" in text
+        assert "structure: diamond            # diamond, folded, straight, u-shape\n" in text
+
+
+@every_family
 def test_what_a_family_says_about_itself_is_complete(name):
     record = families.family(name)
     assert record.summary

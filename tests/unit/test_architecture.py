@@ -212,6 +212,22 @@ def test_no_one_asks_which_family_it_is():
                 assert not (named and literal), f"{path}:{node.lineno}: {ast.unparse(node)}"
 
 
+def test_no_one_asks_for_a_kind_of_leaf_or_spring_by_its_name():
+    """Kinds of the vcfm are records: a new one is its file, and its line in the tables of `leaves_spec`."""
+    from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
+
+    names = {*LEAF_KINDS, *SPRING_KINDS}
+    asked = {}
+    for path in (ROOT / "families" / "vcfm").rglob("*.py"):
+        for node in nodes(path):
+            sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            sides += [one for one in node.keys if one is not None] if isinstance(node, ast.Dict) else []
+            words = {one.value for side in sides for one in ast.walk(side) if isinstance(one, ast.Constant)}
+            if names & words:
+                asked[f"{path.name}:{node.lineno}"] = ast.unparse(node)
+    assert asked == {}
+
+
 def longest_function(path: Path) -> tuple[int, str]:
     """Return (lines of code, name) of the longest function in a file, docstring left out."""
     sizes = [(0, "")]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +15,18 @@ from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families.vcfm.bounding_box import room
 from cfmkit.families.vcfm.flattening_widths_or_window import extreme_sums
-from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring, parts
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw
+from cfmkit.families.vcfm.leaves.laws_in_rows import stacked
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
+from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.model import LawSampler, rest_of, rests_of, solve_rows
-from cfmkit.families.vcfm.pose_outlines import centre_line
+from cfmkit.families.vcfm.pose_outlines import leaf_thickness
 from cfmkit.families.vcfm.quantities import QUANTITIES
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import spread
 from cfmkit.metrics import Window, evaluate
@@ -497,6 +503,74 @@ def test_exact_leaves_have_their_force_where_a_coarse_sampling_cut_the_peak_off(
     assert leaves == pytest.approx(0.7147, abs=5e-5)
 
 
+LEAF = LeafStrip(35 * MM, np.radians(7), 1 * MM, 6 * MM, 1477e6, 0.3)
+
+
+# --- kinds ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ForceAndStress(LeafLaw):
+    """The law of a bar, and nothing else of it."""
+
+    def force(self, travel):
+        return TrussLeaf(self.strip).force(travel)
+
+    def stress(self, travel):
+        return TrussLeaf(self.strip).stress(travel)
+
+
+def test_a_law_of_force_and_stress_has_all_that_is_asked_of_a_leaf():
+    leaf, bar = ForceAndStress(LEAF), TrussLeaf(LEAF)
+    travel = np.linspace(0.0, 2.0, 9)[None] * LEAF.rise
+    assert leaf.first_stiffness == pytest.approx(bar.first_stiffness, rel=2e-3)
+    assert leaf.negative_stiffness == pytest.approx(bar.negative_stiffness, rel=1e-4)
+    assert leaf.balance == bar.balance
+    assert not leaf.buckled(travel).any()
+    two = stacked([leaf, ForceAndStress(replace(LEAF, thickness=2e-3))])
+    assert two.force(travel)[1] == pytest.approx(2.0 * leaf.force(travel)[0], rel=1e-12)
+    assert two.state(travel)[1].shape == two.buckled(travel).shape == (2, 9)
+    assert two.balance[:, 0].tolist() == [bar.balance] * 2
+
+
+def test_the_example_of_the_page_is_a_kind_of_leaf():
+    page = (CONFIGS.parent / "docs" / "vcfm.md").read_text(encoding="utf-8")
+    code = page.split("## Adding a kind of leaf or spring")[1].split("```python\n")[1].split("```")[0]
+    given = {"Any": Any, "LeafKind": LeafKind, "LeafLaw": LeafLaw, "VBeam": VBeam}
+    names: dict[str, Any] = given | {"dataclass": dataclass, "replace": replace, "__name__": __name__}
+    exec(code, names)  # the page's own code
+    travel, kind = np.linspace(0.0, 2.0, 41) * LEAF.rise, names["TAPERED"]
+    even = VBeam(replace(LEAF, thickness=1.1 * LEAF.thickness))
+    law = kind.law(LEAF, None)
+    for read in ("force", "stress", "buckled"):
+        assert getattr(law, read)(travel).tolist() == getattr(even, read)(travel).tolist()
+    assert law.profile[1] == (LEAF.thickness, 1.2 * LEAF.thickness, LEAF.thickness)
+
+
+def test_the_law_of_a_record_is_that_of_its_specification():
+    for name, kind in LEAF_KINDS.items():
+        spec = table_i(f"mechanism.bistable.structure={name}", "mechanism.bistable.flexure_length=5 mm")
+        assert spec.mechanism.bistable.kind is kind
+        assert spec.analysis.fidelity == (kind.fidelity or "analytic")
+        law = parts(spec).leaf
+        shares, thicknesses = law.profile
+        assert (shares[0], shares[-1], min(thicknesses)) == (0.0, 1.0, law.strip.thickness)
+        assert law.bent_line(0.0)[-1] == pytest.approx([law.strip.reach, law.strip.rise], rel=1e-9)
+    for name, kind in SPRING_KINDS.items():
+        about = table_i(f"mechanism.positive.structure={name}", "mechanism.positive.radius=4 mm").mechanism
+        law = leaf_spring(about.flexures, about.material)
+        assert about.flexures.kind is kind
+        assert (law.strip.angle > 0) == kind.is_inclined
+        place = 1e-5
+        stiffer = law.force(3.0 * place) / law.force(place) / 3.0
+        assert stiffer == pytest.approx(1.0, abs=1e-9) if kind.is_linear else stiffer > 1.0 + 1e-6
+
+
+def test_a_step_of_the_thickness_is_drawn_with_the_smaller_one():
+    drawn = leaf_thickness(HybridLeaf(LEAF, 0.2 * LEAF.length), 11) / LEAF.thickness
+    assert drawn.tolist() == [1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0]
+
+
 # --- shapes, outlines, pictures --------------------------------------------------------------------------------
 
 
@@ -507,7 +581,7 @@ def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
     from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
-    drawn = centre_line(parts(spec).leaf, travel * MM)
+    drawn = parts(spec).leaf.bent_line(travel * MM)
     drive = Displacement("shuttle", DOWN, travel * MM * np.linspace(0, 1, 7)[1:])
     apart = []
     for sign in (1, -1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -69,6 +70,8 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
 def template(name: str) -> str:
     """Return the commented spec of a family; it comes with the package that has the family.
 
+    ``{words of PATH}`` in it stands for the words that a key allows.
+
     Raises
     ------
     cfmkit.errors.UsageError
@@ -76,8 +79,10 @@ def template(name: str) -> str:
     """
     from cfmkit.families import family
     from cfmkit.families.base import packaged
+    from cfmkit.specs.keys_and_schema import keys
 
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    return packaged(record.template)
+    kinds = {key.path: key.kind for key in keys(record.spec_type)}
+    return re.sub(r"\{words of (\S+)\}", lambda word: kinds[word[1]].replace(" | ", ", "), packaged(record.template))

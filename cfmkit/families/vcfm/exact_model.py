@@ -6,7 +6,6 @@ one leaf or one chain is traced, by symmetry. How that is interpolated, `interpo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -15,7 +14,7 @@ import numpy as np
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.curves_in_rows import Characteristics, LeafSamples
 from cfmkit.families.vcfm.interpolated_equilibrium_path import RESOLVED, traced
-from cfmkit.families.vcfm.leaf_laws_from_spec import coils, parts, share_of, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import coils, leaf_law, leaf_spring, parts
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 
 if TYPE_CHECKING:
@@ -29,8 +28,10 @@ if TYPE_CHECKING:
     from cfmkit.families.run_control import Run
     from cfmkit.families.vcfm.interpolated_equilibrium_path import Traced
     from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+    from cfmkit.families.vcfm.leaves.kinds import SpringChain
     from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
-    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, VcfmSpec
+    from cfmkit.families.vcfm.leaves_spec import Bistable
+    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
     from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
@@ -57,17 +58,15 @@ def leaf_network(spec: VcfmSpec) -> Network:
 
 
 def _network_of(about: Bistable, made_of: LeafMaterial, wide: bool) -> Network:
-    from cfmkit.elastica import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
+    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Taper, guided
 
-    strip = strip_of(about, made_of)
+    law = leaf_law(about, made_of)
+    strip = law.strip
     x, h = strip.reach, strip.rise
     nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, guided(0.5 * np.pi, rotates=not about.guided))}
-    thickness, shape, mirrored = strip.thickness, STRAIGHT, STRAIGHT
-    if about.structure == "cosine":
-        shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
-    if about.structure == "hybrid":
-        thickness = Taper(*(np.array(item) for item in about.profile))
-    made = section(strip, thickness, wide)
+    shape, mirrored = law.beam_shapes()
+    shares, thicknesses = law.profile
+    made = section(strip, Taper(np.array(shares), np.array(thicknesses)) if len(set(thicknesses)) > 1 else None, wide)
     beams = {"leaf": Beam("wall", "shuttle", made, shape)}
     if not about.guided:
         nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)
@@ -87,47 +86,10 @@ def _leaf_path(about: Bistable, made_of: LeafMaterial, wide: bool, end: float, b
     return traced(_network_of(about, made_of, wide), "shuttle", end, **control)
 
 
-@dataclass(frozen=True)
-class SpringChain:
-    """A part of the spring that is traced: its network, the node that moves, and how it counts.
-
-    `travel` is the node's share of the compression, `count` the number of such parts in parallel.
-    """
-
-    network: Network
-    node: str
-    travel: float
-    count: float
-
-
 def spring_chain(spec: VcfmSpec) -> SpringChain:
     """Return what is traced of the spring."""
-    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Support, arc, guided
-
-    about = spec.mechanism.flexures
-    strip, share = strip_of(about, spec.mechanism.material), share_of(about)
-    made, wall = section(strip, wide=spec.mechanism.wide_beams), Node(0, 0, CLAMPED)
-    if about.structure == "u-shape":
-        radius = float(about.radius or 0.0)
-        nodes = {
-            "wall": wall,
-            "low": Node(strip.length, 0),
-            "high": Node(strip.length, 2.0 * radius),
-            "end": Node(0, 2.0 * radius, guided(0.5 * np.pi)),
-        }
-        beams = {
-            "lower": Beam("wall", "low", made),
-            "bend": Beam("low", "high", made, arc(np.pi)),
-            "upper": Beam("high", "end", made),
-        }
-        return SpringChain(Network(nodes, beams), "end", 1.0, 2.0 * share)
-    # the corner of a diamond or the joint of folded beams moves across as it likes; a straight beam is held
-    support = guided(0.5 * np.pi) if about.structure == "straight" else Support(rotation=True)
-    network = Network(
-        {"wall": wall, "end": Node(strip.reach, strip.rise, support)}, {"leaf": Beam("wall", "end", made)}
-    )
-    travel, count = {"diamond": (0.5, 2.0), "folded": (0.5, 4.0), "straight": (1.0, 2.0)}[about.structure]
-    return SpringChain(network, "end", travel, count * share)
+    law = leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
+    return law.chain(section(law.strip, wide=spec.mechanism.wide_beams))
 
 
 def elastic_networks(spec: VcfmSpec) -> tuple[DrivenNetwork, ...]:

@@ -12,7 +12,6 @@ from cfmkit.curves import Curve
 from cfmkit.families.fem_results import numbered
 from cfmkit.families.vcfm.fem_stress_in_each_fillet import fillets
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import force_change, rest_shift
-from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 from cfmkit.families.vcfm.model import rests_of
 from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.metrics.longest_interval_in_band import flat_window
@@ -93,8 +92,8 @@ def split(result: Result) -> Figure:
         Series(push.spring_force, "spring", OCHRE, prefer=0.85),
         Series(push.leaves.force, "leaves", BLUE, prefer=0.35),
     ]
-    if solution.spec.mechanism.bistable.structure == "v-beam" and not isinstance(solution.parts.leaf, TrussLeaf):
-        bars = solution.parts.half_beams * np.asarray(TrussLeaf(solution.parts.strip).force(push.travel))
+    if (truss := solution.leaf_kind.truss) is not None and solution.fidelity != "truss":
+        bars = solution.parts.half_beams * np.asarray(truss(solution.parts.strip).force(push.travel))
         series.append(Series(bars, "leaves by the truss law", GREY, dashed=True, prefer=0.4))
     found = list(_beyond(solution))
     low = float(solution.linear[0][0])

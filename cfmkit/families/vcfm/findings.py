@@ -13,10 +13,10 @@ from cfmkit.families.findings import TOO_SOFT, at_least, finder, mm, mpa, newton
 from cfmkit.families.rows import FindingRule
 from cfmkit.families.vcfm.bought_parts import buckles, buckling, is_overstretched, overstretching
 from cfmkit.families.vcfm.flattening_widths_or_window import flattening, ripple_inside
-from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, spring_room
+from cfmkit.families.vcfm.leaf_laws_from_spec import closed_length, leaf_law, leaf_spring, spring_room
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.s_form import POLE
-from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE, LINEAR_ABOVE, NEGATIVE_ABOVE, VBeam
+from cfmkit.families.vcfm.leaves.v_beam import FLAT_BUCKLED_ABOVE
 from cfmkit.families.vcfm.range_of_closed_forms import (
     is_stocky,
     leaves_out_of_range,
@@ -96,8 +96,8 @@ def _slenderness(solution: Solution) -> FloatArray:
 
 
 def _contradicts(solution: Solution) -> Any:
-    if solution.spec.analysis.measured is None or solution.structure == "hybrid":
-        return False  # flexures push where such leaves are flat
+    if solution.spec.analysis.measured is None or not solution.leaf_kind.buckles:
+        return False  # such leaves push where they are flat
     balance = solution.of_mechanisms(solution.parts.balance)
     stated = [spec.analysis.measured for spec in solution.specs]
     stiffness, force = np.array([(one.positive_stiffness, one.force) for one in stated if one is not None]).T
@@ -119,8 +119,6 @@ def _contradiction(solution: Solution) -> Sentence:
 
 def is_closed(solution: Solution) -> NDArray[np.bool_]:
     """Return whether the spring is pressed together within the travel, (m,) of bool."""
-    if solution.spec.mechanism.kinds[0] in ("folded", "straight"):
-        return np.zeros(len(solution), dtype=bool)
     most = solution.column(lambda spec: max(spec.analysis.preloads))
     return np.asarray(most + solution.travel > solution.column(spring_room) * (1 + ROUNDING))
 
@@ -129,14 +127,14 @@ def closed_spring(solution: Solution) -> Sentence:
     """Return up to which travel the worst preload leaves the spring open, with what keeps it open."""
     spec, room = solution.spec, spring_room(solution.spec)
     most = max(spec.analysis.preloads)
-    positive, bought, needed = spec.mechanism.positive, spec.mechanism.springs, most + spec.travel - room
+    bought, needed = spec.mechanism.springs, most + spec.travel - room
     place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
     if bought is not None:
-        key, size = "mechanism.springs.free_length", at_least(closed_length(bought) + most + spec.travel)
-    elif positive is not None and positive.structure == "u-shape":
-        key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
+        key, least = "springs.free_length", closed_length(bought) + most + spec.travel
     else:
-        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
+        spring = leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
+        key, least = spring.opening(spec.mechanism.frame.corner, needed)
+    key, size = f"mechanism.{key}", at_least(least)
     return (
         f"the spring closes: its {'blocks' if bought is None else 'turns'} touch when it is compressed by {mm(room)}, "
         f"with a preload of {mm(most)} {place}, and curves end there; use less preload ('analysis.preloads') or travel "
@@ -149,7 +147,9 @@ def closed_spring(solution: Solution) -> Sentence:
 
 
 def _truss(solution: Solution) -> Sentence:
-    law, places = VBeam(solution.parts.strip), np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise)
+    about = solution.spec.mechanism
+    law = leaf_law(about.bistable, about.material)
+    places = np.linspace(0.0, 1.0, 401) * float(law.strip.rise)
     bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
     high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]
     steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
@@ -163,12 +163,13 @@ def _truss(solution: Solution) -> Sentence:
 
 def _negative_and_straight(solution: Solution) -> tuple[Any, Any]:
     """Return of which leaves the stiffness is negative anywhere, and constant there, (m,) each."""
-    if solution.structure == "hybrid" or solution.fidelity == "truss":
+    limits = solution.leaf_kind.limits
+    if not solution.leaf_kind.buckles or solution.fidelity == "truss":
         return True, True
-    if solution.structure == "cosine":  # whose limits depend on the angle: as the curve has it
+    if limits is None:  # or they depend on more than the slenderness: as the curve has it
         return solution.of_mechanisms(solution.character.negative_stiffness) > 0, np.isfinite(solution.linear[0])
     q = _slenderness(solution)
-    return q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
+    return q >= limits.negative, q > limits.constant
 
 
 def _only_rises(solution: Solution) -> Any:
@@ -181,7 +182,8 @@ def _is_rounded(solution: Solution) -> Any:
 
 
 def _rising_force(solution: Solution) -> Sentence:
-    limit = f", below {NEGATIVE_ABOVE}" if solution.structure == "v-beam" else ""
+    limits = solution.leaf_kind.limits
+    limit = "" if limits is None else f", below {limits.negative}"
     return (
         f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the force of the leaves only rises and cannot "
         "cancel that of the spring; use thinner or steeper leaves",
@@ -189,7 +191,8 @@ def _rising_force(solution: Solution) -> Sentence:
 
 
 def _rounded_force(solution: Solution) -> Sentence:
-    limit = ", not above pi" if solution.structure == "v-beam" else ""
+    limits = solution.leaf_kind.limits
+    limit = "" if limits is None else f", not above {limits.constant_text}"
     return (
         f"rise over thickness is {_slenderness(solution)[0]:.4g}{limit}: the leaves do not buckle and their force "
         "curve is rounded; the constant-force window is only its maximum. Use thinner or steeper leaves",

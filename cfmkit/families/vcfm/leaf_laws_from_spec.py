@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, sin
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils, Diamond, StraightSpring, UShape, folded
-from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
-from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Coils
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
-    from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Spring
-    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
-
-
-RIM = 0.75
-"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
-
-Leaf = VBeam | CosineLeaf | HybridLeaf | TrussLeaf
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
+    from cfmkit.families.vcfm.leaves_spec import Bistable, Positive
+    from cfmkit.families.vcfm.spec import LeafMaterial, VcfmSpec
 
 
 @dataclass(frozen=True)
 class Parts:
     """A mechanism's leaves, their laws and how many there are; of several mechanisms, columns (`laws_in_rows`)."""
 
-    leaf: Leaf  # law of one half-beam of the snap-through structure
-    spring: Spring | TrussDiamond  # law of the spring, as much of it as is loaded
+    leaf: LeafLaw  # law of one half-beam of the snap-through structure
+    spring: LeafSpring | Coils  # law of the spring, as much of it as is loaded
     half_beams: Any  # leaves that carry the shuttle
 
     @property
@@ -69,8 +58,8 @@ class Parts:
 
 
 def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> LeafStrip:
-    """Return a leaf of a specification; of the springs only the diamond's are inclined."""
-    angle = 0.0 if leaf.structure in ("folded", "straight", "u-shape") else leaf.angle
+    """Return a leaf of a specification."""
+    angle = leaf.angle if leaf.kind.is_inclined else 0.0
     return LeafStrip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
 
 
@@ -84,10 +73,7 @@ def spring_room(spec: VcfmSpec) -> float:
     about, bought = spec.mechanism.positive, spec.mechanism.springs
     if about is None:
         return inf if bought is None else room_of_coils(bought)
-    rims = 2.0 * RIM * about.thickness
-    if about.structure == "diamond":
-        return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
-    return 2.0 * about.radius - rims if about.structure == "u-shape" and about.radius else inf
+    return leaf_spring(about, spec.mechanism.material).room(spec.mechanism.frame.corner)
 
 
 def room_of_coils(springs: BoughtSprings) -> float:
@@ -105,33 +91,26 @@ def closed_length(springs: BoughtSprings) -> float:
 def parts(spec: VcfmSpec) -> Parts:
     """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
     mechanism = spec.mechanism
-    bistable, other = mechanism.bistable, strip_of(mechanism.bistable, mechanism.material)
+    bistable, leaf = mechanism.bistable, leaf_law(mechanism.bistable, mechanism.material)
     if mechanism.springs is not None:
-        return Parts(_LEAVES[bistable.structure](other, bistable), coils(mechanism.springs), bistable.half_beams)
+        return Parts(leaf, coils(mechanism.springs), bistable.half_beams)
     positive = mechanism.flexures
-    one, share = strip_of(positive, mechanism.material), share_of(positive)
-    if spec.analysis.fidelity == "truss":
-        return Parts(TrussLeaf(other), TrussDiamond(one, share), bistable.half_beams)
-    return Parts(_LEAVES[bistable.structure](other, bistable), _springs(one, positive, share), bistable.half_beams)
+    spring, truss = leaf_spring(positive, mechanism.material), (bistable.kind.truss, positive.kind.truss)
+    if spec.analysis.fidelity == "truss" and truss[0] is not None and truss[1] is not None:
+        return Parts(truss[0](leaf.strip), truss[1](spring.strip, share_of(positive)), bistable.half_beams)
+    return Parts(leaf, spring, bistable.half_beams)
+
+
+def leaf_law(bistable: Bistable, made_of: LeafMaterial) -> LeafLaw:
+    """Return the closed form of one snap-through leaf, with its shape."""
+    return bistable.kind.law(strip_of(bistable, made_of), bistable)
+
+
+def leaf_spring(positive: Positive, made_of: LeafMaterial) -> LeafSpring:
+    """Return the closed form of a spring of leaves, as much of it as is loaded, with its shape."""
+    return positive.kind.law(strip_of(positive, made_of), positive, share_of(positive))
 
 
 def coils(springs: BoughtSprings) -> Coils:
     """Return the law of bought springs, all of them together."""
     return Coils(springs.count * springs.rate, springs.count * springs.initial_tension)
-
-
-def _springs(strip: LeafStrip, positive: Positive, share: float) -> Spring:
-    kinds: dict[str, Callable[[], Spring]] = {
-        "diamond": lambda: Diamond(strip, share),
-        "folded": lambda: folded(strip, share),
-        "straight": lambda: StraightSpring(strip, share),
-        "u-shape": lambda: UShape(strip, positive.radius, share),
-    }
-    return kinds[positive.structure]()
-
-
-_LEAVES: dict[str, Callable[[LeafStrip, Any], Leaf]] = {
-    "v-beam": lambda strip, _about: VBeam(strip),
-    "cosine": lambda strip, _about: CosineLeaf(strip),
-    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),
-}

@@ -20,7 +20,6 @@ from cfmkit.families.vcfm.curves_in_rows import LEAST_POINTS, Characteristics, L
 from cfmkit.families.vcfm.findings import RULES, closed_spring, finding, is_closed
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts, spring_room
 from cfmkit.families.vcfm.leaves.laws_in_rows import rows_of, stacked
-from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.quantities import QUANTITIES
 from cfmkit.families.vcfm.solution import Solution, target_of
 from cfmkit.families.vcfm.tables_of_preloads_and_readings import adjustability, readings
@@ -325,7 +324,7 @@ class LawSampler:
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]."""
         leaf = self.parts.leaf
-        force, stress = leaf.state(travel) if isinstance(leaf, VBeam) else (leaf.force(travel), leaf.stress(travel))
+        force, stress = leaf.state(travel)
         force = self.parts.half_beams * np.asarray(force, dtype=float)
         buckled = np.asarray(leaf.buckled(travel))
         return LeafSamples(force, np.asarray(stress, dtype=float), np.ones(travel.shape, dtype=bool), buckled)

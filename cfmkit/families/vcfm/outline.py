@@ -32,7 +32,7 @@ from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.cut_and_frame_spec import VcfmPart
-from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_law, leaf_spring, strip_of
 from cfmkit.families.vcfm.walls_stop_and_seat import FrameSizes, frame_notes, frame_sizes
 from cfmkit.specs.units import format_short
 from cfmkit.stock.material_and_part_spec import CutPart
@@ -41,19 +41,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw, LeafSpring
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 GAP = 0.01
 """Between the two parts of the drawing [m]."""
 
-FITS = 1.02
-"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
-
 FINE = 2e-4
 """How far files may be from cosine arches, in thicknesses of the thinnest leaf."""
-
-POINTS = 201
-"""Of the edge of a cosine arch."""
 
 Point = tuple[float, float]
 Item = Point | Arc | Smooth
@@ -65,7 +60,7 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     sizes = sizes_of_frame(spec)
     leaves, low = leaves_contours(spec)
     bought = spec.mechanism.springs is not None
-    places, heights, _ = _centre_line(spec)
+    places, heights, _ = _leaf(spec).centre_line
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
     spring = [] if bought else spring_contours(spec, low - GAP)
     dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
@@ -112,12 +107,12 @@ def _marks(spec: VcfmSpec, spring: Sequence[Contour], sizes: FrameSizes) -> Iter
     if not spring:
         return
     x0, y0, x1, y1 = spring[0].extents
-    half, kind = 0.5 * frame.block, spec.mechanism.flexures
-    yield mark(_box(-half, y0 if kind.structure == "straight" else y1 - frame.block, half, y1), driven=True)
-    if kind.structure != "straight":
+    half, flexures = 0.5 * frame.block, spec.mechanism.flexures
+    yield mark(_box(-half, y0 if flexures.kind.stands_on_ends else y1 - frame.block, half, y1), driven=True)
+    if not flexures.kind.stands_on_ends:
         yield mark(_box(-half, y0, half, y0 + frame.block), driven=False)
         return
-    for x in (x1 - frame.block, *([x0] if kind.loaded == "whole" else [])):
+    for x in (x1 - frame.block, *([x0] if flexures.loaded == "whole" else [])):
         yield mark(_box(x, y1 - 1.5 * frame.block, x + frame.block, y1 - 0.5 * frame.block), driven=False)
 
 
@@ -171,8 +166,8 @@ def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
 def _notes(spec: VcfmSpec) -> Iterator[str]:
     """Yield what the contours do not show."""
     about, count = spec.mechanism.positive, spec.mechanism.bistable.half_beams
-    if about is not None and about.structure == "folded" and about.loaded == "whole":
-        yield "one half of the eight folded beams is drawn: make it twice"
+    if about is not None and about.kind.drawing_note and about.loaded == "whole":
+        yield about.kind.drawing_note
     if count % 2:
         yield f"leaves are drawn as whole Vs: {count + 1} instead of {count}; leave one off"
     if about is None:
@@ -192,9 +187,10 @@ def _check_levels(spec: VcfmSpec) -> None:
         With the place where they are closest, and the spacing at which they just touch.
     """
     frame, about = spec.mechanism.frame, spec.mechanism.bistable
-    x, y, slope = _centre_line(spec)
+    law = _leaf(spec)
+    x, y, slope = law.centre_line
     steepest = int(np.abs(slope).argmax())
-    least = max(about.profile[1]) * float(np.hypot(1.0, slope[steepest]))
+    least = max(law.profile[1]) * float(np.hypot(1.0, slope[steepest]))
     if about.half_beams > 2 and frame.spacing <= least:
         at = (0.5 * frame.shuttle_width + float(x[steepest]), float(y[steepest]) + 0.5 * frame.spacing)
         raise GeometryError(
@@ -245,32 +241,23 @@ def sizes_of_frame(spec: VcfmSpec) -> FrameSizes:
     return frame_sizes(spec, spring_contours(spec, 0.0)[0].extents if seated else None)
 
 
-def _centre_line(spec: VcfmSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return x, y [m] and slope of a leaf as made, from the shuttle at (0, 0) to the wall."""
-    about = spec.mechanism.bistable
-    strip = strip_of(about, spec.mechanism.material)
-    reach, rise = float(strip.reach), float(strip.rise)
-    if about.structure == "cosine":
-        x = np.linspace(0.0, reach, POINTS)
-        wave = np.pi * x / reach
-        return x, -0.5 * rise * (1.0 - np.cos(wave)), -0.5 * np.pi * rise / reach * np.sin(wave)
-    x = np.linspace(0.0, reach, 2)
-    return x, -rise * x / reach, np.full(2, -rise / reach)
+def _leaf(spec: VcfmSpec) -> LeafLaw:
+    return leaf_law(spec.mechanism.bistable, spec.mechanism.material)
 
 
 def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
     """Return the upper (1) or lower (-1) edge of a leaf from the shuttle at `apex` to the wall."""
-    about = spec.mechanism.bistable
-    x, y, slope = _centre_line(spec)
+    law = _leaf(spec)
+    x, y, slope = law.centre_line
     stretch = np.hypot(1.0, slope)
-    if about.structure == "cosine":
-        half = 0.5 * side * about.thickness
+    if len(x) > 2:
+        half = 0.5 * side * law.strip.thickness
         points = np.column_stack([x - half * slope / stretch, y + half / stretch]) + np.array(apex)
         return [Smooth(points, np.column_stack([1.0 / stretch, slope / stretch]))]
     up = 0.5 * side * float(stretch[0])
     return [
         (apex[0] + share * float(x[-1]), apex[1] + share * float(y[-1]) + up * height)
-        for share, height in zip(*about.profile, strict=True)
+        for share, height in zip(*law.profile, strict=True)
     ]
 
 
@@ -298,16 +285,16 @@ class SolvedPiece:
 
 def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
     """Return one leaf between shuttle and wall; both leaves of a V where the shuttle can turn."""
-    about, fillet = spec.mechanism.bistable, spec.mechanism.fillet
-    strip = strip_of(about, spec.mechanism.material)
+    law, fillet = _leaf(spec), spec.mechanism.fillet
+    strip = law.strip
     half, far = 0.5 * spec.mechanism.frame.shuttle_width, 0.5 * spec.mechanism.frame.shuttle_width + float(strip.reach)
-    rise, over = float(strip.rise), 2.0 * (max(about.profile[1]) + fillet)
+    rise, over = float(strip.rise), 2.0 * (max(law.profile[1]) + fillet)
     upper, lower = (_edge(spec, side, (half, 0.0)) for side in (1.0, -1.0))
     out = far + spec.mechanism.frame.block
     right: list[Item] = [(0.0, over), (half, over), *upper, (far, over - rise), (out, over - rise)]
     right += [(out, -over - rise), (far, -over - rise), *_back(lower), (half, -over), (0.0, -over)]
     wall = np.array([[far, over - rise], [out, over - rise], [out, -over - rise], [far, -over - rise]])
-    if about.guided:
+    if spec.mechanism.bistable.guided:
         shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
         return SolvedPiece(filleted(_contour(right), fillet)[0], shuttle, (wall,), True)
     shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
@@ -316,103 +303,31 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
-    about, frame, fillet = spec.mechanism.flexures, spec.mechanism.frame, spec.mechanism.fillet
+    law, frame, fillet = _spring(spec), spec.mechanism.frame, spec.mechanism.fillet
     half = 0.5 * frame.block
-    if about.structure == "straight":
-        right, bottom = _straight(spec, 0.0)
-        x, middle, out = half + about.length, -frame.block, half + about.length + frame.block
-        end = np.array([[x, middle + half], [out, middle + half], [out, middle - half], [x, middle - half]])
-        top = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
-        return SolvedPiece(filleted(_contour(right), fillet)[0], top, (end,), False)
-    if about.structure == "u-shape":
-        outer, inner, base = _bend(spec, 0.0)
-        low, high = _corners(inner)[1][1], _corners(inner)[0][1]
-        around: list[Item] = [(0.0, 0.0), (half, 0.0), *outer, (half, base - frame.block), (0.0, base - frame.block)]
-        around += [(0.0, low), *_back(inner), (0.0, high)]
-        top = np.array([[0.0, 0.0], [half, 0.0], [half, high], [0.0, high]])
-        foot = np.array([[0.0, low], [half, low], [half, base - frame.block], [0.0, base - frame.block]])
-        return SolvedPiece(filleted(_contour(around), fillet)[0], top, (foot,), False)
-    outer, inner, base = _diamond(spec, 0.0)
-    middle, (leaf, corner) = 0.5 * (base - frame.block), (inner[0], inner[1])
-    out, x = _corners(outer[3:4])[0][0], _corners(outer[1:2])[0][0]
-    around = [(0.0, 0.0), (half, 0.0), *outer[:4], (out, middle), (x, middle), corner, leaf]
-    start = _corners([leaf])[0][1]
-    top = np.array([[0.0, 0.0], [half, 0.0], [half, start], [0.0, start]])
-    line = np.array([[x, middle], [out, middle]])
-    return SolvedPiece(filleted(_contour([*around, (0.0, start)]), fillet)[0], top, (line,), False, True)
+    around, bottom, held, glides = law.solved_piece(law.edges(frame.block, frame.corner, fillet, 0.0), half)
+    block = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
+    contour = _contour([(0.0, 0.0), (half, 0.0), *around])
+    return SolvedPiece(filleted(contour, fillet)[0], block, (np.array(held),), False, glides)
 
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
     """Return the spring with its rigid blocks, its upper end at `top` [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half = 0.5 * frame.block
-    if about.structure == "straight":
-        right, bottom = _straight(spec, top)
-        return [_contour([(-half, top), *right[1:-1], (-half, bottom)])] if about.loaded == "half" else [_whole(right)]
-    outer, inner, base = (_bend if about.structure == "u-shape" else _diamond)(spec, top)
-    low = base - frame.block
-    if about.loaded == "half":
-        ends = _corners(inner)
-        hollow: list[Item] = [(-half, ends[1][1]), *_back(inner), (-half, ends[0][1])]
+    frame, half = spec.mechanism.frame, 0.5 * spec.mechanism.frame.block
+    outer, inner, low = _spring(spec).edges(frame.block, frame.corner, spec.mechanism.fillet, top)
+    if spec.mechanism.flexures.loaded == "half":
+        hollow = [(-half, inner[-1][1]), *_back(inner), (-half, inner[0][1])] if inner else []
         return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
     whole = _whole([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
-    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)]
+    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)] if inner else [whole]
 
 
-def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
-    """Return outer and inner edge of the right chain from its top down, and the height of its lower end [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    strip = strip_of(about, spec.mechanism.material)
-    half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
-    rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
-    # high enough for the fillet beside it; where the spring closes, its inner edges meet, not these
-    room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * spec.mechanism.fillet
-    rim = max(RIM * about.thickness, v + FITS * room)
-    high = top - frame.block
-    up, down = high - rise, high - rise - frame.corner
-    base, out = down - rise, x + frame.block
-    outer: list[Item] = [(half, high + v), (x, up + v), (x, up + rim), (out, up + rim)]
-    outer += [(out, down - rim), (x, down - rim), (x, down - v), (half, base - v)]
-    return outer, [(half, high - v), (x, up - v), (x, down + v), (half, base + v)], base
-
-
-def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
-    """Return the same of a U-shaped chain."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half, v, radius = 0.5 * frame.block, 0.5 * about.thickness, float(about.radius or 0.0)
-    if radius <= v:
-        raise GeometryError(
-            f"a bend of radius {mm(radius)} cannot be cut in a leaf of {mm(about.thickness)}: its inside would cross "
-            f"itself; use a radius above {mm(v)} ('mechanism.positive.radius')"
-        )
-    high, x = top - frame.block, 0.5 * frame.block + about.length
-    center, base = (x, high - radius), high - 2.0 * radius
-    edges: list[list[Item]] = []
-    for side in (1.0, -1.0):
-        arc = Arc(center, radius + side * v, 0.5 * np.pi, -0.5 * np.pi)
-        edges.append([(half, high + side * v), arc, (half, base - side * v)])
-    return edges[0], edges[1], base
-
-
-def _straight(spec: VcfmSpec, top: float) -> tuple[list[Item], float]:
-    """Return the right half of a straight beam with its blocks, and its lowest point [m]."""
-    about, frame = spec.mechanism.flexures, spec.mechanism.frame
-    half, v = 0.5 * frame.block, 0.5 * about.thickness
-    x, middle = half + about.length, top - frame.block
-    out, bottom = x + frame.block, top - frame.block - half
-    right: list[Item] = [(0.0, top), (half, top), (half, middle + v), (x, middle + v), (x, middle + half)]
-    right += [(out, middle + half), (out, middle - half), (x, middle - half), (x, middle - v), (half, middle - v)]
-    return [*right, (half, bottom), (0.0, bottom)], bottom
+def _spring(spec: VcfmSpec) -> LeafSpring:
+    return leaf_spring(spec.mechanism.flexures, spec.mechanism.material)
 
 
 def _whole(right: list[Item]) -> Contour:
     return _contour([*right, *_mirrored(right)])
-
-
-def _corners(items: Sequence[Item]) -> tuple[Point, Point]:
-    """Return where a chain begins and ends."""
-    (first, _), (_, last) = _ends(items[0]), _ends(items[-1])
-    return first, last
 
 
 def _ends(item: Item) -> tuple[Point, Point]:

@@ -10,24 +10,17 @@ shuttle at (X, h - d); its ends keep their direction.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaf_laws_from_spec import RIM, strip_of
-from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import UShape
-from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE, axial_root, pose
-from cfmkit.families.vcfm.leaves.truss import TrussLeaf
-from cfmkit.families.vcfm.leaves.v_beam import VBeam, critical_force
+from cfmkit.families.vcfm.leaf_laws_from_spec import leaf_spring
+from cfmkit.families.vcfm.leaves.positive_stiffness_springs import RIM
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+    from cfmkit.families.vcfm.leaves.kinds import LeafLaw
     from cfmkit.families.vcfm.solution import Solution
-    from cfmkit.families.vcfm.spec import Bistable
 
 
 MIRROR = np.array([-1.0, 1.0])
@@ -69,12 +62,10 @@ def band(line: FloatArray, thickness: Any) -> FloatArray:
     return np.concatenate([line + half, (line - half)[::-1]])
 
 
-def leaf_thickness(about: Bistable, count: int) -> FloatArray:
-    """Return the thickness of a snap-through leaf at `count` even places of its length [m]."""
-    stations, heights = about.profile
-    share = np.linspace(0.0, 1.0, count)
-    middle = (share > stations[1]) & (share < stations[-2])
-    return np.where(middle, max(heights), min(heights))
+def leaf_thickness(law: LeafLaw, count: int) -> FloatArray:
+    """Return the thickness of a snap-through leaf at `count` even places of its length, at a step the smaller [m]."""
+    place, (shares, heights) = np.linspace(0.0, 1.0, count), np.array(law.profile)
+    return np.asarray(np.minimum(np.interp(place, shares, heights), np.interp(-place, -shares[::-1], heights[::-1])))
 
 
 def scene(solution: Solution, travel: float, preload: float) -> Scene:
@@ -83,8 +74,9 @@ def scene(solution: Solution, travel: float, preload: float) -> Scene:
     about, strip = solution.spec.mechanism.bistable, solution.parts.strip
     levels = -(-about.half_beams // 2)
     half, reach, rise = 0.5 * frame.shuttle_width, float(strip.reach), float(strip.rise)
-    line = centre_line(solution.parts.leaf, travel)[::-1] * MIRROR + np.array([half + reach, -rise])
-    thickness = leaf_thickness(about, len(line))
+    leaf = solution.parts.leaf
+    line = leaf.bent_line(travel)[::-1] * MIRROR + np.array([half + reach, -rise])
+    thickness = leaf_thickness(leaf, len(line))
     for level in range(levels):
         up = np.array([0.0, level * frame.spacing])
         one = band(line + up, thickness)
@@ -109,18 +101,12 @@ def _add_spring(found: Scene, solution: Solution, top: float, compression: float
         return
     about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, rim = 0.5 * frame.block, RIM * about.thickness
-    if about.structure == "straight":
-        _add_straight(found, solution, top, compression)
+    lines, height = leaf_spring(about, solution.spec.mechanism.material).bent_lines(compression, frame.corner)
+    if about.kind.stands_on_ends:
+        _add_on_ends(found, solution, top, lines[0], height)
         return
-    if about.structure == "u-shape":
-        chain = u_chain(strip_of(about, solution.spec.mechanism.material), float(about.radius or 0.0), compression)
-        lines, corners, height = [chain], [], float(chain[-1, 1])
-    else:
-        lower = bent_leaf(strip_of(about, solution.spec.mechanism.material), 0.5 * compression, free=True)
-        height = 2.0 * float(lower[-1, 1]) + frame.corner
-        lines = [lower, lower * np.array([1.0, -1.0]) + np.array([0.0, height])]
-        x, y = lower[-1]
-        corners = [rectangle(x, y - rim, x + frame.block, y + frame.corner + rim)]
+    ends = [line[-1] for line in lines[:-1]]
+    corners = [rectangle(x, y - rim, x + frame.block, y + frame.corner + rim) for x, y in ends]
     shift = np.array([half, top - frame.block - height])
     sides = (1.0,) if about.loaded == "half" else (1.0, -1.0)
     for side in sides:
@@ -168,11 +154,10 @@ def _add_coils(found: Scene, solution: Solution, bottom: float, deflection: floa
     found.base = (0.5 * (left + right), end + away)
 
 
-def _add_straight(found: Scene, solution: Solution, top: float, compression: float) -> None:
-    """Add a straight beam clamped at both ends, with the shuttle on its middle."""
+def _add_on_ends(found: Scene, solution: Solution, top: float, line: FloatArray, compression: float) -> None:
+    """Add a beam clamped at both ends, with the shuttle on its middle."""
     about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, length = 0.5 * frame.block, about.length
-    line = bent_leaf(strip_of(about, solution.spec.mechanism.material), -compression)
     middle = top - half
     for side in (1.0, -1.0):
         mirror = np.array([side, 1.0])
@@ -182,129 +167,3 @@ def _add_straight(found: Scene, solution: Solution, top: float, compression: flo
         found.rigid.append(rectangle(ends[0], end - half, ends[1], end + half))
     found.rigid.append(rectangle(-half, middle - half, half, top))
     found.base = (half + length + half, middle + compression - half)
-
-
-POINTS = 81
-
-
-@singledispatch
-def centre_line(leaf: Any, travel: float) -> FloatArray:
-    """Return the centre line of a leaf whose shuttle has travelled so far [m], (n, 2) [m]."""
-    raise TypeError(type(leaf))
-
-
-@centre_line.register(VBeam)
-def _v(leaf: VBeam, travel: float) -> FloatArray:
-    buckled = bool(leaf.buckled(np.array([travel]))[0])
-    return bent_leaf(leaf.strip, travel, float(critical_force(leaf.strip)) if buckled else None)
-
-
-@centre_line.register(TrussLeaf)
-def _bar(leaf: TrussLeaf, travel: float) -> FloatArray:
-    share = np.linspace(0.0, 1.0, POINTS)[:, None]
-    line: FloatArray = share * np.array([leaf.strip.reach, leaf.strip.rise - travel])
-    return line
-
-
-@centre_line.register(HybridLeaf)
-def _hybrid(leaf: HybridLeaf, travel: float) -> FloatArray:
-    strip, end = leaf.strip, float(leaf.flexure)
-    tilt = float(np.arctan2(leaf.bar * np.sin(strip.angle) - travel, leaf.bar * np.cos(strip.angle)))
-    bend = np.linspace(float(strip.angle), tilt, 15)
-    angles = np.concatenate([bend, np.full(POINTS - 30, tilt), bend[::-1]])
-    lengths = np.concatenate([np.full(15, end / 15), np.full(POINTS - 30, (strip.length - 2 * end) / (POINTS - 30))])
-    return _to_ends(angles, np.concatenate([lengths, np.full(15, end / 15)]), (strip.reach, strip.rise - travel))
-
-
-@centre_line.register(CosineLeaf)
-def _cosine(leaf: CosineLeaf, travel: float) -> FloatArray:
-    at = np.array([travel])
-    z, length, rise = float(leaf.root(at)[0]), float(leaf.developed), float(leaf.strip.rise)
-    eta = np.linspace(-1.0, 1.0, POINTS)
-    own = np.pi / length * np.cos(0.5 * np.pi * eta)
-    if z >= BUCKLED:
-        slope = (float(leaf.balance) - travel) / length
-        free = float(leaf.buckled_amplitude(at)[0])
-        phase = np.pi * (1.0 + eta)
-        turn = -rise / 6.0 * own + slope * (1.0 - np.cos(phase)) + free * np.sin(phase)
-    else:
-        q, _, c, g = (complex(item[0]) if np.ndim(item) else complex(item) for item in leaf.waves(np.array([z]), at))
-        turn = np.real(-c * own + g * (np.cos(q) - np.cos(q * eta)))
-    return _to_ends(np.arctan(turn), np.full(POINTS, length / POINTS), (float(leaf.strip.reach), rise - travel))
-
-
-def bent_leaf(strip: LeafStrip, travel: float, critical: float | None = None, free: bool = False) -> FloatArray:
-    """Return the centre line of a straight leaf bent into an S, buckled under `critical` [N] where that is given.
-
-    Parameters
-    ----------
-    strip : LeafStrip
-        The leaf.
-    travel : float
-        Of its far end towards the flat pose [m].
-    critical : float, optional
-        Load of the buckled form; None: it is not buckled.
-    free : bool
-        Whether the far end moves across as it likes, without axial force, as the corner of a diamond does.
-    """
-    length, angle = float(strip.length), float(strip.angle)
-    at = pose(angle, travel / length)
-    stretch = (strip.thickness / length) ** 2 / 3.0
-    z = 0.0 if free else float(axial_root(at.shortening, at.turn, stretch))
-    if critical is not None:
-        z = BUCKLED
-    place = np.linspace(0.0, 1.0, POINTS)
-    slope = float(at.turn) * _s_slope(min(z, POLE - 0.05), 2.0 * place - 1.0)
-    if critical is not None:
-        spare = float(at.shortening) - critical / float(strip.axial) - 0.25 * float(at.turn) ** 2
-        slope = slope + 2.0 * np.sqrt(max(spare, 0.0)) * np.sin(2.0 * np.pi * place)
-    angles = angle - float(at.turn) + slope
-    end = (float(strip.reach), float(strip.rise) - travel)
-    if free:
-        steps = np.full(POINTS, length / POINTS)
-        end = (float((np.cos(angles) * steps).sum()), end[1])
-    return _to_ends(angles, np.full(POINTS, length / POINTS), end)
-
-
-def _s_slope(z: float, eta: FloatArray) -> FloatArray:
-    """Return the slope to the chord over the end slope, at -1 ... 1 along the leaf."""
-    if abs(z) < 1e-6:
-        return 0.5 * (3.0 * eta**2 - 1.0)
-    q = np.sqrt(complex(z))
-    mean = np.sin(q) / q
-    return np.asarray(np.real((np.cos(q * eta) - mean) / (np.cos(q) - mean)))
-
-
-def _to_ends(angles: FloatArray, steps: FloatArray, end: tuple[float, float]) -> FloatArray:
-    """Return the line of these directions and step lengths, its far end brought to its place evenly."""
-    along = np.column_stack([np.cos(angles), np.sin(angles)])
-    middle = 0.5 * (along[1:] + along[:-1]) * steps[1:, None]
-    line = np.concatenate([[[0.0, 0.0]], np.cumsum(middle, axis=0)])
-    share = np.linspace(0.0, 1.0, len(line))[:, None]
-    found: FloatArray = line + share * (np.array(end) - line[-1])
-    return found
-
-
-def u_chain(strip: LeafStrip, radius: float, compression: float) -> FloatArray:
-    """Return the centre line of one U-shaped chain from the clamped end (0, 0) up to the guided one.
-
-    The moment is linear across the motion, about the chain's centroid [Castigliano].
-    """
-    length = float(strip.length)
-    half = np.pi * radius
-    legs = np.linspace(0, length, 40)
-    s = np.concatenate([legs, length + np.linspace(0, half, 61)[1:], length + half + legs[1:]])
-    arc = np.clip((s - length) / radius, 0.0, np.pi)
-    middle = 0.5 * (s[1:] + s[:-1])
-    turn_as_made = np.interp(middle, s, arc)
-    x = np.concatenate([[0.0], np.cumsum(np.cos(turn_as_made) * np.diff(s))])
-    developed, centroid, second = UShape(strip, radius).moments
-    over_ei = 0.5 * compression / (second - centroid**2 * developed)  # force of one chain over EI
-    curvature = -over_ei * (0.5 * (x[1:] + x[:-1]) - centroid)
-    turn = np.concatenate([[0.0], np.cumsum(curvature * np.diff(s))])
-    angles = turn_as_made - 0.5 * (turn[1:] + turn[:-1])
-    steps = np.column_stack([np.cos(angles), np.sin(angles)]) * np.diff(s)[:, None]
-    line = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
-    end = np.array([0.0, 2.0 * radius - compression])
-    found: FloatArray = line + (s / s[-1])[:, None] * (end - line[-1])
-    return found

@@ -42,8 +42,7 @@ def lengthened(spec: VcfmSpec, factors: list[float]) -> VcfmSpec:
     changes = {"mechanism.bistable.length": length, "mechanism.bistable.angle": asin(rise / length)}
     if spec.mechanism.springs is None:
         changes["mechanism.positive.length"] = spec.mechanism.flexures.length * factors[1]
-    if leaf.flexure_length is not None:
-        changes["mechanism.bistable.flexure_length"] = leaf.flexure_length * factors[0]
+    changes |= {f"mechanism.bistable.{key}": getattr(leaf, key) * factors[0] for key in leaf.kind.lengths}
     return spec.replace(changes)
 
 

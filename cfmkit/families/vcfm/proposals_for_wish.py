@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import chain, product
-from math import asin, pi, sin, sqrt
+from math import pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from cfmkit.families.run_control import Run
 from cfmkit.families.stiffening_of_wide_beams import is_too_wide
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.leaf_laws_from_spec import parts
+from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS
 from cfmkit.families.vcfm.proposal_sizes import fit_in_window, lengthened, opened, preloads_for, widened
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, FamilyOffer, called
@@ -57,10 +58,13 @@ THICKER = (1.0, 1.6, 2.4)
 MIDDLE = (0.8, 0.9)
 """Share of the linear region that is used: the exact leaves depart from the line at its ends."""
 
-STRUCTURE_WORDS = {
-    "folded spring": "2 Vs, folded spring", "cosine arches": "2 cosine arches", "hybrid leaves": "2 hybrid Vs",
-}  # fmt: skip
-"""What two Vs are called with another structure."""
+STRUCTURES = {
+    kind.proposal.name: (block, kind.proposal)
+    for block, kinds in (("positive", SPRING_KINDS.values()), ("bistable", LEAF_KINDS.values()))
+    for kind in kinds
+    if kind.proposal is not None
+}
+"""Name -> the block that is changed, and what is proposed in place of a designed diamond or its Vs."""
 
 SPRING_ANGLE = 7.0 * pi / 180.0
 """Of the diamond's leaves, as in Ding, Li and Li 2022."""
@@ -71,8 +75,10 @@ SAFETY = 1.03
 LITTLE = 0.02
 """Adjustment, over the force, where none is wished: every such mechanism has one."""
 
-TURNS = ("2 Vs, folded", "1 V", "2 cosine", "3 Vs", "4 Vs", "2 hybrid", "2 Vs, catalogue")
-"""Variants in the order in which they are tried, behind two Vs with a diamond."""
+TURNS = {"1 V": 2, "3 Vs": 4, "4 Vs": 5, "2 Vs, catalogue": 7} | {
+    one.variant: one.turn for _, one in STRUCTURES.values()
+}
+"""Variants by their first words, in the order in which they are tried behind two Vs with a diamond."""
 
 SOFTEST = 0.9
 """Smallest rise over that of the leaves that helical springs may ask for: the nearest of the series is taken."""
@@ -86,6 +92,7 @@ APART = 1.2
 OFFERED = 28
 
 FINISH = "cfmkit.families.vcfm.proposals_for_wish:finish"
+FINISH_WITH = "cfmkit.families.vcfm.proposals_for_wish:finish_with"
 CORRECT = "cfmkit.families.vcfm.proposals_corrected_by_solids:correct"
 """What finishes what the family's design has made, and what corrects it by its solids."""
 
@@ -143,7 +150,7 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
 
 def _turn(variant: str) -> int:
     """Return when a variant has its turn: what is most often possible first, then what differs from it most."""
-    return next((k for k, words in enumerate(TURNS, 1) if variant.startswith(words)), 0)
+    return next((turn for words, turn in TURNS.items() if variant.startswith(words)), 0)
 
 
 def _designs(wish: Wish, material: dict[str, Any]) -> Any:
@@ -274,29 +281,13 @@ def _with_structures(found: list[Candidate]) -> Iterator[Candidate]:
     """Yield the same with other springs and leaves: of two Vs, a small, a larger and a large one of each structure."""
     plain = [one for one in found if _turn(one.variant) == 0]
     chosen = [plain[k] for k in dict.fromkeys(len(plain) * part // 8 for part in (0, 3, 6))] if plain else []
-    for name in STRUCTURES:
-        function = "finish_" + name.replace(" ", "_")
+    for name, (_, structure) in STRUCTURES.items():
         for one in chosen:
-            words = one.variant.replace("2 Vs", STRUCTURE_WORDS[name])
-            yield replace(one, variant=words, finish=f"cfmkit.families.vcfm.proposals_for_wish:{function}")
+            yield replace(one, variant=one.variant.replace("2 Vs", structure.variant), finish=f"{FINISH_WITH}:{name}")
 
 
-def finish_folded_spring(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
-    """Return a designed mechanism with a folded spring."""
-    return _of_structure(spec, wish, "folded spring")
-
-
-def finish_cosine_arches(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
-    """Return a designed mechanism with cosine arches in place of Vs."""
-    return _of_structure(spec, wish, "cosine arches")
-
-
-def finish_hybrid_leaves(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
-    """Return a designed mechanism whose leaves are stiff between two flexures."""
-    return _of_structure(spec, wish, "hybrid leaves")
-
-
-def _of_structure(spec: VcfmSpec, wish: Wish, name: str) -> VcfmSpec:
+def finish_with(name: str, spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a designed mechanism with another structure, of `STRUCTURES`."""
     strength = wish.strength_used * (spec.mechanism.material.allowable(SAFETY) or 0.0)
     design = spec.design
     raised = 0.0 if wish.adjustable is None or design is None or not design.adjustment else max(wish.adjustable)
@@ -325,19 +316,6 @@ def _over_flattest(spec: VcfmSpec, wish: Wish, preloads: tuple[float, ...], end:
         return made
     return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})
 
-
-STRUCTURES: dict[str, dict[str, Any]] = {
-    "folded spring": {"mechanism.positive.structure": "folded", "mechanism.positive.angle": 0.0},
-    "cosine arches": {"mechanism.bistable.structure": "cosine"},
-    "hybrid leaves": {"mechanism.bistable.structure": "hybrid"},
-}
-"""Name -> what is changed of a designed mechanism."""
-
-FLEXURE = 0.2
-"""Length of each flexure of a hybrid leaf over that of the leaf: as in Ding, Li and Li 2022, a little longer."""
-
-HIGHER = 1.6
-"""Rise of hybrid leaves over that of straight ones for the same travel."""
 
 CENTRES = np.linspace(0.5, 1.5, 41)
 """Middles of windows that are looked at, over the rise: that of Vs is 1, that of cosine arches 4/3."""
@@ -383,12 +361,9 @@ def with_structure(
     cfmkit.errors.SolutionError
         If no widths above zero fit, or the leaves cannot be followed that far.
     """
-    changes: dict[str, Any] = dict(STRUCTURES[name])
-    leaf = spec.mechanism.bistable
-    if changes.get("mechanism.bistable.structure") == "hybrid":
-        # their force falls over a smaller share of the rise
-        changes["mechanism.bistable.flexure_length"] = FLEXURE * leaf.length
-        changes["mechanism.bistable.angle"] = asin(min(HIGHER * sin(leaf.angle), 0.25))
+    block, structure = STRUCTURES[name]
+    keys = structure.changes(getattr(spec.mechanism, block)).items()
+    changes = {f"mechanism.{block}.{key}": value for key, value in keys}
     made = spec.replace({**changes, "design": None, "requirements": (), "mechanism.safety_factor": 1.0})
     made = made.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0,), "analysis.window": None})
     found = _fitted(made, forces, travel)

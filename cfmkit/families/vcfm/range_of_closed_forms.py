@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm, percent
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.positive_stiffness_springs import Diamond
 from cfmkit.families.vcfm.leaves.v_beam import RELIABLE, STEEP, STOCKY, THICK
 from cfmkit.families.vcfm.solution import goes_beyond
 
@@ -21,9 +19,6 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.solution import Solution
 
     Sentence = tuple[Any, ...]
-
-PRESSED, STRETCHED = 0.3, 0.12
-"""Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
 
 
 def _slimness(solution: Solution) -> FloatArray:
@@ -40,7 +35,7 @@ def leaves_out_of_range(solution: Solution) -> Any:
     """Return which leaves the closed form is not for, (m,)."""
     if solution.fidelity != "analytic":
         return False
-    if solution.structure == "hybrid":
+    if solution.leaf_kind.shortcoming is not None:
         return ~is_stocky(solution)
     reach = RELIABLE * solution.of_mechanisms(solution.parts.balance)
     steep = solution.of_mechanisms(solution.parts.strip.angle) > STEEP
@@ -52,15 +47,8 @@ def range_of_leaves(solution: Solution) -> Sentence:
     """Return why the closed form is not for these leaves."""
     strip, share, cure = solution.parts.strip, float(_slimness(solution)[0]), "analysis.fidelity=exact"
     verify = "verify with 'analysis.fidelity: exact'"
-    if isinstance(law := solution.parts.leaf, HybridLeaf):
-        much = (
-            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
-            f"{percent(law.crushing)} of the flexures' own buckling load these bend and buckle, which "
-            "pseudo-rigid bodies cannot: the force is overestimated, by up to several times"
-            if law.flexures_buckle
-            else "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
-        )
-        return f"{much}; their stress is underestimated, by up to a half. V{verify[1:]}", cure
+    if (shortcoming := solution.leaf_kind.shortcoming) is not None:
+        return f"{shortcoming(solution.parts.leaf)}. V{verify[1:]}", cure
     if share > THICK:
         return (
             f"the thickness of the leaves is {percent(share)} of their length: the closed forms are for thin leaves, "
@@ -77,29 +65,31 @@ def range_of_leaves(solution: Solution) -> Sentence:
     )
 
 
-def _worst_compression(solution: Solution) -> FloatArray:
+def _worst_compression(solution: Solution, limits: tuple[float, float]) -> FloatArray:
     """Return by how much the spring is compressed, or negative stretched, where that matters most, (m,) [m]."""
+    pressed, stretched = limits
     ends = np.stack([end + solution.curves.preload[:, 0] for end in solution.curves.ends], axis=1)
     ends = solution.by_mechanism(ends).reshape(len(solution), -1)
-    worst = np.where(ends > 0, ends / PRESSED, -ends / STRETCHED).argmax(axis=1)
+    worst = np.where(ends > 0, ends / pressed, -ends / stretched).argmax(axis=1)
     return np.asarray(ends[np.arange(len(ends)), worst])
 
 
 def spring_out_of_range(solution: Solution) -> Any:
     """Return which springs the closed form is not for, (m,)."""
-    spring = solution.parts.spring
-    if solution.fidelity != "analytic" or not isinstance(spring, Diamond):
+    spring: Any = solution.parts.spring
+    limits = getattr(spring, "deflection_limits", None)
+    if solution.fidelity != "analytic" or limits is None:
         return False
-    worst = _worst_compression(solution)
+    worst = _worst_compression(solution, limits)
     share = np.abs(worst) / (2.0 * solution.of_mechanisms(spring.strip.length))
     steep = solution.of_mechanisms(spring.strip.angle) > STEEP
-    return ~is_stocky(solution) & (steep | (share > np.where(worst > 0, PRESSED, STRETCHED)))
+    return ~is_stocky(solution) & (steep | (share > np.where(worst > 0, *limits)))
 
 
 def range_of_spring(solution: Solution) -> Sentence:
     """Return why the closed form is not for this spring."""
-    spring, worst = solution.parts.spring, float(_worst_compression(solution)[0])
-    assert isinstance(spring, Diamond)
+    spring: Any = solution.parts.spring
+    worst = float(_worst_compression(solution, spring.deflection_limits)[0])
     if spring.strip.angle > STEEP:
         angle = degrees(spring.strip.angle)
         text = f"the leaves of the spring are at {angle:.3g} deg: its stiffness changes with its compression"

@@ -18,7 +18,6 @@ from cfmkit.arrays import ShortRepr
 from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.curves_in_rows import LeafSamples, Push
 from cfmkit.families.vcfm.leaf_laws_from_spec import coils
-from cfmkit.families.vcfm.leaves.v_beam import VBeam, overrated
 from cfmkit.metrics.longest_interval_in_band import extremes
 from cfmkit.metrics.metrics_of_rows import CurveRows, RowSamples, StressRows
 from cfmkit.specs.units import between
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.curves_in_rows import Characteristics, PartSampler, Rows
     from cfmkit.families.vcfm.leaf_laws_from_spec import Parts
+    from cfmkit.families.vcfm.leaves.kinds import LeafKind
     from cfmkit.families.vcfm.spec import VcfmSpec
 
     Ends = tuple[FloatArray, FloatArray]
@@ -111,9 +111,9 @@ class Solution(ShortRepr):
         return self.spec.analysis.fidelity
 
     @property
-    def structure(self) -> str:
-        """The kind of the leaves."""
-        return self.spec.mechanism.bistable.structure
+    def leaf_kind(self) -> LeafKind:
+        """Record of the kind of the leaves."""
+        return self.spec.mechanism.bistable.kind
 
     @property
     def sampler(self) -> PartSampler:
@@ -251,13 +251,13 @@ class Solution(ShortRepr):
         Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
         constant stiffness. Then no single number stands for the curve.
         """
-        kinds, curves = self.spec.mechanism.kinds, self.nominal
+        about, curves = self.spec.mechanism.positive, self.nominal
         place = self.of_mechanisms(self.parts.balance)[:, None]
         force = curves.sampler.spring(place + curves.preload)[0][:, 0]
         # leaves with a stated waviness carry a little there, which no flatness tells
-        buckles = np.isfinite(self.linear[0]) & (kinds[1] != "hybrid")
+        buckles = np.isfinite(self.linear[0]) & self.leaf_kind.buckles
         bears = (np.abs(curves.sampler.leaf_force(place)[:, 0]) > self._flatness * np.abs(force)) & ~buckles
-        return np.where(bears | (kinds[0] == "straight"), np.nan, force)
+        return np.where(bears | (about is not None and not about.kind.is_linear), np.nan, force)
 
     @cached_property
     def constant_force(self) -> FloatArray:
@@ -317,8 +317,7 @@ class Solution(ShortRepr):
     @property
     def overrating(self) -> FloatArray:
         """By what share the model overestimates the stress of the leaves at most, where that is known; else zero."""
-        closed = isinstance(self.parts.leaf, VBeam) and self.spec.analysis.fidelity == "analytic"
-        return self.of_mechanisms(overrated(self.parts.strip.angle) if closed else 0.0)
+        return self.of_mechanisms(self.parts.leaf.overrating if self.fidelity == "analytic" else 0.0)
 
     @cached_property
     def hindered_curling(self) -> dict[str, Ends]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import radians, sin
+from math import sin
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.vcfm.bought_springs_spec import BoughtSprings
 from cfmkit.families.vcfm.cut_and_frame_spec import CutLeaves, VcfmPart
+from cfmkit.families.vcfm.leaves_spec import LEAF_KINDS, SPRING_KINDS, Bistable, Positive
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.block import keys_of
 from cfmkit.specs.spec import (
@@ -23,16 +24,12 @@ from cfmkit.specs.spec import (
     refuse,
 )
 from cfmkit.specs.target_curve import Target
-from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness, format_short
+from cfmkit.specs.units import Force, Length, Ratio, Stiffness, format_short
 from cfmkit.stock.material_and_part_spec import MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life
 
 if TYPE_CHECKING:
     from cfmkit.specs.evaluable_target_curve import TargetCurve
-
-
-LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
-SteepAngle = Annotated[Angle, Field(gt=0, le=radians(40))]
 
 
 class LeafMaterial(MaterialSpec):
@@ -55,80 +52,6 @@ class LeafMaterial(MaterialSpec):
 
 MOST_PRELOAD = 100.0
 """Lengths of a leaf that a preload may be: every spring closes, or tears, long before."""
-
-
-def _slender(length: float, thickness: float) -> None:
-    if thickness >= length:
-        raise ValueError("'thickness' must be smaller than 'length': a leaf is long and thin")
-
-
-class Positive(Model):
-    """The spring: the structure with a positive stiffness, whose far end the preload moves."""
-
-    structure: Literal["diamond", "folded", "straight", "u-shape"] = Field(
-        "diamond", description="two chains of inclined leaves, eight folded ones, one straight beam, or two U-shapes"
-    )
-    loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
-    length: PositiveLength = Field(description="of one flexible leaf, L1")
-    angle: LeafAngle = Field(0.0, description="of a diamond's leaves from the direction across the motion, theta1")
-    thickness: PositiveLength = Field(description="in the plane, t1")
-    width: PositiveLength = Field(description="out of the plane, b1")
-    radius: PositiveLength | None = Field(
-        None, description="of the flexible semicircle of a u-shape; the others have none"
-    )
-
-    @model_validator(mode="after")
-    def _bend_has_a_radius(self) -> Self:
-        _slender(self.length, self.thickness)
-        if self.structure == "u-shape" and self.radius is None:
-            raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
-        return self
-
-
-class Bistable(Model):
-    """The leaves between wall and shuttle that snap through, and so have a negative stiffness."""
-
-    structure: Literal["v-beam", "cosine", "hybrid"] = Field(
-        "v-beam", description="straight inclined leaves, half cosine arches, or flexures with a stiff middle"
-    )
-    half_beams: int = Field(
-        ge=1, le=1000, description="leaves between wall and shuttle, all together: one V has two, two Vs have four"
-    )
-    guided: bool = Field(True, description="whether the shuttle cannot turn: two Vs at a distance, or a guide")
-    length: PositiveLength = Field(description="between the ends of a leaf, L2")
-    angle: SteepAngle = Field(description="of that line from the direction across the motion, theta2")
-    thickness: PositiveLength = Field(description="in the plane, t2")
-    width: PositiveLength = Field(description="out of the plane, b2")
-    flexure_length: PositiveLength | None = Field(None, description="of each of a hybrid leaf's two flexures")
-    stiffening: Annotated[Ratio, Field(ge=1.5, le=100)] | None = Field(
-        None, description="thickness of a hybrid leaf's middle over that of its flexures; default 4"
-    )
-    waviness: NonNegativeLength = Field(
-        0.0, description="deviation of a leaf as made from its shape, in its buckling mode; exact model only"
-    )
-
-    @property
-    def bar_ratio(self) -> float:
-        """Thickness of a hybrid leaf's middle over that of its flexures."""
-        return self.stiffening or 4.0
-
-    @property
-    def profile(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Shares of the length and the thicknesses there [m]: two, or six with the steps of a hybrid leaf."""
-        thin = self.thickness
-        if self.structure != "hybrid":
-            return (0.0, 1.0), (thin, thin)
-        end, thick = float(self.flexure_length or 0.0) / self.length, self.bar_ratio * thin
-        return (0.0, end, end, 1.0 - end, 1.0 - end, 1.0), (thin, thin, thick, thick, thin, thin)
-
-    @model_validator(mode="after")
-    def _flexures_fit(self) -> Self:
-        _slender(self.length, self.thickness)
-        if self.structure == "hybrid" and self.flexure_length is None:
-            raise ValueError("'structure: hybrid' needs 'flexure_length', of each of its two flexures")
-        if self.flexure_length and 2.0 * self.flexure_length >= self.length:
-            raise ValueError("two flexures of 'flexure_length' must be shorter than 'length'")
-        return self
 
 
 class Frame(Model):
@@ -303,6 +226,14 @@ class VcfmSolid(SolidAnalysis):
     )
 
 
+OTHER_DEFAULTS = "; ".join(
+    f"for {kind.name} leaves the default is {kind.fidelity}"
+    for kind in LEAF_KINDS.values()
+    if kind.fidelity is not None
+)
+"""Of `analysis.fidelity`."""
+
+
 class VcfmAnalysis(Analysis):
     """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
 
@@ -316,7 +247,7 @@ class VcfmAnalysis(Analysis):
     fidelity: Literal["truss", "analytic", "exact", "solid"] = Field(
         "analytic",
         description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
-        "spring as drawn, as planar solids; for hybrid leaves the default is exact",
+        f"spring as drawn, as planar solids; {OTHER_DEFAULTS}",
     )
     solid: VcfmSolid = Field(VcfmSolid(), description="settings of fidelity 'solid'")
     branch: Literal["stable", "primary"] = Field(
@@ -346,14 +277,15 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="before")
     @classmethod
-    def _hybrid_leaves_are_exact(cls, data: Any) -> Any:
-        """Choose the exact model for hybrid leaves unless another is named: no law has flexures that buckle."""
+    def _default_model_is_that_of_the_leaves(cls, data: Any) -> Any:
+        """Choose the model that the kind of leaf needs, unless another is named."""
         whole = keys_of(data)
         structure = keys_of(keys_of(whole.get("mechanism")).get("bistable")).get("structure")
         analysis = whole.get("analysis")
-        if structure != "hybrid" or not (analysis is None or isinstance(analysis, Mapping | Model)):
+        fidelity = next((kind.fidelity for kind in LEAF_KINDS.values() if kind.name == structure), None)
+        if fidelity is None or not (analysis is None or isinstance(analysis, Mapping | Model)):
             return data
-        return dict(whole) | {"analysis": {"fidelity": "exact"} | dict(keys_of(analysis))}
+        return dict(whole) | {"analysis": {"fidelity": fidelity} | dict(keys_of(analysis))}
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
@@ -409,9 +341,12 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
-        kinds = self.mechanism.kinds
-        if self.analysis.fidelity == "truss" and kinds != ("diamond", "v-beam"):
-            raise ValueError("the truss laws are for 'diamond' and 'v-beam'; choose another 'analysis.fidelity'")
+        both = self.mechanism.positive, self.mechanism.bistable
+        if self.analysis.fidelity == "truss" and any(one is None or one.kind.truss is None for one in both):
+            names = [
+                f"'{kind.name}'" for kind in (*SPRING_KINDS.values(), *LEAF_KINDS.values()) if kind.truss is not None
+            ]
+            raise ValueError(f"the truss laws are for {' and '.join(names)}; choose another 'analysis.fidelity'")
         return self
 
     @model_validator(mode="after")
@@ -431,10 +366,15 @@ class VcfmSpec(Spec):
     def _design_has_laws(self) -> Self:
         if self.design is None:
             return self
-        spring, leaves = self.mechanism.kinds
-        if leaves != "v-beam" or (spring not in ("diamond", "springs") and not self.design.catalogue):
-            raise ValueError("only 'v-beam' with a 'diamond' or with 'springs' can be designed; remove 'design'")
-        free = spring == "springs" or bool(self.design.catalogue)
+        spring, leaves = self.mechanism.positive, self.mechanism.bistable
+        fixed = spring is not None and not self.design.catalogue
+        if not leaves.kind.can_be_designed or (spring is not None and fixed and not spring.kind.can_be_designed):
+            names, springs = (
+                " or ".join(f"'{kind.name}'" for kind in kinds.values() if kind.can_be_designed)
+                for kinds in (LEAF_KINDS, SPRING_KINDS)
+            )
+            raise ValueError(f"only {names} with a {springs} or with 'springs' can be designed; remove 'design'")
+        free = not fixed
         if not free and self.design.preload is None and self.design.rise is None:
             raise ValueError(
                 "'design' needs either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"

@@ -9,7 +9,6 @@ import numpy as np
 
 from cfmkit.families.vcfm.leaf_laws_from_spec import share_of, strip_of
 from cfmkit.families.vcfm.leaves.positive_stiffness_springs import measured_stiffness_for
-from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.solution import MEAN_PLACES
 from cfmkit.tables import Table, TableColumn, border_column
 
@@ -109,8 +108,9 @@ def _readings(solution: Solution) -> Iterator[TableReading]:
             same = leaves == mechanism.bistable.half_beams and name == mechanism.flexures.loaded
             mark = ", as specified" if same else ""
             yield TableReading(f"{leaves} half-beams, {name} spring{mark}", leaves, share * whole)
-    if mechanism.kinds == ("diamond", "v-beam"):
-        one_chain = TrussDiamond(strip_of(mechanism.flexures, mechanism.material), 0.5).stiffness
+    truss = mechanism.flexures.kind.truss
+    if truss is not None and solution.leaf_kind.truss is not None:
+        one_chain = truss(strip_of(mechanism.flexures, mechanism.material), 0.5).stiffness
         yield TableReading("the paper's eq. 19 as printed: truss law", 2, float(one_chain), truss=True)
     if reported is not None:
         yield TableReading("measured stiffness, 2 half-beams", 2, reported.positive_stiffness)
@@ -122,8 +122,8 @@ def _readings(solution: Solution) -> Iterator[TableReading]:
 def _force(solution: Solution, one: TableReading) -> FloatArray:
     """Return the force of a reading without preload at even places of the window [N]."""
     places = np.linspace(*solution.window_of_one, MEAN_PLACES)
-    if one.truss:
-        law = TrussLeaf(solution.parts.strip)
+    if one.truss and (truss := solution.leaf_kind.truss) is not None:
+        law = truss(solution.parts.strip)
         return np.asarray(one.half_beams * law.force(places) + one.positive_stiffness * places)
     leaves = solution.sampler.leaves(places).force / solution.parts.half_beams
     spring = solution.sampler.spring(places)[0] / solution.character.positive_stiffness

@@ -113,7 +113,7 @@ def _floor(
             f"{mm(2 * widest)} wide and the walls are {mm(2 * wall)} apart; use longer leaves, or leave out "
             f"'mechanism.part.frame.seat'"
         )
-    if about.structure != "straight":
+    if not about.kind.stands_on_ends:
         if seat > bottom - spec.travel - given.clearance:
             raise GeometryError(
                 f"the shuttle comes to the seat at (0 mm, {mm(seat)}) within the travel of {mm(spec.travel)}: reduce "

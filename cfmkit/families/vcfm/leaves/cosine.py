@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
 from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
@@ -33,16 +34,17 @@ _POSITIVE, _HALF = _NODES[12:], _WEIGHTS[12:]
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
 _PLACES = np.linspace(-1.0, 1.0, 41)
 
+N_EDGE_POINTS = 201
+"""Points of the centre line as made, from which edges are drawn."""
+
 
 @dataclass(frozen=True)
-class CosineLeaf:
+class CosineLeaf(LeafLaw):
     """The law of one half of a cosine arch, of the same wall, shuttle, thickness and width as the straight leaf.
 
     Bending is scaled so that the load of the constrained mode is P_cr with stretching and shear, and lengths along the
     arch are developed ones: at 7 deg the negative stiffness is then within 0.6 % of the exact one (2.4 % without).
     """
-
-    strip: LeafStrip
 
     @cached_property
     def developed(self) -> Any:
@@ -66,14 +68,7 @@ class CosineLeaf:
         """Size of the negative stiffness of one leaf [N/m]: of the buckled form, else of the steepest fall."""
         if np.isfinite(self.linear[0]):
             return self.critical_force / self.strip.reach
-        places = np.linspace(0.0, 2.0, 801) * self.strip.rise
-        return max(0.0, -float(np.gradient(self.force(places), places).min()))
-
-    @property
-    def first_stiffness(self) -> Any:
-        """Stiffness as made [N/m], from the law at a thousandth of the rise."""
-        small = 1e-3 * self.strip.rise
-        return self.force(np.array([small]))[0] / small
+        return super().negative_stiffness
 
     @cached_property
     def linear(self) -> tuple[Any, Any]:
@@ -93,11 +88,6 @@ class CosineLeaf:
     def _stretch(self) -> Any:
         """Shortening by the axial force, per z."""
         return self.critical_force / (BUCKLED * self.strip.axial)
-
-    def buckled(self, travel: Any) -> Any:
-        """Return whether the arch is buckled."""
-        first, last = self.linear
-        return (travel >= first) & (travel <= last)
 
     def force(self, travel: Any) -> FloatArray:
         """Return the force of one leaf along the motion [N], on the stable branch."""
@@ -207,3 +197,46 @@ class CosineLeaf:
         own = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
         both = (np.abs(own + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))
         return np.asarray(np.maximum(*both))
+
+    # --- shape ------------------------------------------------------------------------------------------------------
+
+    @property
+    def centre_line(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """x, y [m] and slope as made, from the shuttle at (0, 0) to the wall."""
+        reach, rise = float(self.strip.reach), float(self.strip.rise)
+        x = np.linspace(0.0, reach, N_EDGE_POINTS)
+        wave = np.pi * x / reach
+        return x, -0.5 * rise * (1.0 - np.cos(wave)), -0.5 * np.pi * rise / reach * np.sin(wave)
+
+    def beam_shapes(self) -> tuple[Any, Any]:
+        """Return the shapes of `cfmkit.elastica` of an arch from wall to shuttle, and of its mirror image."""
+        from cfmkit.elastica import CosineArch
+
+        return CosineArch(self.strip.rise, 0.5), CosineArch(-self.strip.rise, 0.5)
+
+    def bent_line(self, travel: float) -> FloatArray:
+        """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]."""
+        at = np.array([travel])
+        z, length, rise = float(self.root(at)[0]), float(self.developed), float(self.strip.rise)
+        eta = np.linspace(-1.0, 1.0, POINTS)
+        own = np.pi / length * np.cos(0.5 * np.pi * eta)
+        if z >= BUCKLED:
+            slope = (float(self.balance) - travel) / length
+            free = float(self.buckled_amplitude(at)[0])
+            phase = np.pi * (1.0 + eta)
+            turn = -rise / 6.0 * own + slope * (1.0 - np.cos(phase)) + free * np.sin(phase)
+        else:
+            q, _, c, g = (
+                complex(item[0]) if np.ndim(item) else complex(item) for item in self.waves(np.array([z]), at)
+            )
+            turn = np.real(-c * own + g * (np.cos(q) - np.cos(q * eta)))
+        end = (float(self.strip.reach), rise - travel)
+        return line_between(np.arctan(turn), np.full(POINTS, length / POINTS), end)
+
+
+COSINE = LeafKind(
+    "cosine",
+    "half cosine arches",
+    lambda strip, _keys: CosineLeaf(strip),
+    proposal=ProposedStructure("cosine arches", "2 cosine arches", 3, lambda _leaf: {"structure": "cosine"}),
+)

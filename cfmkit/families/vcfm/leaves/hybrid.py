@@ -11,41 +11,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import asin, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.findings import percent
+from cfmkit.families.vcfm.leaves.bent_centre_line import POINTS, line_between
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, ProposedStructure
+
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
 
 
 SLENDER, CRUSHED = 6.0, 0.25
 """Rise over the thickness of a flexure, and axial force over its own buckling load, above which that force bends it."""
 
+STIFFENING = 4.0
+"""Thickness of the middle over that of the flexures, where none is stated."""
+
+PROPOSED_FLEXURE = 0.2
+"""Length of each flexure of a proposed leaf over that of the leaf: as in Ding, Li and Li 2022, a little longer."""
+
+PROPOSED_RISE = 1.6
+"""Rise of proposed leaves over that of straight ones for the same travel: their force falls over less of it."""
+
+N_FLEXURE_POINTS = 15
+"""Points of a flexure in pictures."""
+
 
 @dataclass(frozen=True)
-class HybridLeaf:
-    """The law of one hybrid leaf.
+class HybridLeaf(LeafLaw):
+    """The law of one hybrid leaf, of flexures as thick as its strip; some force is left where its chord is flat."""
 
-    Parameters
-    ----------
-    strip : LeafStrip
-        Of the flexures; its length is that of the whole leaf.
-    flexure : float
-        Length of each flexure [m].
-    stiffening : float
-        Thickness of the bar over that of the flexures.
-    """
-
-    strip: LeafStrip
-    flexure: Any
-    stiffening: Any = 4.0
-
-    @property
-    def balance(self) -> Any:
-        """Travel at which the line between its ends is flat [m]; unlike in other leaves some force is left there."""
-        return self.strip.rise
+    flexure: Any  # length of each flexure [m]
+    stiffening: Any = STIFFENING  # thickness of the bar over that of the flexures
 
     @property
     def pivot(self) -> Any:
@@ -119,3 +119,54 @@ class HybridLeaf:
     def buckled(self, travel: Any) -> Any:
         """Return False everywhere: the model has no buckled form."""
         return np.zeros(np.shape(travel), dtype=bool)
+
+    # --- shape ------------------------------------------------------------------------------------------------------
+
+    @property
+    def profile(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Shares of the length, and the thicknesses there [m]: with the steps from the flexures to the middle."""
+        end, thin = self.flexure / self.strip.length, self.strip.thickness
+        thick = self.stiffening * thin
+        return (0.0, end, end, 1.0 - end, 1.0 - end, 1.0), (thin, thin, thick, thick, thin, thin)
+
+    def bent_line(self, travel: float) -> FloatArray:
+        """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]."""
+        strip, end, n = self.strip, float(self.flexure), N_FLEXURE_POINTS
+        tilt = float(np.arctan2(self.bar * np.sin(strip.angle) - travel, self.bar * np.cos(strip.angle)))
+        bend = np.linspace(float(strip.angle), tilt, n)
+        angles = np.concatenate([bend, np.full(POINTS - 2 * n, tilt), bend[::-1]])
+        middle = np.full(POINTS - 2 * n, (strip.length - 2 * end) / (POINTS - 2 * n))
+        lengths = np.concatenate([np.full(n, end / n), middle, np.full(n, end / n)])
+        return line_between(angles, lengths, (strip.reach, strip.rise - travel))
+
+
+def _shortcoming(law: HybridLeaf) -> str:
+    """Return how rough the force and the stress of this law are."""
+    if not law.flexures_buckle:
+        force = "the pseudo-rigid-body model gives the force of hybrid leaves to about 10 %, up to the peak only"
+    else:
+        force = (
+            f"with a rise of {float(law.strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
+            f"{percent(law.crushing)} of the flexures' own buckling load these bend and buckle, which pseudo-rigid "
+            "bodies cannot: the force is overestimated, by up to several times"
+        )
+    return f"{force}; their stress is underestimated, by up to a half"
+
+
+def _as_proposed(leaf: Any) -> dict[str, Any]:
+    """Return the keys of hybrid leaves in place of a designed straight one."""
+    angle = asin(min(PROPOSED_RISE * sin(leaf.angle), 0.25))
+    return {"structure": "hybrid", "flexure_length": PROPOSED_FLEXURE * leaf.length, "angle": angle}
+
+
+HYBRID = LeafKind(
+    "hybrid",
+    "flexures with a stiff middle",
+    lambda strip, keys: HybridLeaf(strip, keys.flexure_length, keys.stiffening or STIFFENING),
+    needs={"flexure_length": "of each of its two flexures"},
+    lengths=("flexure_length",),
+    fidelity="exact",
+    buckles=False,
+    shortcoming=_shortcoming,
+    proposal=ProposedStructure("hybrid leaves", "2 hybrid Vs", 6, _as_proposed),
+)

@@ -9,18 +9,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
-from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
 
 T = TypeVar("T")
-
-ONE_BY_ONE = (CosineLeaf, HybridLeaf)
-"""Laws of one leaf only: their tables and searches are not arrays over leaves."""
 
 
 def stacked(laws: Sequence[T]) -> T:
@@ -35,7 +29,7 @@ def stacked(laws: Sequence[T]) -> T:
     first: Any = laws[0]
     if len(laws) == 1:
         return laws[0]
-    if isinstance(first, ONE_BY_ONE):
+    if getattr(first, "one_by_one", False):  # its tables and searches are not arrays over leaves
         return LawsOneByOne(tuple(laws))  # type: ignore[return-value]
     if not is_dataclass(first):
         return np.array(laws, dtype=float)[:, None]  # type: ignore[return-value]
@@ -77,6 +71,10 @@ class LawsOneByOne:
     def stress(self, travel: FloatArray) -> FloatArray:
         """Return the largest stress of each leaf [Pa]."""
         return np.asarray(self._each("stress", travel))
+
+    def state(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return `force` and `stress`."""
+        return self.force(travel), self.stress(travel)
 
     def buckled(self, travel: FloatArray) -> Any:
         """Return whether each leaf is buckled."""

@@ -15,11 +15,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import radians, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
+from cfmkit.families.vcfm.leaves.kinds import LeafKind, LeafLaw, SlendernessLimits
 from cfmkit.families.vcfm.leaves.s_form import pose, s_force
+from cfmkit.families.vcfm.leaves.truss import TrussLeaf
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -103,15 +106,10 @@ def overrated(angle: float) -> float:
 
 
 @dataclass(frozen=True)
-class VBeam:
-    """The law of one leaf: force and stress over the travel, and where it is buckled."""
+class VBeam(LeafLaw):
+    """The law of one straight inclined leaf, which carries nothing when flat, if it is buckled there."""
 
-    strip: LeafStrip
-
-    @property
-    def balance(self) -> Any:
-        """Travel at which the leaf carries nothing [m]: flat, if it is buckled there."""
-        return self.strip.rise
+    one_by_one: ClassVar[bool] = False
 
     @property
     def first_stiffness(self) -> Any:
@@ -169,10 +167,15 @@ class VBeam:
         near = np.abs(here - guess) <= 2.0 * np.abs(outward)
         return np.where(near, here, guess)
 
-    def buckled(self, travel: Any) -> Any:
-        """Return whether the leaf is buckled."""
-        first, last = self.linear
-        return (travel >= first) & (travel <= last)
+    @property
+    def overrating(self) -> Any:
+        """By what share the law overestimates the largest stress at most (`overrated`)."""
+        return overrated(self.strip.angle)
+
+    def bent_line(self, travel: float) -> FloatArray:
+        """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]."""
+        buckled = bool(self.buckled(np.array([travel]))[0])
+        return bent_leaf(self.strip, travel, float(critical_force(self.strip)) if buckled else None)
 
     def force(self, travel: Any) -> FloatArray:
         """Return the force of one leaf along the motion [N], on the stable branch.
@@ -225,3 +228,13 @@ def _bent(strip: LeafStrip, travel: FloatArray) -> tuple[Any, Any]:
     axial = np.abs(4.0 * found.z * unit) / strip.area
     bending = 0.5 * strip.youngs_modulus * strip.thickness * found.curvature / strip.length
     return unit * found.along, bending + axial
+
+
+V_BEAM = LeafKind(
+    "v-beam",
+    "straight inclined leaves",
+    lambda strip, _keys: VBeam(strip),
+    truss=TrussLeaf,
+    can_be_designed=True,
+    limits=SlendernessLimits(NEGATIVE_ABOVE, LINEAR_ABOVE, "pi"),
+)

@@ -1,0 +1,236 @@
+"""Kinds of leaves that snap through and of springs of leaves: what the law of one gives, and the record of a kind.
+
+A kind is a subclass of `LeafLaw` or `LeafSpring` and a record `LeafKind` or `SpringKind`, both in one file of this
+folder; the record is listed in `leaves_spec`. Specification, findings, figures, drawings, models and proposals read the
+record and the law: none of them compares names.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from cfmkit.families.vcfm.leaves.bent_centre_line import bent_leaf
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network, Section
+    from cfmkit.families.vcfm.leaves.dimensions_and_material import LeafStrip
+
+    Edge = list[Any]  # corners (x, y) [m], and arcs of `cfmkit.export.contours`
+    Edges = tuple[Edge, Edge, float]
+
+
+@dataclass(frozen=True)
+class LeafLaw(ABC):
+    """Force and stress of one leaf over the travel of the shuttle, and its shape.
+
+    Travels count from the as-made pose, positive towards the flat pose [m]. What a subclass leaves out is that of a
+    straight leaf of constant thickness, or follows from its force.
+    """
+
+    strip: LeafStrip
+
+    one_by_one: ClassVar[bool] = True
+    """Whether it is a law of plain numbers only; if not, fields may be columns, and travels rows (`laws_in_rows`)."""
+
+    @abstractmethod
+    def force(self, travel: Any) -> Any:
+        """Return the force of one leaf along the motion [N], on the stable branch."""
+
+    @abstractmethod
+    def stress(self, travel: Any) -> Any:
+        """Return the largest stress of the leaf, bending and axial [Pa]."""
+
+    def state(self, travel: Any) -> tuple[Any, Any]:
+        """Return `force` and `stress`."""
+        return self.force(travel), self.stress(travel)
+
+    @property
+    def balance(self) -> Any:
+        """Travel at which the leaf carries nothing [m]: flat."""
+        return self.strip.rise
+
+    @property
+    def first_stiffness(self) -> Any:
+        """Stiffness as made [N/m], from the force at a thousandth of the rise."""
+        small = 1e-3 * self.strip.rise
+        return self.force(np.array([small]))[0] / small
+
+    @property
+    def negative_stiffness(self) -> Any:
+        """Size of the negative stiffness [N/m]: that of the steepest fall of the force; zero if it only rises."""
+        places = np.linspace(0.0, 2.0, 801) * self.strip.rise
+        return max(0.0, -float(np.gradient(self.force(places), places).min()))
+
+    @property
+    def linear(self) -> tuple[Any, Any]:
+        """Where the negative stiffness is constant, because the leaf is buckled, from and to [m]; NaN: nowhere."""
+        return np.nan, np.nan
+
+    def buckled(self, travel: Any) -> Any:
+        """Return whether the leaf is buckled."""
+        first, last = self.linear
+        return (travel >= first) & (travel <= last)
+
+    @property
+    def overrating(self) -> Any:
+        """By what share the law overestimates the largest stress at most, where that is known; else zero."""
+        return 0.0
+
+    # --- shape ------------------------------------------------------------------------------------------------------
+
+    @property
+    def profile(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Shares of the length, and the thicknesses there [m]; linear in between, a share given twice is a step."""
+        return (0.0, 1.0), (self.strip.thickness, self.strip.thickness)
+
+    @property
+    def centre_line(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """x, y [m] and slope as made, from the shuttle at (0, 0) to the wall; of a straight leaf its two ends."""
+        reach, rise = float(self.strip.reach), float(self.strip.rise)
+        x = np.linspace(0.0, reach, 2)
+        return x, -rise * x / reach, np.full(2, -rise / reach)
+
+    def beam_shapes(self) -> tuple[Any, Any]:
+        """Return the shapes of `cfmkit.elastica` of a leaf from wall to shuttle, and of its mirror image."""
+        from cfmkit.elastica import STRAIGHT
+
+        return STRAIGHT, STRAIGHT
+
+    def bent_line(self, travel: float) -> FloatArray:
+        """Return the centre line at a travel, from the wall at (0, 0) to the shuttle, (n, 2) [m]: bent into an S."""
+        return bent_leaf(self.strip, travel)
+
+
+@dataclass(frozen=True)
+class SpringChain:
+    """A part of the spring that is traced: its network, the node that moves, and how it counts."""
+
+    network: Network
+    node: str
+    travel: float  # share of the compression that the node moves
+    count: float  # number of such parts in parallel
+
+
+@dataclass(frozen=True)
+class LeafSpring(ABC):
+    """A spring of leaves, with its shape: x = 0 is its middle, and it is compressed along y."""
+
+    strip: LeafStrip
+
+    deflection_limits: ClassVar[tuple[float, float] | None] = None
+    """Deflection of a leaf over its length up to which the law holds, pressed and stretched; None: it always does."""
+
+    @property
+    @abstractmethod
+    def stiffness(self) -> Any:
+        """K_p as made [N/m]."""
+
+    def force(self, compression: Any) -> Any:
+        """Return the force [N] at a compression [m]."""
+        return self.stiffness * compression
+
+    @abstractmethod
+    def stress(self, compression: Any) -> Any:
+        """Return the largest stress [Pa]."""
+
+    @abstractmethod
+    def chain(self, section: Section) -> SpringChain:
+        """Return what is traced of it by the exact model."""
+
+    @abstractmethod
+    def edges(self, block: float, corner: float, fillet: float, top: float) -> Edges:
+        """Return outer and inner edge of the right half between its blocks, from the top down, and its lowest point.
+
+        The inner edge is empty where the two blocks are one.
+
+        Parameters
+        ----------
+        block, corner, fillet : float
+            Width of blocks, height of rigid corners, radius of inside corners [m].
+        top : float
+            Height of its upper end [m].
+        """
+
+    @abstractmethod
+    def solved_piece(self, edges: Edges, half: float) -> tuple[Edge, float, Edge, bool]:
+        """Return what symmetry leaves for the model of solids, from the edges of a spring with its upper end at zero.
+
+        Its edge from the upper block down and around to x = 0, the lower end of the block that is driven, the corners
+        of what is held, and whether that moves across as it likes. `half` is half of the width of a block [m].
+        """
+
+    @abstractmethod
+    def bent_lines(self, compression: float, corner: float) -> tuple[list[FloatArray], float]:
+        """Return the centre lines of the right chain from below, between rigid corners, and its height [m]."""
+
+    def room(self, _corner: float) -> float:
+        """Return by how much it can be compressed until its blocks meet [m]; infinite if they do not."""
+        return np.inf
+
+    def opening(self, corner: float, needed: float) -> tuple[str, float]:
+        """Return which key of `mechanism` gives it more room, and its value for so much more [m]."""
+        return "frame.corner", corner + needed
+
+
+@dataclass(frozen=True)
+class ProposedStructure:
+    """Another structure in place of the designed leaves, or of the designed diamond, as `suggest` proposes it."""
+
+    name: str
+    variant: str  # what two Vs and a diamond are called with it
+    turn: int  # the order in which variants are tried, see `proposals_for_wish.TURNS`
+    changes: Callable[[Any], dict[str, Any]]  # from the block as designed: keys of it -> values
+
+
+@dataclass(frozen=True)
+class StructureKind:
+    """What kinds of leaves and kinds of springs have in common."""
+
+    name: str  # in `structure` of its block
+    description: str  # as the documentation of that key lists it
+    law: Callable[..., Any]
+    needs: Mapping[str, str] = field(default_factory=dict)  # keys that must be given -> what they are of
+    truss: Callable[..., Any] | None = None  # law of the fidelity `truss`; None if it has none
+    is_inclined: bool = True  # whether its leaves have an angle
+    lengths: tuple[str, ...] = ()  # keys of its own that grow with its leaves
+    can_be_designed: bool = False  # whether `cfmkit design` has sizing rules for it
+    proposal: ProposedStructure | None = None  # None: not proposed
+
+
+@dataclass(frozen=True)
+class SlendernessLimits:
+    """Rise over thickness from which on leaves of a kind have a negative stiffness, and a constant one."""
+
+    negative: float
+    constant: float
+    constant_text: str  # as messages write it
+
+
+@dataclass(frozen=True)
+class LeafKind(StructureKind):
+    """A kind of snap-through leaf: everything that distinguishes it from the others."""
+
+    law: Callable[[LeafStrip, Any], LeafLaw]  # from dimensions and material, and the keys of `mechanism.bistable`
+    truss: Callable[[LeafStrip], LeafLaw] | None = None
+    fidelity: str | None = None  # default of `analysis.fidelity`; None: that of the family
+    buckles: bool = True  # whether a constant negative stiffness means that it is buckled, and carries nothing if flat
+    limits: SlendernessLimits | None = None  # None: the curve shows whether its stiffness is negative, and constant
+    shortcoming: Callable[[Any], str] | None = None  # from its law: why that is rough for all sizes; None if it is not
+
+
+@dataclass(frozen=True)
+class SpringKind(StructureKind):
+    """A kind of spring of leaves: everything that distinguishes it from the others."""
+
+    law: Callable[[LeafStrip, Any, float], LeafSpring]  # from a leaf, keys of `mechanism.positive`, the loaded share
+    truss: Callable[[LeafStrip, float], LeafSpring] | None = None
+    is_linear: bool = True  # whether its stiffness is constant
+    stands_on_ends: bool = False  # whether its two ends stand, and its middle is driven
+    drawing_note: str = ""  # on the drawing of the whole spring
