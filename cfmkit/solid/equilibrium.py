@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.numerics.continuation.problem import Border
     from cfmkit.solid.elements import Elements
     from cfmkit.solid.rigid_groups import Supports
 
@@ -127,8 +128,9 @@ class LinearisedPart:
     residual: FloatArray
     forces: FloatArray
 
-    def factored(self) -> Factors:
-        """Return the tangent's factors; RuntimeError where it is singular."""
+    @cached_property
+    def factors(self) -> Factors:
+        """The tangent's factors; RuntimeError where it is singular."""
         found = splu(
             self.matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, panel_size=PANEL, options={"SymmetricMode": True}
         )
@@ -187,10 +189,19 @@ class SolidProblem:
     obstacles: tuple[FloatArray, ...] = ()
 
     @cached_property
-    def _scale(self) -> float:
+    def size(self) -> float:
+        """Larger side of the box around the part [m]."""
         return float(np.ptp(self.elements.mesh.nodes, axis=0).max())
 
-    def linearised(self, unknowns: FloatArray, travel: float) -> LinearisedPart:
+    def under(self, share: float) -> SolidProblem:
+        """Return the part under a share of its constant loads."""
+        part = replace(self, supports=self.supports.under(share))
+        part.__dict__.update(
+            {name: self.__dict__[name] for name in ("size", "_found_selection") if name in self.__dict__}
+        )
+        return part
+
+    def linearise(self, unknowns: FloatArray, travel: float) -> LinearisedPart:
         """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
         moved = self.supports.displaced(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
@@ -211,54 +222,54 @@ class SolidProblem:
             self.__dict__["_found_selection"] = found
         return found
 
-    def solve(self, guess: FloatArray, travel: float) -> Balance | None:
-        """Return the equilibrium near a guess; None where Newton's method finds none.
+    def solve(self, guess: FloatArray, travel: float, border: Border | None = None) -> Balance | None:
+        """Return the equilibrium near a guess, at its travel or where a border's condition holds; None if none is near.
 
         Factors of a tangent serve as long as each correction is much smaller than the last.
         """
-        unknowns, least = guess.copy(), np.inf
+        place, least, on_border = np.append(guess, travel), np.inf, border is None
         with np.errstate(all="ignore"):
             for _ in range(ROUNDS):
                 try:
-                    here = self.linearised(unknowns, travel)
-                    factors = here.factored()
+                    here = self.linearise(place[:-1], place[-1])
+                    correct = _Correction.of(here, border)
                 except RuntimeError:  # exactly singular
                     return None
-                step = factors.solve(here.residual)
+                step = correct(here.residual, place)
                 if not self._believed(here.forces, step):
                     return None
-                if self._balanced(here.residual, here.forces) or self._still(step):
-                    return self._balance(unknowns, travel, factors)
                 left = float(np.abs(here.residual).max(initial=0.0) / np.abs(here.forces).max())
-                if 0.5 * least < left <= ROUGH and self._still(step, ROUNDED):
-                    return self._balance(unknowns, travel, factors)
-                unknowns, least = unknowns - step, min(least, left)
+                rounded = 0.5 * least < left <= ROUGH and self._still(step, ROUNDED)
+                if on_border and (self._balanced(here.residual, here.forces) or self._still(step) or rounded):
+                    return self._balance(place, here.factors)
+                place, least, on_border = place - step, min(least, left), True
                 for _ in range(CORRECTIONS):
-                    forces = self.elements.forces(self.supports.displaced(unknowns, travel))
-                    residual = self.supports.residual(unknowns, travel, forces)
+                    forces = self.elements.forces(self.supports.displaced(place[:-1], place[-1]))
+                    residual = self.supports.residual(place[:-1], place[-1], forces)
                     if self._balanced(residual, forces):
-                        return self._balance(unknowns, travel, factors)
-                    more = factors.solve(residual)
+                        return self._balance(place, here.factors)
+                    more = correct(residual, place)
                     if self._still(more):
-                        return self._balance(unknowns, travel, factors)
-                    if not np.abs(more).max() <= SHRINK * np.abs(step).max():
+                        return self._balance(place, here.factors)
+                    if not np.abs(more[:-1]).max() <= SHRINK * np.abs(step[:-1]).max():
                         break
-                    unknowns, step = unknowns - more, more
+                    place, step = place - more, more
         return None
 
     def _balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
         return bool(np.abs(residual).max(initial=0.0) <= CLOSE * np.abs(forces).max())
 
     def _still(self, step: FloatArray, part: float = STILL) -> bool:
-        return bool(np.abs(step).max(initial=0.0) <= part * self._scale)
+        return bool(np.abs(step[:-1]).max(initial=0.0) <= part * self.size)
 
     def _believed(self, forces: FloatArray, step: FloatArray) -> bool:
         """Tell whether a correction is small enough to be believed."""
         finite = np.isfinite(np.abs(forces).max())
-        return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self._scale)
+        return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self.size)
 
-    def _balance(self, unknowns: FloatArray, travel: float, factors: Factors) -> Balance:
+    def _balance(self, place: FloatArray, factors: Factors) -> Balance:
         """Return the equilibrium, with factors of a tangent close to its own; with its own if they are not close."""
+        unknowns, travel = place[:-1], float(place[-1])
         forces, pull = self.elements.along(self.supports.displaced(unknowns, travel))
         carried = self.supports.carried(unknowns, travel, forces)
         path = np.append(np.zeros(self.supports.size), 1.0)
@@ -273,9 +284,42 @@ class SolidProblem:
             if np.abs(more).max(initial=0.0) <= FINE * np.abs(path[:-1]).max(initial=0.0):
                 break
         else:
-            factors = self.linearised(unknowns, travel).factored()
+            factors = self.linearise(unknowns, travel).factors
             path[:-1] = -factors.solve(beside[:-1])
             stiffness = float(path @ beside)
-        reactions = self.supports.reactions(unknowns, travel, forces)
-        effort = float(sum(group.driven @ one for group, one in zip(self.supports.groups, reactions, strict=True)))
+        effort = self._effort(unknowns, travel, forces)
         return Balance(travel, unknowns, effort, stiffness, factors.negative, path[:-1], factors)
+
+    def measure(self, unknowns: FloatArray, travel: float, slope: FloatArray, unstable: int) -> Balance:
+        """Return the equilibrium at unknowns that are solved for already, with the effort and the stiffness there."""
+        forces, pull = self.elements.along(self.supports.displaced(unknowns, travel))
+        path = np.append(slope, 1.0)
+        stiffness = float(path @ self.supports.carried(unknowns, travel, forces).times(pull, path))
+        return Balance(travel, unknowns, self._effort(unknowns, travel, forces), stiffness, unstable, slope, None)
+
+    def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:
+        reactions = self.supports.reactions(unknowns, travel, forces)
+        return float(sum(group.driven @ one for group, one in zip(self.supports.groups, reactions, strict=True)))
+
+
+@dataclass(frozen=True)
+class _Correction:
+    """Newton's correction with the factors of one tangent, of unknowns and travel (q + 1,)."""
+
+    factors: Factors
+    border: Border | None
+    rate: FloatArray  # of the unknowns by the travel, (q,); empty without a border
+
+    @classmethod
+    def of(cls, here: LinearisedPart, border: Border | None) -> _Correction:
+        rate = np.empty(0) if border is None else -here.factors.solve(here.slope)
+        return cls(here.factors, border, rate)
+
+    def __call__(self, residual: FloatArray, place: FloatArray) -> FloatArray:
+        """Return what is to be subtracted from a place where a residual is left."""
+        step = np.append(self.factors.solve(residual), 0.0)
+        if self.border is not None:
+            row, level = self.border
+            step[-1] = (row @ (place - step) - level) / (row[-1] + row[:-1] @ self.rate)
+            step[:-1] += step[-1] * self.rate
+        return step

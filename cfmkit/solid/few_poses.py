@@ -70,6 +70,14 @@ class PoseGuide:
     def _interpolated(self) -> dict[float, Balance]:
         return {}
 
+    @cached_property
+    def branch_steps(self) -> tuple[FloatArray, ...]:
+        """Changes of the unknowns across the bifurcations on the coarser mesh, from and to poses apart from them."""
+        places, travels = self.coarse.course.bifurcations, self.travels
+        behind = [sum(abs(travel) < abs(place) for travel in travels) for place in places]
+        pairs = [travels[k - 1 : k + 1] for k in behind if 0 < k < len(travels)]
+        return tuple(np.subtract(*(self.interpolate(travel).unknowns for travel in pair[::-1])) for pair in pairs)
+
     def _interpolate(self, field: FloatArray, unknowns: FloatArray) -> FloatArray:
         """Return a field of the coarse nodes (n, 2) as unknowns, with the free motions of rigid pieces."""
         for refinement in self.refinements:

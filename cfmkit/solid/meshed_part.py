@@ -26,7 +26,7 @@ from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.mesh_refinement import refine
-from cfmkit.solid.path_following import PathEnd, PosePath, advanced, follow
+from cfmkit.solid.path_following import PathEnd, PosePath, follow, pose_between
 from cfmkit.solid.rigid_groups import Group, Supports, within
 from cfmkit.solid.sections_of_mesh import check_mesh
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
+    from cfmkit.solid.followed_part import Guide
     from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.mesh_refinement import RefinedMesh
     from cfmkit.solid.plane_stress_law import Law
@@ -291,7 +292,7 @@ class Meshed:
         self,
         stops: Sequence[float],
         report: Callable[[float], None] = lambda _share: None,
-        guide: Callable[[float], FloatArray | None] = lambda _travel: None,
+        guide: Guide | None = None,
     ) -> MeshSolution:
         """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
         return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)
@@ -449,13 +450,12 @@ def _checked(problem: SolidProblem, course: PosePath, skipped: set[float]) -> tu
         cornered = any(low <= place <= high for place in corners)
         if cornered or high - low < SHORTEST * span or low in skipped:
             continue
-        first = course.poses[k]
-        pose = advanced(problem, first, 0.5 * (low + high), course.poses[k - 1] if k else None)
-        if pose is None or pose.unstable > first.unstable:
+        pose = pose_between(problem, course.poses[k], course.poses[k + 1], 0.5 * (low + high))
+        if pose is None:
             skipped.add(low)
             continue
         difference = abs(float(course.effort(np.array([pose.travel]))[0]) - pose.effort)
-        return replace(course, poses=(*course.poses[: k + 1], pose.kept(), *course.poses[k + 1 :])), difference
+        return replace(course, poses=(*course.poses[: k + 1], pose, *course.poses[k + 1 :])), difference
     return None
 
 

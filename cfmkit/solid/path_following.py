@@ -1,19 +1,25 @@
-"""Following a part's equilibria over its travel: step control, loss of stability, branch switching.
+"""Poses of a part along its path, as `cfmkit.numerics.continuation` follows it.
 
-Each pose is predicted along the tangent of the path and corrected by Newton's method. A step is halved where Newton
-fails, where the correction is not small beside the step (it has come to another branch), and where a direction has
-become unstable. When the step is at its smallest and the next pose is still unstable, the path has passed a
-bifurcation: from a little beyond it the part is pushed along its softest mode until a stable pose is found.
+Where stability is lost the path goes on along another branch, and the curve of effort over travel has a corner: two
+poses, one with the stiffness before it and one with that behind it. A mesh is an imperfection: where the path goes
+round a corner within a small part of the travel, that is a bifurcation, too (`Options.corner`); its poses are kept.
 """
 
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
+
+from cfmkit.numerics.continuation.branches import find_beside
+from cfmkit.numerics.continuation.follow import follow as follow_path
+from cfmkit.numerics.continuation.path import Options, PathEvent, PathStop, Point, WhyStopped
+from cfmkit.numerics.continuation.steps import hermite
+from cfmkit.solid.equilibrium import Balance
+from cfmkit.solid.followed_part import FollowedPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,41 +27,20 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.equilibrium import Balance, SolidProblem
+    from cfmkit.numerics.continuation.problem import PathEquilibrium
+    from cfmkit.solid.equilibrium import SolidProblem
+    from cfmkit.solid.followed_part import Guide
 
-SMALLEST = 2.0**-12
-"""Smallest step, in parts of the whole travel: a bifurcation's place is then known to 2.5e-4 of the travel."""
-STRAY = 0.5
-"""Largest correction, in parts of the step: on one branch it shrinks with the step's square."""
-SOFTLY = 1e-3
-"""Corrections below this part of the part's size count as small: next to a bifurcation rounding is amplified along the
-soft mode beyond any short step."""
-FARTHEST = 2.5
-"""Step, in those of the last one, up to which a cubic is a better prediction than a tangent."""
-GROWTH = 2.0
-"""Of the step after one that was easy."""
-CORNER, SEEN = 0.3, 0.05
-"""Change of the stiffness, in parts of the larger one and of the largest so far, for which steps are cut: that of a
-smooth curve gets smaller and smaller, one that does not has a corner, as at a bifurcation."""
-ROUNDED = 8.0
-"""Smallest steps over which a corner may be rounded: where a branch ends, a mesh is an imperfection."""
-CORNERS_APART = 2.0**-6
-"""Distance between corners, in parts of the whole travel: a corner is seen by its neighbours, too."""
-CORNER_WIDTH = 1e-9
-"""Distance between the two poses at a corner, one with the stiffness before it and one with that behind it, in parts of
-the whole travel."""
-PUSHES = np.geomspace(1e-4, 0.1, 13)
-"""Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
-NEAR = 1e-3
-"""How closely the travel is found at which a part touches itself, in parts of the whole travel."""
-BEYOND = (2.0, 8.0, 32.0)
-"""How far beyond a bifurcation its branch is looked for, in smallest steps."""
-MODE_ROUNDS = 30
-"""Of inverse iteration: next to a bifurcation the lowest eigenvalue is hundreds of times smaller than the second."""
-LOAD_STEP, SMALLEST_LOAD_STEP = 0.25, 2.0**-6
-"""First and smallest step in which constant loads are put on, in parts of them."""
-SOFT = 30.0
-"""The path has a limit point where it ends while its tangent has grown by so much against the travel's first pose."""
+FINEST_STEP = 2.0**-16  # share of the travel below which no step is tried
+GROWTH = 2.0  # of a step after one that was easy
+CORNER = 2.0**-9  # share of the travel over which a mesh may round a bifurcation
+CORNER_WIDTH = 1e-9  # share of the travel between the two poses at a corner
+BESIDE_CORNER = 1.0 / 16.0
+"""Share of the way from a bifurcation to the next pose of its branch at which the branch's stiffness is taken."""
+CONTACT_WIDTH = 1e-3  # share of the travel within which it is found where a part touches itself
+LARGEST_MISS, SMALL_MISS = 0.5, 1e-3
+"""Correction of a pose between two others, in parts of the way between these and of the part's size: at most both."""
+LOAD_STEP, FINEST_LOAD_STEP = 0.25, 2.0**-6  # first and smallest share by which constant loads grow
 
 
 class PathEnd(enum.Enum):
@@ -68,6 +53,13 @@ class PathEnd(enum.Enum):
     NO_START = "the part has no equilibrium at rest"
     OVERLOADED = "the part has no stable equilibrium under its constant loads"
     CONTACT = "the part touches itself"
+
+
+PATH_ENDS = {
+    WhyStopped.COMPLETE: PathEnd.COMPLETE,
+    WhyStopped.LIMIT_POINT: PathEnd.LIMIT_POINT,
+    WhyStopped.JUMPS: PathEnd.UNSTABLE,
+}
 
 
 @dataclass(frozen=True)
@@ -132,7 +124,7 @@ def follow(
     stops: Sequence[float],
     report: Callable[[float], None] = lambda _share: None,
     enough: Callable[[float], bool] = lambda _effort: False,
-    guide: Callable[[float], FloatArray | None] = lambda _travel: None,
+    guide: Guide | None = None,
 ) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch.
 
@@ -146,83 +138,165 @@ def follow(
         Is given the share of the travel that is done.
     enough : callable
         Is given the effort of a pose [N or N m], and tells whether it is the last.
-    guide : callable
-        Predicts the unknowns (q,) at a travel; None if it cannot.
+    guide : Guide, optional
+        Predicts the unknowns.
     """
-    start = _start(problem, stops[0])
+    part = FollowedPart(problem, guide=guide)
+    start = _start(part, stops[0])
     if start is None:
         return PosePath((), PathEnd.OVERLOADED if problem.supports.loaded else PathEnd.NO_START)
-    span = stops[-1] - stops[0]
-    course, state, step = PosePath((start.kept(),), PathEnd.COMPLETE), start, stops[1] - stops[0]
-    smooth: list[Balance] = []  # earlier poses from the last corner on
-    for stop in stops[1:]:
-        while state.travel != stop:
-            ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
-            guided = _guided(problem, state, ahead, guide)
-            found = advanced(problem, state, ahead, _base(smooth, state, ahead)) if guided is None else guided
-            steepest = max(abs(pose.stiffness) for pose in course.poses)
-            spot = None if found is None else touching(problem, found)
-            if spot is not None:
-                if abs(ahead - state.travel) <= NEAR * abs(span):
-                    return replace(course, ending=PathEnd.CONTACT, touching=spot)
-                step = 0.5 * (ahead - state.travel)
-                continue
-            if found is not None and found.unstable <= state.unstable:
-                if bends(state, found, steepest) and abs(ahead - state.travel) > SMALLEST * abs(span):
-                    step = 0.5 * (ahead - state.travel)  # between poses the curve is a cubic: none has a corner
-                    continue
-                step = max(step, GROWTH * (ahead - state.travel), key=abs)  # a stop close by makes no step shorter
-            elif abs(ahead - state.travel) > SMALLEST * abs(span):
-                step = 0.5 * (ahead - state.travel)
-                continue
+    span = abs(stops[-1] - stops[0])
+    first_step = 1.0 if guide else float(np.abs(np.diff(stops)).max()) / span
+    options = Options(span, first_step=first_step, growth=GROWTH, corner=CORNER, finest_step=FINEST_STEP)
+    path = PosePath((), PathEnd.COMPLETE)
+    event: PathEvent | None = None  # a bifurcation behind the last pose
+    for item in follow_path(part, start, np.array(stops[1:]), options):
+        if isinstance(item, PathEvent):
+            if item.before == item.after:
+                path = replace(path, bifurcations=(*path.bifurcations, _meet(part, path, item, path.poses[-1])[0]))
             else:
-                beyond = found
-                found = None if beyond is None else switched(problem, state, SMALLEST * span, stop)
-                step = SMALLEST * span
-                if found is None:
-                    return replace(course, ending=_ending(start, state, beyond))
-            smooth.append(state.kept())
-            if found is guided and float((found.unknowns - state.unknowns) @ state.slope) * (ahead - state.travel) < 0:
-                smooth = []  # a guide on the other side of a branch: no cubic leads there
-            before, upto = state, len(course.poses)
-            if not bends(state, found, steepest):
-                upto = _rounded_from(course, found, ROUNDED * SMALLEST * abs(span))
-                before = course.poses[upto - 1]
-            if bends(before, found, steepest):
-                smooth = []  # no cubic leads round a corner
-                last = course.bifurcations[-1] if course.bifurcations else math.inf
-                if abs(before.travel - last) > CORNERS_APART * abs(span):
-                    corner = _corner(problem, before, found, CORNER_WIDTH * span)
-                    place = corner[0].travel if corner else state.travel
-                    poses = (*course.poses[: upto if corner else None], *(pose.kept() for pose in corner))
-                    course = replace(course, poses=poses, bifurcations=(*course.bifurcations, place))
-            course, state = replace(course, poses=(*course.poses, found.kept())), found
-            report((state.travel - stops[0]) / span)
-            if enough(state.effort):
-                return course
-    return course
+                event = item
+            continue
+        if isinstance(item, PathStop):
+            return _end(part, path, item, event)
+        passed = abs(path.poses[-1].travel - stops[0]) if path.poses else -1.0
+        if not passed < abs(item.at.drive - stops[0]) <= span * (1.0 + 1e-12):  # behind the last stop a branch begins
+            continue
+        pose = part.pose(item.at)
+        if event is not None and abs(pose.travel - stops[0]) > abs(event.drive - stops[0]):
+            path, event = _add_corner(part, path, event, pose), None
+        spot = touching(problem, pose)
+        if spot is not None and path.poses:
+            return _end_at_contact(problem, path, pose, spot, CONTACT_WIDTH * span)
+        path = replace(path, poses=(*path.poses, pose))
+        report(abs(pose.travel - stops[0]) / span)
+        if enough(pose.effort):
+            break
+    return path
 
 
-def _start(problem: SolidProblem, travel: float) -> Balance | None:
-    """Return the first pose, under the constant loads, which grow from nothing; None where they grow too large.
+def _start(part: FollowedPart, travel: float) -> PathEquilibrium | None:
+    """Return the first equilibrium, under the constant loads; None if they are too large.
 
-    They are put on by steps: from afar Newton's method may come to a form that the part snaps into later, if at all.
+    They grow from nothing: from afar Newton's method may come to a form that the part snaps into later, if at all.
     """
-    unknowns = np.zeros(problem.supports.size)
-    if not problem.supports.loaded:
-        return problem.solve(unknowns, travel)
-    found, share, step = None, 0.0, LOAD_STEP
-    while share < 1.0:
-        ahead = min(1.0, share + step)
-        part = problem if ahead == 1.0 else replace(problem, supports=problem.supports.under(ahead))
-        found = part.solve(unknowns, travel)
-        if found is not None and found.unstable == 0:
-            share, unknowns = ahead, found.unknowns
-        elif step > SMALLEST_LOAD_STEP:
-            step *= 0.5
+    rest, loaded = np.zeros(part.problem.supports.size), part.problem.supports.loaded
+    ramp = FollowedPart(part.problem, held_at=travel) if loaded else part
+    start = ramp.solve(rest, 0.0 if loaded else travel)
+    if start is None:
+        return None
+    part.rest_stiffness = ramp.rest_stiffness = ramp.softest(start)[0]
+    if not loaded:
+        return start
+    options = Options(1.0, branch="stop", first_step=LOAD_STEP, finest_step=FINEST_LOAD_STEP)
+    for item in follow_path(ramp, start, np.ones(1), options):
+        if isinstance(item, Point) and item.at.drive == 1.0 and not item.at.unstable:
+            return part.solve(item.at.x, travel)
+    return None
+
+
+def _end(part: FollowedPart, path: PosePath, stop: PathStop, event: PathEvent | None) -> PosePath:
+    """Return a path with its ending, up to where stability is lost if it is."""
+    ending = PATH_ENDS.get(stop.end, PathEnd.LOST)
+    if ending is PathEnd.UNSTABLE and event is not None and event.within is not None and len(path.poses) > 1:
+        first, beyond = path.poses[-1], part.pose(event.within[1])
+        back = FINEST_STEP * (stop.drive - path.poses[0].travel)
+        last = pose_between(part.problem, first, beyond, stop.drive - back)
+        if last is not None and abs(last.travel - path.poses[0].travel) > abs(first.travel - path.poses[0].travel):
+            path = replace(path, poses=(*path.poses, last))
+    if ending is PathEnd.LIMIT_POINT and len(path.poses) > 2 and _is_steep(*path.poses[-2:]):
+        path = replace(path, poses=path.poses[:-1])
+    return replace(path, ending=ending)
+
+
+def _is_steep(first: Balance, last: Balance) -> bool:
+    """Return True if the cubic between two poses may overshoot, as before a limit point [Fritsch, Carlson, 1980]."""
+    chord = (last.effort - first.effort) / (last.travel - first.travel)
+    return abs(last.stiffness) > 3.0 * abs(chord)
+
+
+def _end_at_contact(problem: SolidProblem, path: PosePath, pose: Balance, spot: FloatArray, width: float) -> PosePath:
+    """Return a path up to just before a part touches itself, as it does at a pose."""
+    poses = list(path.poses)
+    while abs(pose.travel - poses[-1].travel) > width:
+        middle = pose_between(problem, poses[-1], pose, 0.5 * (poses[-1].travel + pose.travel))
+        if middle is None:
+            break
+        if (found := touching(problem, middle)) is None:
+            poses.append(middle)
         else:
-            return None
-    return found
+            pose, spot = middle, found
+    return replace(path, poses=tuple(poses), ending=PathEnd.CONTACT, touching=spot)
+
+
+def pose_between(problem: SolidProblem, first: Balance, last: Balance, travel: float) -> Balance | None:
+    """Return the pose at a travel between two of one branch; None if none is as stable near their cubic."""
+    part = FollowedPart(problem)
+    ends = part.equilibrium(first), part.equilibrium(last)
+    guess = hermite(*ends, travel)
+    at = part.solve(guess, travel)
+    if at is None or at.unstable > first.unstable:
+        return None
+    moves = slice(len(problem.supports.loose))  # behind them are turns
+    allowed = LARGEST_MISS * np.abs((ends[1].x - ends[0].x)[moves]).max() + SMALL_MISS
+    return part.pose(at) if np.abs((at.x - guess)[moves]).max() <= allowed else None
+
+
+def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Balance) -> PosePath:
+    """Return a path with the corner of a bifurcation that lies between its last pose and another.
+
+    Beside the corner stand a pose before it and one behind it: at one of them, or both, its stiffness is known.
+    """
+    assert event.within is not None
+    place, width = event.drive, CORNER_WIDTH * (pose.travel - path.poses[0].travel)
+    first, last = (part.pose(at) for at in event.within)
+    if event.near is None:  # the mesh rounds it
+        place, effort, before, behind = _meet(part, path, event, pose)
+        unknowns = first.unknowns + (place - first.travel) * first.slope
+    else:
+        corner, onto = part.pose(event.near), event.before < event.after
+        near, far = (first, pose) if onto else (last, path.poses[-1])  # on the path that crosses, and on the branch
+        goal = place + BESIDE_CORNER * (far.travel - place)
+        far = part.pose(find_beside(part, event.near.x, place, part.equilibrium(far), goal, far.unstable))
+        effort, unknowns = corner.effort + (place - corner.travel) * near.stiffness, corner.unknowns
+        opening = 2 * (effort - far.effort) / (place - far.travel) - far.stiffness  # of a parabola
+        before, behind = (near.stiffness, opening) if onto else (opening, near.stiffness)
+        first, last = (near, far) if onto else (far, near)
+    path = replace(path, bifurcations=(*path.bifurcations, place))
+    if min(abs(place - first.travel), abs(place - last.travel)) < 2.0 * abs(width):
+        return path
+    poses = [one for one in path.poses if (one.travel - first.travel) * width < 0.0]
+    for end, travel, stiffness in ((first, place, before), (last, place + width, behind)):
+        slope = (end.unknowns - unknowns) / (end.travel - place)
+        poses.append(Balance(travel, unknowns, effort, stiffness, pose.unstable, slope, None))
+    poses.insert(-2, first)
+    if (pose.travel - last.travel) * width > 0.0:
+        poses.append(last)
+    return replace(path, poses=tuple(poses))
+
+
+def _meet(part: FollowedPart, path: PosePath, event: PathEvent, later: Balance) -> tuple[float, float, float, float]:
+    """Return travel and effort where the curves before and behind a rounded corner meet, and their stiffnesses."""
+    assert event.within is not None
+    first, last = (part.pose(at) for at in event.within)
+    place, sense = event.drive, np.sign(last.travel - first.travel)
+    earlier = next((one for one in path.poses[::-1] if (one.travel - first.travel) * sense < 0.0), first)
+    curves = _curve_beside(first, earlier, place), _curve_beside(last, later, place)
+    roots = np.asarray((curves[0] - curves[1]).roots(), complex)
+    inside = (roots.imag == 0.0) & ((roots.real > first.travel - place) != (roots.real > last.travel - place))
+    way = min(roots.real[inside].tolist(), key=abs, default=0.0)
+    before, behind = (float(curve.deriv()(way)) for curve in curves)
+    return place + way, float(curves[0](way)), before, behind
+
+
+def _curve_beside(pose: Balance, other: Balance, place: float) -> Polynomial:
+    """Return the effort near a pose and another by a cubic, over the travel behind a place."""
+    way = other.travel - pose.travel
+    cubic = Polynomial([pose.effort, pose.stiffness])
+    if way:
+        gap, change = other.effort - float(cubic(way)), other.stiffness - pose.stiffness
+        cubic += Polynomial([0.0, 0.0, (3 * gap - way * change) / way**2, (way * change - 2 * gap) / way**3])
+    return cubic(Polynomial([place - pose.travel, 1.0]))
 
 
 def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
@@ -268,147 +342,3 @@ def _at_obstacle(problem: SolidProblem, pieces: Any, lines: Any) -> FloatArray |
         return None
     common = lines[np.flatnonzero(entered)[0]].intersection(stands)
     return np.asarray(common.representative_point().coords[0])
-
-
-def bends(state: Balance, found: Balance, steepest: float) -> bool:
-    """Tell whether the curve may have a corner between two poses: another stiffness, seen against the steepest, too."""
-    change = abs(found.stiffness - state.stiffness)
-    return change > CORNER * max(abs(state.stiffness), abs(found.stiffness)) and change > SEEN * steepest
-
-
-def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balance | None = None) -> Balance | None:
-    """Return the pose at a travel that continues the path from a pose; None where there is none in reach.
-
-    With a pose before it, on the same branch, the prediction is the cubic through both with their slopes.
-    """
-    predicted = state.slope * (travel - state.travel)
-    if before is not None and abs(travel - state.travel) <= FARTHEST * abs(state.travel - before.travel):
-        predicted = predicted + _bending(before, state, travel)
-    found = problem.solve(state.unknowns + predicted, travel)
-    if found is None:
-        return None
-    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
-    moves = len(problem.supports.loose)  # behind them are turns, whose radians are no metres
-    correction = float(np.abs((found.unknowns - state.unknowns - predicted)[:moves]).max())
-    return found if correction <= STRAY * float(np.abs(predicted[:moves]).max()) + SOFTLY * size else None
-
-
-def _rounded_from(course: PosePath, found: Balance, width: float) -> int:
-    """Return how many poses of a course lead to where a corner before a new pose begins, of a width at most."""
-    last = course.bifurcations[-1] if course.bifurcations else math.inf
-    near = [abs(found.travel - pose.travel) <= width and abs(pose.travel - last) > width for pose in course.poses[:-1]]
-    return near.index(True) + 1 if True in near else len(course.poses)
-
-
-def _corner(problem: SolidProblem, state: Balance, found: Balance, width: float) -> tuple[Balance, ...]:
-    """Return the poses just before and behind a corner between two poses, where their tangents meet; none if elsewhere.
-
-    The branch beyond is looked for some steps behind its bifurcation, so that its tangent is taken closer to it.
-    """
-    place = _where_tangents_meet(state, found)
-    if place is not None and abs(found.travel - place) > 2.0 * abs(place - state.travel):
-        closer = advanced(problem, found, place + 0.25 * (found.travel - place))
-        if closer is not None and closer.unstable <= found.unstable and _where_tangents_meet(state, closer) is not None:
-            place, found = _where_tangents_meet(state, closer), closer
-    if place is None or min(abs(place - state.travel), abs(found.travel - place)) < 2.0 * abs(width):
-        return ()
-    way = place - state.travel
-    effort = state.effort + way * state.stiffness
-    unknowns = state.unknowns + way * state.slope
-    before = replace(state, travel=place, effort=effort, unknowns=unknowns)
-    ahead = found.travel - place
-    behind = replace(
-        before,
-        travel=place + width,
-        effort=effort + width * found.stiffness,
-        stiffness=found.stiffness,
-        slope=(found.unknowns - unknowns) / ahead,
-    )
-    return before, behind
-
-
-def _where_tangents_meet(state: Balance, found: Balance) -> float | None:
-    """Return the travel between two poses at which the tangents of the curve meet; None if they do not."""
-    way = found.travel - state.travel
-    if state.stiffness == found.stiffness:
-        return None
-    share = (found.effort - state.effort - found.stiffness * way) / (way * (state.stiffness - found.stiffness))
-    return state.travel + share * way if 0.0 < share < 1.0 else None
-
-
-def _guided(
-    problem: SolidProblem, state: Balance, travel: float, guide: Callable[[float], FloatArray | None]
-) -> Balance | None:
-    """Return the stable pose near that of a guide at a travel; None if there is none, or no such guide."""
-    here, there = guide(state.travel), guide(travel)
-    if there is None:
-        return None
-    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
-    moves = len(problem.supports.loose)
-    for guess in (there,) if here is None else (state.unknowns + there - here, there):
-        found = problem.solve(guess, travel)
-        if found is not None and found.unstable <= state.unstable:
-            step = float(np.abs((guess - state.unknowns)[:moves]).max())
-            if float(np.abs((found.unknowns - guess)[:moves]).max()) <= STRAY * step + SOFTLY * size:
-                return found
-    return None
-
-
-def _base(smooth: Sequence[Balance], state: Balance, travel: float) -> Balance | None:
-    """Return the last of some poses before a pose from which a cubic reaches to a travel beyond it."""
-    reach = abs(travel - state.travel) / FARTHEST
-    return next((pose for pose in reversed(smooth) if abs(state.travel - pose.travel) >= reach), None)
-
-
-def _bending(before: Balance, state: Balance, travel: float) -> FloatArray:
-    """Return by how much the cubic through two poses departs from the tangent at the second, at a travel."""
-    way, ahead = state.travel - before.travel, (travel - state.travel) / (state.travel - before.travel)
-    # in s = (t - t2)/way: u = u2 + s way u2' + s^2 a + s^3 b, with u and u' of the first pose at s = -1
-    gap = before.unknowns - state.unknowns + way * state.slope
-    drop = way * (before.slope - state.slope)
-    return np.asarray(ahead**2 * (3 * gap + drop) + ahead**3 * (2 * gap + drop))
-
-
-def softest(problem: SolidProblem, state: Balance) -> FloatArray:
-    """Return the softest mode (q,), by inverse iteration; its largest displacement is 1 m."""
-    assert state.factors is not None  # poses on the way have theirs
-    mode = np.random.default_rng(0).standard_normal(problem.supports.size)
-    for _ in range(MODE_ROUNDS):
-        mode = state.factors.solve(mode / np.linalg.norm(mode))
-    loose = np.abs(mode[: len(problem.supports.loose)]).max()
-    return np.asarray(mode / loose)
-
-
-def switched(problem: SolidProblem, state: Balance, least: float, stop: float) -> Balance | None:
-    """Return the nearest stable pose beyond a bifurcation; None where pushing along the softest mode finds none.
-
-    Parameters
-    ----------
-    problem : SolidProblem
-    state : Balance
-        The last stable pose before it.
-    least : float
-        Smallest step, with the sign of the travel's direction [m or rad].
-    stop : float
-        Travel that must not be passed [m or rad].
-    """
-    mode = softest(problem, state)
-    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
-    for travel in (state.travel + times * least for times in BEYOND):
-        if abs(travel - state.travel) > abs(stop - state.travel):
-            travel = stop
-        base = state.unknowns + state.slope * (travel - state.travel)
-        for push in PUSHES * size:
-            for sign in (1.0, -1.0):
-                found = problem.solve(base + sign * push * mode, travel)
-                if found is not None and found.unstable <= state.unstable:
-                    return found
-    return None
-
-
-def _ending(start: Balance, state: Balance, beyond: Balance | None) -> PathEnd:
-    """Return why a path cannot go on from a pose."""
-    if beyond is not None:
-        return PathEnd.UNSTABLE
-    grown = float(np.linalg.norm(state.slope) / np.linalg.norm(start.slope))
-    return PathEnd.LIMIT_POINT if grown > SOFT else PathEnd.LOST

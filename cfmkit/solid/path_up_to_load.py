@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.solid.path_following import PathEnd, advanced, follow
+from cfmkit.solid.path_following import PathEnd, follow, pose_between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -123,16 +123,17 @@ def up_to_load(solved: MeshSolution, load: float, through_maxima: bool) -> tuple
     if found.how is LoadEnd.SHORT:
         return solved, found
     poses = [pose for pose in course.poses if abs(pose.travel) < abs(found.end) * (1 - 1e-12)]
+    beyond = course.poses[len(poses)]
     last, travel = None, found.end
     for _ in range(ROUNDS):
-        last = advanced(solved.problem, poses[-1], travel)
+        last = pose_between(solved.problem, poses[-1], beyond, travel)
         if last is None or found.how is LoadEnd.MAXIMUM or abs(last.effort - load) <= CLOSE * abs(load):
             break
         travel += (load - last.effort) / last.stiffness
     if last is None:
         ended = replace(course, poses=tuple(poses), ending=PathEnd.LOST)
         return replace(solved, course=ended), LoadPath(poses[-1].travel, poses[-1].effort, LoadEnd.SHORT)
-    ended = replace(course, poses=(*poses, last.kept()), ending=PathEnd.COMPLETE, touching=None)
+    ended = replace(course, poses=(*poses, last), ending=PathEnd.COMPLETE, touching=None)
     return replace(solved, course=ended), LoadPath(last.travel, last.effort, found.how)
 
 
@@ -143,8 +144,8 @@ def with_poses(solved: MeshSolution, travels: Iterable[float]) -> MeshSolution:
     for travel in travels:
         after = next((k for k, pose in enumerate(poses) if abs(pose.travel) > abs(travel) - slack), 0)
         if after and abs(poses[after].travel - travel) > slack:
-            found = advanced(solved.problem, poses[after - 1], travel)
-            poses[after:after] = [] if found is None else [found.kept()]
+            found = pose_between(solved.problem, poses[after - 1], poses[after], travel)
+            poses[after:after] = [] if found is None else [found]
     return replace(solved, course=replace(solved.course, poses=tuple(poses)))
 
 

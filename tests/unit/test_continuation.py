@@ -10,10 +10,11 @@ import pytest
 from scipy.optimize import brentq
 from small_structures import Structure, bulge, columns, truss
 
+from cfmkit.numerics.continuation.corners import mark_corners
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.follow import follow
 from cfmkit.numerics.continuation.path import Options, PathEvent, PathStop, Point, WhyStopped
-from cfmkit.numerics.continuation.problem import Border
+from cfmkit.numerics.continuation.problem import Border, PathEquilibrium
 
 
 def run(structure: Structure, targets: Any, **options: Any) -> tuple[list[Point], list[PathEvent], PathStop]:
@@ -145,3 +146,25 @@ def test_nothing_is_found_where_no_equilibrium_is_near() -> None:
     assert correct(truss(HEIGHT), np.array([0.05]), 3 * LIMIT) is None or LIMIT < 0
     stuck = replace(columns(1.0), hessian=lambda _x, _: np.zeros((1, 1)))
     assert correct(stuck, np.array([0.1]), 0.5) is None
+
+
+def bent(width: float) -> list[Point | PathStop]:
+    """Return points of a curve that rises by 1 up to a drive of 1 and falls by 0.5 from there on, over a width."""
+    drives = np.unique([0.0, *(1.0 + 0.7 * side * 0.5**k for k in range(16) for side in (-1, 1))])
+    root = np.hypot(drives - 1.0, width)
+    efforts, slopes = drives - 0.75 * (drives - 1.0 + root), 0.25 - 0.75 * (drives - 1.0) / root
+    none = np.zeros(1)
+    curve = zip(drives, efforts, slopes, strict=True)
+    states = [PathEquilibrium(none, drive, none, 0, effort, slope) for drive, effort, slope in curve]
+    return [*(Point(at) for at in states), PathStop(WhyStopped.COMPLETE, float(drives[-1]))]
+
+
+@pytest.mark.parametrize(("width", "corner", "count"), [(1e-3, 0.02, 1), (1e-3, 2e-5, 0), (2.0, 0.02, 0)])
+def test_a_curve_that_bends_within_the_corner_of_the_options_has_a_bifurcation_there(width, corner, count):
+    items = list(mark_corners(bent(width), Options(1.7, corner=corner)))
+    events = [item for item in items if isinstance(item, PathEvent)]
+    assert len(events) == count
+    assert [item for item in items if not isinstance(item, PathEvent)] == bent(width)
+    for event in events:
+        assert event.drive == pytest.approx(1.0, abs=0.1 * width)
+        assert event.within[0].drive < 1.0 < event.within[1].drive

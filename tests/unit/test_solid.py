@@ -15,6 +15,7 @@ from cfmkit.export import contours
 from cfmkit.solid.boundary_and_element_sizes import Ring
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import SolidProblem
+from cfmkit.solid.followed_part import FollowedPart
 from cfmkit.solid.mesh import TriangleMesh, mesh
 from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
@@ -156,7 +157,11 @@ def test_no_pose_is_kept_beyond_where_the_solver_stops(monkeypatch):
     """The path ends with the last equilibrium: nothing of the iterates that follow is reported."""
     held, _, shortening = strut()
     solve, end = held.solve, 0.55 * shortening
-    limited = lambda self, start, travel: solve(start, travel) if travel < end else None  # noqa: E731
+
+    def limited(self, start, travel, border=None):
+        found = solve(start, travel, border)
+        return found if found is not None and found.travel < end else None
+
     monkeypatch.setattr(type(held), "solve", limited)
     course = follow(held, np.linspace(0, shortening, 5).tolist())
     assert course.ending is PathEnd.LOST
@@ -333,6 +338,23 @@ def test_a_pressed_strip_leaves_for_its_buckled_branch():
     assert course.poses[-1].effort == pytest.approx(euler, rel=0.03)
     sideways = held.supports.displaced(course.poses[-1].unknowns, course.poses[-1].travel)[:, 1]
     assert np.abs(sideways).max() > 1e-3
+
+
+def test_a_part_is_a_problem_of_the_continuation_with_its_tangent_and_modes():
+    held, _, _ = strut(10.0)
+    part = FollowedPart(held)
+    at = part.solve(np.zeros(len(part.unit)), 2e-4)
+    step = 1e-6 * np.cos(np.arange(len(at.x)))
+    here, there = (part.linearise(x, at.drive) for x in (at.x, at.x + step))
+    assert here.solve((there.residual - here.residual)[:, None])[:, 0] == pytest.approx(step, abs=1e-8)
+    assert at.rate == pytest.approx(-here.solve(here.rate[:, None])[:, 0], rel=1e-5, abs=1e-5 * np.abs(at.rate).max())
+    flexibility = here.solve(np.diag(1.0 / part.scale))
+    values, modes = FollowedPart(held).modes(at, 3)  # with factors of its own: those of `part` are of its guess
+    dense = np.linalg.eigvalsh(flexibility)
+    assert 1.0 / values == pytest.approx(dense[np.argsort(-np.abs(dense))[:3]], rel=1e-6)
+    assert flexibility @ modes == pytest.approx(modes / values, abs=1e-6 / abs(values[0]))
+    assert here.unstable == (dense < 0.0).sum() == at.unstable
+    assert part.softest(at, modes[:, 0])[0] == pytest.approx(abs(values[0]), rel=0.01)
 
 
 def test_cubics_between_poses_have_their_stiffness():

@@ -61,7 +61,8 @@ def test_a_load_on_the_driven_node_is_carried_by_the_drive():
     bare, pulled = solved(), solved(SHUTTLE)
     np.testing.assert_allclose(pulled.curve.effort - bare.curve.effort, 0.3, atol=1e-9)
     np.testing.assert_allclose(read(pulled, "shuttle_fx") - read(bare, "shuttle_fx"), -0.2, atol=1e-9)
-    np.testing.assert_array_equal(read(pulled, "max_stress"), read(bare, "max_stress"))
+    # the corner at which it buckles is placed by the forces, which are rounded
+    np.testing.assert_allclose(read(pulled, "max_stress"), read(bare, "max_stress"), rtol=1e-11)
 
 
 def test_loads_on_mirrored_halves_are_mirrored(loaded):

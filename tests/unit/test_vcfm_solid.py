@@ -12,6 +12,7 @@ from cfmkit.families import family
 from cfmkit.families.findings import sharp_inside
 from cfmkit.families.vcfm.outline import sharp_corners, solved_leaf, solved_spring
 from cfmkit.results import Status
+from cfmkit.solid.equilibrium import SolidProblem
 
 QUICK = ("analysis.solid.poses=15", "analysis.solid.error=0.1", "analysis.points=121", "analysis.fidelity=solid")
 
@@ -162,7 +163,10 @@ def test_ends_of_windows_are_poses_of_leaf_and_spring():
 
 
 def test_a_leaf_whose_solver_stops_at_once_has_no_curve(monkeypatch):
-    monkeypatch.setattr("cfmkit.solid.path_following.advanced", lambda *_: None)
+    solve = SolidProblem.solve
+    monkeypatch.setattr(
+        SolidProblem, "solve", lambda self, start, travel, *_: None if travel else solve(self, start, travel)
+    )
     found = api.analyze(spec("straight", *QUICK))
     assert found.status is Status.NO_EQUILIBRIUM
     assert not found.curves

@@ -191,7 +191,7 @@ class NetworkProblem:
 
 
 def _state(at: PathEquilibrium) -> MarchState:
-    return MarchState(*at)
+    return MarchState(*at[:5])
 
 
 def _equilibrium(state: MarchState) -> PathEquilibrium:

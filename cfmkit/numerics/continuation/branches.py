@@ -21,6 +21,7 @@ FIRST_REACH, LONGEST_REACH = 1e-3, 0.05  # of steps down from a saddle
 MAX_STEPS_DOWN = 100
 STILL = 1e-6  # step from which Newton's method reaches an equilibrium
 NEARBY = 0.5  # motion behind which an equilibrium is no more near a saddle
+AMPLITUDE_SLACK = 0.3  # of the amplitude expected: how far an equilibrium on a branch may be off
 BESIDE_TOLERANCE = 1e-12  # of the drive, as a share of the way to where the branch was entered
 SMALLEST_AMPLITUDE = 1e-6  # as a share of that where the branch was entered: less is the singular point itself
 
@@ -94,16 +95,22 @@ def find_beside(
     drive fits.
     """
     part = (goal - drive) / (entered.drive - drive) if entered.drive != drive else 0.0
-    direction = keep_motions(problem, entered.x - x)
+    chord = entered.x - x
+    # where no forces are unknowns a straight guess would stretch the structure as it moves sideways
+    curved = 2 * (entered.drive - drive) * entered.rate - chord if problem.motions.all() else np.zeros_like(x)
+    direction, tolerance = keep_motions(problem, chord), getattr(problem, "drive_tolerance", BESIDE_TOLERANCE)
     row = direction / (np.linalg.norm(direction) or 1.0)
     share = float(np.sqrt(max(part, 0.0)))
-    at = correct(problem, x + share * (entered.x - x), goal)
-    if at is not None and at.unstable <= unstable and abs(row @ (at.x - x) / (row @ direction) - share) < 0.3 * share:
+    at = correct(problem, x + share * chord - share * (1 - share) * curved, goal)
+    slack = getattr(problem, "amplitude_slack", AMPLITUDE_SLACK) * share
+    if at is not None and at.unstable <= unstable and abs(row @ (at.x - x) / (row @ direction) - share) < slack:
         return at
     for _ in range(8 if share > SMALLEST_AMPLITUDE else 1):
         level = float(row @ (x + share * direction))
-        at = correct(problem, x + share * (entered.x - x), goal, Border(np.append(row, 0.0), level))
-        if at is None or abs(at.drive - goal) <= BESIDE_TOLERANCE * abs(entered.drive - drive):
+        at = correct(
+            problem, x + share * chord - share * (1 - share) * curved, goal, Border(np.append(row, 0.0), level)
+        )
+        if at is None or abs(at.drive - goal) <= tolerance * abs(entered.drive - drive):
             break
         reached = (at.drive - drive) / (entered.drive - drive)
         if share <= SMALLEST_AMPLITUDE or reached <= 0:

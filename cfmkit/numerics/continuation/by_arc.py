@@ -99,7 +99,9 @@ def _end_at_fold(
     walk: Walk, begin: PathEquilibrium, move: ArcMove, fold: Located, after: int, fineness: float
 ) -> Items:
     """Go on where the drive turns back: at a limit point, or behind the end of a branch."""
-    joined, loses_one = find_joined_path(walk, fold, begin.unstable), after == begin.unstable + 1
+    branch_ends = walk.branch is not None or not walk.options.corner
+    joined = find_joined_path(walk, fold, begin.unstable) if branch_ends else None
+    loses_one = after == begin.unstable + 1
     if joined is None and loses_one and walk.options.through_folds:
         return (yield from pass_fold(walk, move, fold, after))
     if joined is None and loses_one:

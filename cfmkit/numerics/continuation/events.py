@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.numerics.continuation.arc import step_along, unit_tangent
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.problem import Border, arc_weights, largest_motion
-from cfmkit.numerics.continuation.steps import hermite
+from cfmkit.numerics.continuation.steps import hermite, predict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,6 +40,7 @@ class Located(NamedTuple):
     behind: PathEquilibrium
     share: float  # of the way between the first two
     within: tuple[PathEquilibrium, PathEquilibrium]  # the first two
+    rounded: bool = False  # whether an imperfection rounds a bifurcation so that they lie on two paths
 
 
 class _Sample(NamedTuple):
@@ -55,12 +56,13 @@ def locate(
     solve: Callable[[float], PathEquilibrium | None],
     value: Callable[[PathEquilibrium], float],
     close: float,
+    patient: bool = True,
 ) -> Located | None:
     """Return where `value` vanishes between two equilibria, or None if they lie on two paths.
 
     `solve` returns an equilibrium at a share of the way. By the Illinois variant of false position, then interpolation
     through the three nearest samples. It is not one path if the value jumps, or if the sides of a narrow bracket stay
-    apart: imperfect corners beside an unstable branch look like a bifurcation else.
+    apart: imperfect corners beside an unstable branch look like a bifurcation else. Without patience that ends it.
     """
     low, high = _Sample(0.0, value(first), first), _Sample(1.0, value(last), last)
     if low.value * high.value > 0:
@@ -85,11 +87,20 @@ def locate(
             high, at_high, at_low, side = sample, sample.value, (0.5 * at_low if side == -1 else at_low), -1
         if abs(sample.value) < goal or high.share - low.share < 1e-12:
             break
-    width = high.share - low.share
-    apart = largest_motion(problem, high.at.x - low.at.x)
-    if width < 0.2 and apart > SAME_PATH_WIDTH * width * largest_motion(problem, last.x - first.x) + 1e-5:
+        if not patient and _lie_apart(problem, low, high, first, last):
+            break
+    if _lie_apart(problem, low, high, first, last):
         return None
     return _interpolate(samples, low, high, (first, last), SAME_PATH_VALUE * goal / close)
+
+
+def _lie_apart(
+    problem: ContinuationProblem, low: _Sample, high: _Sample, first: PathEquilibrium, last: PathEquilibrium
+) -> bool:
+    """Return True if the sides of a narrow bracket are on two paths."""
+    width = high.share - low.share
+    apart = largest_motion(problem, high.at.x - low.at.x)
+    return width < 0.2 and apart > SAME_PATH_WIDTH * width * largest_motion(problem, last.x - first.x) + 1e-5
 
 
 def _interpolate(
@@ -140,23 +151,33 @@ def stability_value(problem: ContinuationProblem, reference: PathEquilibrium) ->
 
 
 def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
-    """Return the first change of stability between here and a new equilibrium on the same path."""
-    problem, here = walk.problem, walk.here
+    """Return the first change of stability between here and a new equilibrium on the same path.
+
+    Where an imperfection may round a bifurcation it is looked for by as short a step; if the path with the unstable
+    directions is another there, the last equilibrium that is stable stands for it, where the path would be without it.
+    """
+    problem, here, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
     begin = walk.trail[0].drive
     narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(here.drive - begin) + 1e-12 * walk.options.span)
     for _ in range(HALVINGS):
-        if abs(new.unstable - here.unstable) <= 1 or abs(new.drive - here.drive) < narrowest:
+        width = abs(new.drive - here.drive)
+        if (abs(new.unstable - here.unstable) <= 1 and width <= widest) or width < narrowest:
             break
         drive = 0.5 * (here.drive + new.drive)
         middle = correct(problem, hermite(here, new, drive), drive)
         if middle is None:
             break
         here, new = (middle, new) if middle.unstable == walk.here.unstable else (here, middle)
-    return locate_stability_change(problem, here, new)
+    if not walk.options.corner:
+        return locate_stability_change(problem, here, new)
+    if abs(new.drive - here.drive) > widest:
+        return None
+    found = locate_stability_change(problem, here, new, patient=False)
+    return found or Located(predict(walk, here.drive), here.drive, here, here, new, 0.0, (here, new), rounded=True)
 
 
 def locate_stability_change(
-    problem: ContinuationProblem, first: PathEquilibrium, last: PathEquilibrium
+    problem: ContinuationProblem, first: PathEquilibrium, last: PathEquilibrium, patient: bool = True
 ) -> Located | None:
     """Return the change of stability between two equilibria at different drives."""
 
@@ -164,7 +185,7 @@ def locate_stability_change(
         drive = first.drive + share * (last.drive - first.drive)
         return correct(problem, hermite(first, last, drive), drive)
 
-    return locate(problem, first, last, solve, stability_value(problem, first), CLOSE_TO_BIFURCATION)
+    return locate(problem, first, last, solve, stability_value(problem, first), CLOSE_TO_BIFURCATION, patient)
 
 
 def relocate(

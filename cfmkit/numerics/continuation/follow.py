@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.numerics.continuation.branch_ends import find_passed_end, primary_slope
 from cfmkit.numerics.continuation.by_arc import follow_by_arc
+from cfmkit.numerics.continuation.corners import crosses_bend, mark_corners
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.losses import look_past, lose_stability, start_critical, start_unstable
 from cfmkit.numerics.continuation.path import AT_EVENT, PathEvent, PathStop, Point, Walk, WhyStopped
@@ -26,14 +27,13 @@ if TYPE_CHECKING:
 
 NEARLY_CRITICAL = 1e-5  # stiffness of a mode; one a hundred times as large says that no bifurcation is very near
 LANDING = 1.3  # steps by which a step may be stretched to land on a requested value
-GROWTH, GOOD_MISFIT = 1.6, 0.1  # of the step, after predictions that good
+GOOD_MISFIT = 0.1  # of predictions after which the step grows
 SHRINK, POOR_MISFIT = 0.8, 0.25
 FORCE_MARGIN = 0.7  # of the allowed change of forces that a shortened step aims at
 ARC_AFTER = 7  # rejections, two each less one for an accepted step, above which the arc length leads
 ARC_ANYWAY = 24  # rejections above which it leads even where the slope is not steep
 STEEP = 0.5  # motion over the drive's range, by the slope
 MAX_REJECTIONS = 90
-FINEST_STEP = 1e-13  # share of the range
 SHORT_STEP = 1e-9  # share of the range: shorter steps count as rejections
 LOCKED = "the drive cannot go on at {place}: the structure locks, a force grows beyond all bounds"
 LOCKED_FORCE, LOCKED_STEP = 1e5, 1e-6
@@ -69,7 +69,8 @@ def follow(
         Points at requested values and between them. A path that ends early ends with an `PathStop` that says why.
     """
     between = 0
-    for item in _items(problem, start, targets, options, branch):
+    items = _items(problem, start, targets, options, branch)
+    for item in mark_corners(items, options) if options.corner else items:
         yield item
         between += isinstance(item, Point) and item.target < 0
         if between > options.most_points:
@@ -85,9 +86,8 @@ def _items(
     branch: PathBranch | None,
 ) -> Iterator[Point | PathEvent | PathStop]:
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
-    walk = Walk(
-        problem, options, targets, start, options.first_step * options.span, at_first, trail=(start,), branch=branch
-    )
+    step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
+    walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
     if beyond is not None:  # how many directions are unstable there is rounding
         yield Point(start._replace(unstable=beyond.here.unstable), at_first - 1, branch)
@@ -167,6 +167,8 @@ def _step(walk: Walk) -> Items:
     if trial.new is None or _skips(walk, trial.new):
         return (yield from _reject(walk, goal))
     walk = replace(walk, rejections=max(0, walk.rejections - 1))
+    if crosses_bend(walk, trial.new):
+        return walk.shorten(0.5 * abs(goal - here.drive), penalty=0)
     if trial.new.unstable > here.unstable and walk.options.branch != "primary":
         outcome = yield from lose_stability(walk, trial.new)
         return outcome if outcome is not None else replace(walk.shorten(0.25 * abs(goal - here.drive)), before=None)
@@ -202,7 +204,7 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
         if abs(new.drive - drive) <= AT_EVENT * walk.options.span:  # the slope there is that of a mode
             _, critical = walk.problem.modes(new, abs(lost))
             new = new._replace(rate=primary_slope(walk.problem, new, critical))
-    elif walk.branch is not None:
+    elif walk.branch is not None and not walk.options.corner:  # else it is the end of a branch that bends the curve
         end = find_passed_end(walk, new)
         if end == "unsure":
             return replace(walk.shorten(0.5 * step), before=None)
@@ -222,7 +224,7 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
 
 def _next_step(walk: Walk, misfit: float, step: float, landed: bool) -> float:
     if misfit < GOOD_MISFIT:
-        return min(walk.options.span, GROWTH * (walk.step if landed else max(walk.step, step)))
+        return min(walk.options.span, walk.options.growth * (walk.step if landed else max(walk.step, step)))
     return SHRINK * step if misfit > POOR_MISFIT else walk.step
 
 
@@ -239,7 +241,7 @@ def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
 def _reject(walk: Walk, goal: float) -> Items:
     """Go on after a step that failed: behind a bifurcation that is here, by a shorter step, by the arc length."""
     options, here = walk.options, walk.here
-    if walk.rejections >= 2 and walk.searched is not here:
+    if walk.rejections >= 2 and walk.searched is not here and not options.corner:  # else steps are cut at a bend
         walk = replace(walk, searched=here)
         outcome = yield from look_past(walk, goal)
         if outcome is not None:
@@ -251,6 +253,6 @@ def _reject(walk: Walk, goal: float) -> Items:
             outcome = yield from follow_by_arc(walk)
             if outcome is not None:
                 return outcome
-    if walk.step < FINEST_STEP * options.span or walk.rejections > MAX_REJECTIONS:
+    if walk.step < options.finest_step * options.span or walk.rejections > MAX_REJECTIONS:
         return PathStop(WhyStopped.LOST, here.drive, "no step converged at {place}")
     return walk

@@ -18,6 +18,7 @@ from cfmkit.numerics.continuation.branches import (
     find_beside,
     opens_at,
 )
+from cfmkit.numerics.continuation.corners import corner_between
 from cfmkit.numerics.continuation.correct import correct
 from cfmkit.numerics.continuation.events import locate_loss
 from cfmkit.numerics.continuation.path import PathBranch, PathEvent, PathStop, Point, Walk, WhyStopped
@@ -44,6 +45,7 @@ LOOK_PAST_BY = 2e-3, 2e-2
 LOOK_PAST_MISS = 0.02  # motion
 CRITICAL = 1e-6  # stiffness of a mode in EI / L, say, below which a start is critical
 FIRST_AMPLITUDE, MAX_HALVINGS = 0.02, 30  # arc length of the first step from there
+BESIDE_CORNER = 1 / 16  # share of the way onto a branch at which its stiffness is taken
 FORWARD = 1e-13  # share of the range: less is rounding
 FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below an unstable start
 
@@ -87,7 +89,9 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
         onto = onto or enter_branch(walk, found.x, found.drive, mode, amplitudes)
         if onto is not None:
             break
-    yield PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes, found.within)
+    corner = _find_rounded_corner(walk, found, onto) if found.rounded and onto is not None else None
+    event = PathEvent("bifurcation", found.drive, here.unstable, after, found.near, modes, found.within)
+    yield replace(corner, after=after, modes=modes) if corner else event
     walk = yield from _reach_bifurcation(walk, found, far, slope)
     if onto is None and options.through_folds:
         return replace(walk, options=replace(options, branch="primary")).restart(new, walk.step, same_piece=True)
@@ -96,6 +100,20 @@ def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
             WhyStopped.JUMPS, found.drive, "no stable equilibrium near {place}: it jumps to a distant one there"
         )
     return (yield from _begin_branch(walk, found, onto, after))
+
+
+def _find_rounded_corner(walk: Walk, found: Located, onto: PathEquilibrium) -> PathEvent | None:
+    """Return the bifurcation that an imperfection rounds, by the curve well before it and on the branch."""
+    problem, width = walk.problem, walk.sense * walk.options.corner * walk.options.span
+    first, drive = _well_before(walk, found.drive, abs(width)) or walk.trail[0], found.drive - width
+    if (drive - first.drive) * width > 0:
+        near = correct(problem, first.x + (drive - first.drive) * first.rate, drive)
+        first = first if near is None or near.unstable > walk.here.unstable else near
+    way = onto.drive - found.drive
+    goal = found.drive + min(max(BESIDE_CORNER * way, width, key=abs), way, key=abs)
+    beside = find_beside(problem, found.x, found.drive, onto, goal, walk.here.unstable)
+    last = beside if np.isfinite(beside.effort) else correct(problem, beside.x, goal)
+    return None if last is None else corner_between(first, last)
 
 
 def _well_before(walk: Walk, drive: float, distance: float) -> PathEquilibrium | None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.problem import ContinuationProblem, PathEquilibrium
 
 
+BEND_SHARE = 0.125  # of what a bifurcation may be rounded over: longest step over a bend of the curve
 AT_EVENT = 3e-7
 """Share of the range within which a requested value at which the drive turns back is at an event: nothing happens."""
 
@@ -38,6 +39,14 @@ class Options:
     first_step: float = 0.05  # share of the range
     most_points: int = 2000
     cluster: float = 1e-3  # share of the range within which bifurcations may be one
+    corner: float = 0.0  # share of the range over which a bifurcation may be rounded; 0: no corner counts as one
+    growth: float = 1.6  # of the step, after a good prediction
+    finest_step: float = 1e-13  # share of the range below which no step is tried
+
+    @property
+    def longest_bend(self) -> float:
+        """Longest step over a bend of the curve, of the drive."""
+        return BEND_SHARE * self.corner * self.span
 
 
 class Point(NamedTuple):
@@ -108,6 +117,7 @@ class Walk:
     modes: int = 1  # critical where this branch began
     rejections: int = 0  # two for each, less one for each accepted step
     searched: PathEquilibrium | None = None  # from where it was looked for a bifurcation ahead
+    steepest: float = 0.0  # largest stiffness on the way so far
 
     @property
     def sense(self) -> float:
@@ -122,7 +132,9 @@ class Walk:
     def move(self, new: PathEquilibrium, reached: int = 0) -> Walk:
         """Return the walk one equilibrium further on the same smooth piece."""
         trail = (*self.trail, new)
-        return replace(self, before=self.here, here=new, trail=trail, number=self.number + reached)
+        steepest = max(self.steepest, abs(new.stiffness))
+        number = self.number + reached
+        return replace(self, before=self.here, here=new, trail=trail, number=number, steepest=steepest)
 
     def restart(self, new: PathEquilibrium, step: float, same_piece: bool = False) -> Walk:
         """Return the walk at an equilibrium from which the slope alone predicts."""

@@ -36,7 +36,11 @@ class LinearisedProblem(Protocol):
 class ContinuationProblem(Protocol):
     """A structure with n unknowns: motions, which are of size one, and forces.
 
-    A mode is a direction in which the structure gives way, a column of n.
+    A mode is a direction in which the structure gives way, a column of n. A problem may have these numbers, too:
+    `arc_share` (1), the weight of the square of a motion in the arc length, one over their number where there are
+    thousands; `drive_tolerance` (1e-12), the share of a way up to which the drive can be found on a branch; and
+    `amplitude_slack` (0.3), the share by which amplitudes near its begin may not be as those of a parabola. What its
+    follower counts as a bifurcation is `Options.corner`.
     """
 
     def __hash__(self) -> int:
@@ -68,6 +72,7 @@ class PathEquilibrium(NamedTuple):
     rate: FloatArray  # (n,) dx/d(drive)
     unstable: int
     effort: float = math.nan  # what works with the drive, if the problem says so
+    stiffness: float = math.nan  # derivative of the effort along the path, if the problem says so
 
 
 class Border(NamedTuple):
@@ -80,7 +85,8 @@ class Border(NamedTuple):
 @lru_cache(maxsize=2)
 def arc_weights(problem: ContinuationProblem, span: float) -> FloatArray:
     """Return the weights of the squares of (x, drive) in the arc length, (n + 1,)."""
-    return np.append(np.where(problem.motions, 1.0, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)
+    share = getattr(problem, "arc_share", 1.0)
+    return np.append(np.where(problem.motions, share, FORCE_WEIGHT / problem.unit**2), 1.0 / span**2)
 
 
 def largest_motion(problem: ContinuationProblem, x: FloatArray) -> float:

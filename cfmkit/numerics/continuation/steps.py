@@ -40,8 +40,15 @@ def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
 
 
 def predict(walk: Walk, goal: float) -> FloatArray:
-    """Return the predicted unknowns at a drive: by the last two equilibria, or by the last one's slope."""
+    """Return the predicted unknowns at a drive: by the last two equilibria, or by the last one's slope.
+
+    A problem may have a method `predict(here, goal)` that knows better, and returns None where it does not.
+    """
     here, before = walk.here, walk.before
+    own = getattr(walk.problem, "predict", None)
+    guess: FloatArray | None = None if own is None else own(here, goal)
+    if guess is not None:
+        return guess
     if before is None or before.drive == here.drive:
         return here.x + (goal - here.drive) * here.rate
     return hermite(before, here, goal)
