@@ -38,7 +38,7 @@ leaves that are pulled straight there do not reach the first: the next is taken.
 
 RESOLVED = 3e-8
 """Size of a panel's last coefficients, relative to the largest force so far, at which it has converged; where only a
-looser tolerance of the path was reached, that one: halving does not take away what the path is off by."""
+looser tolerance of the path was reached, or rounding of places leaves more, that: halving does not take it away."""
 
 WIDE, CORNERED = (4, 3, 5), 16
 """Panels of a piece at first, the next number where a path left its branch; and of one that may have corners."""
@@ -227,10 +227,12 @@ class Route:
     node: str
     control: dict[str, Any]
     tolerances: tuple[float, ...] = TOLERANCES
+    rounding: float = 0.0  # error that rounding leaves, relative to the largest force
 
     def through(self, places: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path through some places, by the strictest tolerance that it reaches, and the places."""
         from cfmkit.elastica import Control, Displacement, PathStatus, trace
+        from cfmkit.elastica.results.member_efforts import effort_error
 
         drive = Displacement(self.node, DOWN, places)
         for number, tolerance in enumerate(self.tolerances):
@@ -240,12 +242,15 @@ class Route:
                 break
         else:  # nor do other places reach the stricter ones
             self.tolerances = self.tolerances[-1:]
+        largest = float(np.abs(path.effort).max(initial=0.0))
+        if largest > 0:
+            self.rounding = max(self.rounding, effort_error(path, 0.0) / largest)
         return path, places
 
     @property
     def resolved(self) -> float:
         """Size of the last coefficients, relative to the largest force so far, at which a panel has converged."""
-        return max(RESOLVED, self.tolerances[0])
+        return max(RESOLVED, self.tolerances[0], self.rounding)
 
 
 def _begun(route: Route, end: float, count: int) -> First:
