@@ -50,7 +50,7 @@ STARTS = {"beam_lan2010_yield"}
     [
         ("studies", ("--verb", "analyze")),  # the others are analysed one by one in test_contract.py
         pytest.param(".", ("--verb", "analyze"), marks=pytest.mark.slow),
-        pytest.param(".", (), marks=pytest.mark.slow),
+        pytest.param(".", (), marks=pytest.mark.long),
     ],
     ids=["studies", "analyze", "design"],
 )
