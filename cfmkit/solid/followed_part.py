@@ -27,7 +27,7 @@ STIFF_SHARE = 1e-2  # flexibility, as a share of a critical one's, that is none
 MAX_MODES = 6  # computed at once
 
 
-class Guide(Protocol):
+class PathGuide(Protocol):
     """Unknowns known from elsewhere, from a coarser mesh."""
 
     @property
@@ -71,7 +71,7 @@ class FollowedPart:
 
     problem: SolidProblem
     held_at: float | None = None  # travel [m or rad] at which the constant loads grow
-    guide: Guide | None = None
+    guide: PathGuide | None = None
     drive_tolerance: float = 1e-7  # equilibria are iterated
     amplitude_slack: float = 0.7  # a mesh is an imperfection
     rest_stiffness: float = math.nan  # of the softest mode of the unloaded part

@@ -7,7 +7,7 @@ difference is small. Halving an interval reduces a smooth curve's error sixteen 
 
 Reference
 ---------
-[deBoor] C. de Boor, A Practical Guide to Splines, Springer 1978.
+[deBoor] C. de Boor, A Practical PathGuide to Splines, Springer 1978.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.export.beam_sections import BeamSection
     from cfmkit.export.contours import Contour
     from cfmkit.solid.equilibrium import Balance
-    from cfmkit.solid.followed_part import Guide
+    from cfmkit.solid.followed_part import PathGuide
     from cfmkit.solid.mesh import TriangleMesh
     from cfmkit.solid.mesh_refinement import RefinedMesh
     from cfmkit.solid.plane_stress_law import Law
@@ -292,7 +292,7 @@ class Meshed:
         self,
         stops: Sequence[float],
         report: Callable[[float], None] = lambda _share: None,
-        guide: Guide | None = None,
+        guide: PathGuide | None = None,
     ) -> MeshSolution:
         """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
         return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)

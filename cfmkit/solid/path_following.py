@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.numerics.continuation.problem import PathEquilibrium
     from cfmkit.solid.equilibrium import SolidProblem
-    from cfmkit.solid.followed_part import Guide
+    from cfmkit.solid.followed_part import PathGuide
 
 FINEST_STEP = 2.0**-16  # share of the travel below which no step is tried
 GROWTH = 2.0  # of a step after one that was easy
@@ -124,7 +124,7 @@ def follow(
     stops: Sequence[float],
     report: Callable[[float], None] = lambda _share: None,
     enough: Callable[[float], bool] = lambda _effort: False,
-    guide: Guide | None = None,
+    guide: PathGuide | None = None,
 ) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch.
 
@@ -138,7 +138,7 @@ def follow(
         Is given the share of the travel that is done.
     enough : callable
         Is given the effort of a pose [N or N m], and tells whether it is the last.
-    guide : Guide, optional
+    guide : PathGuide, optional
         Predicts the unknowns.
     """
     part = FollowedPart(problem, guide=guide)
