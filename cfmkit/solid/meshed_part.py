@@ -7,7 +7,7 @@ difference is small. Halving an interval reduces a smooth curve's error sixteen 
 
 Reference
 ---------
-[deBoor] C. de Boor, A Practical PathGuide to Splines, Springer 1978.
+[deBoor] C. de Boor, A Practical Guide to Splines, Springer 1978.
 """
 
 from __future__ import annotations
