@@ -38,7 +38,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     assert float(np.median(drawn.bands)) == pytest.approx(0.045, abs=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "seed", [0, 3, 5]
 )  # each takes 300 s of processor time; 1, 2 and 4 held it before a change of the search
