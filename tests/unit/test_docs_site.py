@@ -85,7 +85,8 @@ def test_the_documentation_comes_with_the_package_and_its_links_lead_to_files():
     found = docs.pages()
     assert [one.name for one in found][:4] == ["index", "tutorial", "howto", "reference"]
     assert {one.name for one in found} == {path.stem for path in DOCS.glob("*.md")}
-    assert docs.page("docs/cam.md#friction").path.read_bytes() == (DOCS / "cam.md").read_bytes()
+    page, own = (path.read_text("utf-8") for path in (docs.page("docs/cam.md#friction").path, DOCS / "cam.md"))
+    assert page in (own, own.replace("](../cfmkit/", "](../"))  # as it is in a checkout, and in a wheel
     with pytest.raises(UsageError, match="did you mean 'vcfm'"):
         docs.page("vcmf")
     for one in found:
