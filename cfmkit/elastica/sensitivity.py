@@ -98,10 +98,10 @@ class Gradient:
     @cached_property
     def _rates(self) -> FloatArray:
         """Slopes of the free unknowns along the path at the points, (p, free)."""
-        found = equations(self.path.network).solve_each(self.path.free[self.points], self.at.drive)
-        if not (found.converged.all() and np.isfinite(found.rate).all()):
+        solutions = equations(self.path.network).solve_each(self.path.free[self.points], self.at.drive)
+        if not (solutions.converged.all() and np.isfinite(solutions.rate).all()):
             raise InputError(SINGULAR)
-        return found.rate
+        return solutions.rate
 
     @property
     def motion(self) -> Mapping[str, FloatArray]:
@@ -118,7 +118,7 @@ class Gradient:
 
         def output(net: Network, at: Equilibria) -> Any:
             element = beam_states.elements_of(at.network, beam)[-1 if end else 0]
-            found = beam_states.states_on(net, at, [element], np.array([float(end)]))
+            found = beam_states.states_of_elements(net, at, [element], np.array([float(end)]))
             return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
 
         return self.of(output)
@@ -147,24 +147,25 @@ class Gradient:
     def dual_states(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamStates:
         """Return states with their derivatives at fractions of elements, one after the other; dual arrays (p, n)."""
         places = tuple(np.linspace(0.0, 1.0, N_PLACES) if fractions is None else fractions)
-        known, key = self._known, (*elements, *places)
-        if key not in known:
-            known[key] = beam_states.states_of_designs(self.designs, self._dual, elements, places)
-        return known[key]
+        key = tuple(elements), places
+        if key not in self._states_by_places:
+            states = beam_states.states_of_designs(self.designs, self._dual, elements, places)
+            self._states_by_places[key] = states
+        return self._states_by_places[key]
 
     def dual_sections(self, elements: Sequence[int], fractions: Any = None) -> beam_states.BeamSections:
         """Return section forces and stresses with their derivatives, as of `dual_states`."""
-        found = self.dual_states(elements, fractions)
+        states = self.dual_states(elements, fractions)
         names = [self.path.network.elements.beam[element] for element in elements]
         each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
         own = np.array([self.path.net.beams[name].section.width for name in names])
-        count = len(found.place) // len(names)
+        count = len(states.place) // len(names)
         width = DualArray(np.repeat(own, count), np.repeat(np.imag(each) / COMPLEX_STEP, count, axis=1))
-        return beam_states.sections_of_width(width, found)
+        return beam_states.sections_of_width(width, states)
 
     @cached_property
-    def _known(self) -> dict[Any, beam_states.BeamStates]:
-        """States of beams: their places and their stresses are requested one after the other."""
+    def _states_by_places(self) -> dict[Any, beam_states.BeamStates]:
+        """Results of `dual_states`, by elements and fractions: positions and stresses are read one after the other."""
         return {}
 
     @cached_property

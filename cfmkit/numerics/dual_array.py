@@ -47,13 +47,13 @@ class DualArray:
         return int(self.value.ndim)
 
     @property
-    def every_slope(self) -> Any:
+    def all_slopes(self) -> Any:
         """All derivatives, (k, ...); a view."""
         if self.slopes.shape[1:] == self.value.shape:
             return self.slopes
         return np.broadcast_to(self.slopes, (len(self.slopes), *self.value.shape))
 
-    def along(self, ndim: int) -> Any:
+    def aligned_slopes(self, ndim: int) -> Any:
         """Return the derivatives with as many axes as an array of `ndim`, and that of the variables."""
         missing = ndim - self.value.ndim
         return (
@@ -70,9 +70,9 @@ class DualArray:
         """Return the sum."""
         if not isinstance(other, DualArray):
             value = self.value + other
-            return DualArray(value, self.along(value.ndim))
+            return DualArray(value, self.aligned_slopes(value.ndim))
         value = self.value + other.value
-        return DualArray(value, self.along(value.ndim) + other.along(value.ndim))
+        return DualArray(value, self.aligned_slopes(value.ndim) + other.aligned_slopes(value.ndim))
 
     __radd__ = __add__
 
@@ -88,23 +88,26 @@ class DualArray:
         """Return the product."""
         if not isinstance(other, DualArray):
             value = self.value * other
-            return DualArray(value, self.along(value.ndim) * other)
+            return DualArray(value, self.aligned_slopes(value.ndim) * other)
         value = self.value * other.value
-        return DualArray(value, self.along(value.ndim) * other.value + other.along(value.ndim) * self.value)
+        own, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
+        return DualArray(value, own * other.value + others * self.value)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> DualArray:
         """Return the quotient."""
         if not isinstance(other, DualArray):
-            return DualArray(self.value / other, self.along((self.value / other).ndim) / other)
+            value = self.value / other
+            return DualArray(value, self.aligned_slopes(value.ndim) / other)
         value = self.value / other.value
-        return DualArray(value, (self.along(value.ndim) - other.along(value.ndim) * value) / other.value)
+        own, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
+        return DualArray(value, (own - others * value) / other.value)
 
     def __rtruediv__(self, other: Any) -> DualArray:
         """Return the quotient."""
         value = other / self.value
-        return DualArray(value, -self.along(value.ndim) * (value / self.value))
+        return DualArray(value, -self.aligned_slopes(value.ndim) * (value / self.value))
 
     def __pow__(self, exponent: int) -> DualArray:
         """Return a power."""
@@ -112,18 +115,18 @@ class DualArray:
 
     def __matmul__(self, matrix: Any) -> DualArray:
         """Return the products of rows with a matrix of numbers."""
-        return self.linear(lambda rows: rows @ matrix)
+        return self.map_linear(lambda rows: rows @ matrix)
 
     def __getitem__(self, index: Any) -> DualArray:
         """Return some of the numbers."""
         own = index if isinstance(index, tuple) else (index,)
-        return DualArray(self.value[own], self.every_slope[(slice(None), *own)])
+        return DualArray(self.value[own], self.all_slopes[(slice(None), *own)])
 
     def sum(self, axis: int) -> DualArray:
         """Return the sum along an axis, which is counted from the end."""
-        return self.linear(lambda rows: rows.sum(axis=axis))
+        return self.map_linear(lambda rows: rows.sum(axis=axis))
 
-    def linear(self, function: Callable[[Any], Any]) -> DualArray:
+    def map_linear(self, function: Callable[[Any], Any]) -> DualArray:
         """Return a linear function of the last axes of the array."""
         last = self.slopes
         if last.shape[-1] != self.value.shape[-1]:
@@ -156,12 +159,12 @@ def stack(parts: Sequence[Any]) -> Any:
         return np.stack(parts, axis=-1)
     values = [part.value if isinstance(part, DualArray) else part for part in parts]
     value = np.stack(np.broadcast_arrays(*values), axis=-1)
-    slopes = [part.along(value.ndim - 1) if isinstance(part, DualArray) else 0.0 for part in parts]
+    slopes = [part.aligned_slopes(value.ndim - 1) if isinstance(part, DualArray) else 0.0 for part in parts]
     shape = np.broadcast_shapes(*(np.shape(slope) for slope in slopes))
     return DualArray(value, np.stack([np.broadcast_to(slope, shape) for slope in slopes], axis=-1))
 
 
-def each_of(function: Callable[[Any], tuple[Any, ...]], x: DualArray) -> tuple[DualArray, ...]:
+def map_analytic(function: Callable[[Any], tuple[Any, ...]], x: DualArray) -> tuple[DualArray, ...]:
     """Return some analytic functions of every number of an array, by complex steps."""
     stepped = function(x.value + 1j * COMPLEX_STEP * x.slopes)
     return tuple(
@@ -171,6 +174,5 @@ def each_of(function: Callable[[Any], tuple[Any, ...]], x: DualArray) -> tuple[D
 
 def slopes_of(x: Any, count: int, shape: tuple[int, ...]) -> Any:
     """Return the derivatives (count, *shape) of an array, which are zero unless it is dual."""
-    return (
-        np.broadcast_to(x.along(len(shape)), (count, *shape)) if isinstance(x, DualArray) else np.zeros((count, *shape))
-    )
+    slopes = x.aligned_slopes(len(shape)) if isinstance(x, DualArray) else 0.0
+    return np.broadcast_to(slopes, (count, *shape))

@@ -57,6 +57,15 @@ def test_efforts_are_the_same_with_all_unknowns_and_without_them() -> None:
     np.testing.assert_allclose(alone.effort, last.effort, rtol=1e-9)
 
 
+def test_states_at_other_elements_and_fractions_are_not_mistaken_for_each_other() -> None:
+    """Their numbers in a row are the same: elements 0 and 1 at 0.5, and element 0 at 1 and 0.5."""
+    path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3])), Control(tolerance=1e-5))
+    slopes = gradient(path, lan, LAN)
+    two_elements, two_places = slopes.dual_states([0, 1], [0.5]).x, slopes.dual_states([0], [1, 0.5]).x
+    assert two_elements.shape == two_places.shape == (1, 2)
+    assert (two_elements.value != two_places.value).any()
+
+
 @pytest.mark.parametrize("output", ["effort", "unknowns", "energy"])
 def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
     output: str, monkeypatch: pytest.MonkeyPatch

@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.element_tables import plain_tables
 from cfmkit.elastica.model.network import PointLoad, SlideSpring
-from cfmkit.elastica.model.plain_beams_at_once import between, chords, coefficients_of, is_plain, rigidities_of
+from cfmkit.elastica.model.plain_beams_at_once import chords, coefficients_of, fit_to_ends, is_plain, rigidities_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -98,7 +98,7 @@ def _plain(
     spots = np.array([[(net.nodes[name].x, net.nodes[name].y) for name in names] for net, _ in pairs]) / scales.length
     beams = [list(net.beams.values()) for net, _ in pairs]
     offsets = np.array([[(b.start_offset, b.end_offset) for b in each] for each in beams]) / scales.length
-    row, ends, inside = _rows(template, list(origin[0].beams))
+    row, ends, inside = _number_ends(template, list(origin[0].beams))
     node, master = _whose(origin, names, inside, ends)
     arm = spots[:, node] - spots[:, master]
     arm[:, ends] += offsets
@@ -108,7 +108,7 @@ def _plain(
     every = [beam for each in beams for beam in each]
     shape = len(beams), len(beams[0])
     coefficients = coefficients_of(every).reshape(*shape, -1)
-    rotation, length = between(*chords(coefficients), reach)
+    rotation, length = fit_to_ends(*chords(coefficients), reach)
     turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
     rigidities = rigidities_of(every).reshape(3, *shape)
     tables = plain_tables(turned, length * scales.length, rigidities, scales, template.degree, row, e.cuts)
@@ -125,7 +125,7 @@ def _plain(
     return NetworkDesigns(template, len(pairs), tables, places, base, (), tuple(pairs))
 
 
-def _rows(template: Discretisation, names: list[str]) -> tuple[Any, Any, Any]:
+def _number_ends(template: Discretisation, names: list[str]) -> tuple[Any, Any, Any]:
     """Return the number of each element's beam, the attachments of the ends of beams (b, 2), and those inside beams."""
     e = template.elements
     row = np.array([names.index(name) for name in e.beam])

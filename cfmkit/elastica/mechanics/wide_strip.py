@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.numerics.dual_array import DualArray, each_of
+from cfmkit.numerics.dual_array import DualArray, map_analytic
 
 if TYPE_CHECKING:
     from cfmkit.elastica.mechanics.discretise import BeamElements
@@ -55,7 +55,7 @@ def bending(elements: BeamElements, curvature: Any) -> Bending:
 
 
 def _share(z: Any) -> tuple[Any, ...]:
-    return each_of(curling_share, z) if isinstance(z, DualArray) else curling_share(z)
+    return map_analytic(curling_share, z) if isinstance(z, DualArray) else curling_share(z)
 
 
 def curling_share(z: Any) -> tuple[Any, Any, Any]:

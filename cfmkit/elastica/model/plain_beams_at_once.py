@@ -65,7 +65,7 @@ class Bundle:
         if any(nominal):
             first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
         self.reach, self.drawn = reach, (first, cx, cy)
-        rotation, self.length = between(cx, cy, reach)
+        rotation, self.length = fit_to_ends(cx, cy, reach)
         self.scale = distance / (own * first)
         closures = [beam.closure for beam in beams]
         if "raw" in closures:
@@ -132,8 +132,8 @@ def chords(coefficients: Any) -> tuple[Any, Any]:
     return np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
 
 
-def between(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:
-    """Return by how much shapes with chords are turned to fit between their ends, (..., b, 2), and their lengths."""
+def fit_to_ends(cx: Any, cy: Any, reach: Any) -> tuple[Any, Any]:
+    """Return rotations and lengths of shapes with chords that fit their ends, `reach` (..., b, 2) apart."""
     dx, dy = reach[..., 0], reach[..., 1]
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     return rotation, np.sqrt((dx * dx + dy * dy) / (cx * cx + cy * cy))

@@ -81,14 +81,14 @@ def states(net: Network, at: Equilibria, beam: str, fractions: Any) -> BeamState
     fractions : (k,) array
         Places on every element as fractions of its parameter, from 0 to 1.
     """
-    return states_on(net, at, elements_of(at.network, beam), fractions)
+    return states_of_elements(net, at, elements_of(at.network, beam), fractions)
 
 
-def states_on(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
+def states_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return states at the same fractions (k,) of each of m elements, one after the other: (p, m k)."""
     given = np.asarray(fractions, float)
-    found = _states(at, list(elements), given, _rest(net, at.network, elements, given))
-    return BeamStates(*map(_in_a_row, found))
+    by_element = _states(at, list(elements), given, _rest(net, at.network, elements, given))
+    return BeamStates(*map(_join_elements, by_element))
 
 
 def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
@@ -101,17 +101,17 @@ def states_of_designs(designs: NetworkDesigns, at: Equilibria, elements: Sequenc
     at : Equilibria
         Of `dual_arrays`, with dual unknowns.
     elements, fractions : (m,), (k,) arrays
-        As of `states_on`.
+        As of `states_of_elements`.
     """
     given, numbers = np.asarray(fractions, float), list(elements)
-    found = _states(at, numbers, given, _rest_of_designs(designs, at.network, numbers, given))
-    return BeamStates(*map(_in_a_row, found))
+    by_element = _states(at, numbers, given, _rest_of_designs(designs, at.network, numbers, given))
+    return BeamStates(*map(_join_elements, by_element))
 
 
-def _in_a_row(values: Any) -> Any:
+def _join_elements(values: Any) -> Any:
     """Return values (..., m, k) of one element after the other, (..., m k)."""
     if isinstance(values, DualArray):
-        return DualArray(_in_a_row(values.value), _in_a_row(values.every_slope))
+        return DualArray(_join_elements(values.value), _join_elements(values.all_slopes))
     return values.reshape(*values.shape[:-2], -1)
 
 
@@ -197,7 +197,7 @@ def _states(at: Equilibria, elements: list[int], given: FloatArray, rest: _BeamA
 
 
 class _Fields(NamedTuple):
-    """What is integrated along elements, at their Gauss points (..., m, q)."""
+    """Integrands along elements at their Gauss points, (..., m, q)."""
 
     slope_x: Any  # dX/ds
     slope_y: Any
@@ -221,7 +221,7 @@ def _curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
 
 
 class _AtFractions(NamedTuple):
-    """What takes an element's unknowns and values at its Gauss points to k fractions of it."""
+    """Matrices from an element's unknowns, and values at its Gauss points, to k fractions of it."""
 
     values: FloatArray  # (k, degree + 1) of the rotation
     integrals: FloatArray  # (k, q) up to each

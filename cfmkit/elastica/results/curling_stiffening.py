@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics.polynomials import basis
 from cfmkit.elastica.model.section import curl_hindered, curling
-from cfmkit.elastica.results.beam_states import elements_of, states_on
+from cfmkit.elastica.results.beam_states import elements_of, states_of_elements
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -54,7 +54,7 @@ def hindered_curling(path: EquilibriumPath) -> HinderedCurling:
     for number, name in enumerate(names):
         section, fitted = path.net.beams[name].section, network.fits[name]
         for element in elements_of(network, name):
-            found = states_on(path.net, path.at, [element], places)
+            found = states_of_elements(path.net, path.at, [element], places)
             left, right = network.elements.cuts[element]
             t, inside = left + (right - left) * places, 0.5 * (left + right)
             rest = np.imag(fitted.angle(t + 1j * _STEP, inside)) / _STEP / np.real(fitted.speed(t, inside))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from cfmkit.elastica.results.beam_states import elements_of, sections, states_on
+from cfmkit.elastica.results.beam_states import elements_of, sections, states_of_elements
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -68,7 +68,7 @@ def extremes(net: Network, at: Equilibria, beam: str, signs: FloatArray) -> tupl
     shape = (len(at.z), len(signs))
     best, place, chosen, where = np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape, int), np.zeros(shape)
     for number, element in enumerate(elements_of(at.network, beam)):
-        found = states_on(net, at, [element], fractions)
+        found = states_of_elements(net, at, [element], fractions)
         seen = sections(net, beam, found)
         both = np.stack([seen.bending_stress, seen.axial_stress])
         series = np.einsum("cs,spk->pck", signs, both) @ to_series.T
@@ -142,7 +142,7 @@ def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: A
         here = element == number
         if not here.any():
             continue
-        seen = sections(net, beam, states_on(net, at, [own], fractions))
+        seen = sections(net, beam, states_of_elements(net, at, [own], fractions))
         bending, pull = (
             np.moveaxis(legendre.legvander(2 * fraction - 1, len(fractions) - 1), -1, 0)
             * np.moveaxis(values @ to_series.T, -1, 0)[:, :, None, None]

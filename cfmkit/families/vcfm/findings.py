@@ -147,8 +147,8 @@ def closed_spring(solution: Solution) -> Sentence:
 
 
 def _truss(solution: Solution) -> Sentence:
-    about = solution.spec.mechanism
-    law = leaf_law(about.bistable, about.material)
+    mechanism = solution.spec.mechanism
+    law = leaf_law(mechanism.bistable, mechanism.material)
     places = np.linspace(0.0, 1.0, 401) * float(law.strip.rise)
     bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
     high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]

@@ -279,13 +279,13 @@ class VcfmSpec(Spec):
     @classmethod
     def _default_model_is_that_of_the_leaves(cls, data: Any) -> Any:
         """Choose the model that the kind of leaf needs, unless another is named."""
-        whole = keys_of(data)
-        structure = keys_of(keys_of(whole.get("mechanism")).get("bistable")).get("structure")
-        analysis = whole.get("analysis")
+        blocks = keys_of(data)
+        structure = keys_of(keys_of(blocks.get("mechanism")).get("bistable")).get("structure")
+        analysis = blocks.get("analysis")
         fidelity = next((kind.fidelity for kind in LEAF_KINDS.values() if kind.name == structure), None)
         if fidelity is None or not (analysis is None or isinstance(analysis, Mapping | Model)):
             return data
-        return dict(whole) | {"analysis": {"fidelity": fidelity} | dict(keys_of(analysis))}
+        return dict(blocks) | {"analysis": {"fidelity": fidelity} | dict(keys_of(analysis))}
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:

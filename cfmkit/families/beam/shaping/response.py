@@ -8,7 +8,7 @@ leaves the band between two poses: that is seen at many more poses, where a desi
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,30 +183,30 @@ class Response:
         return found
 
     @cached_property
-    def _alike(self) -> list[dict[str, list[int]]]:
+    def _beams_by_cuts(self) -> list[dict[str, list[int]]]:
         """Elements of each beam; those that are cut into as many elements together."""
         network = self.path.network
         elements = {name: beam_states.elements_of(network, name) for name in network.fits}
         counts = sorted({len(own) for own in elements.values()})
         return [{name: own for name, own in elements.items() if len(own) == count} for count in counts]
 
-    def _along_beams(self, compute: Callable[[list[int], FloatArray], Any]) -> dict[str, Any]:
+    def _compute_along_beams(self, compute: Callable[[list[int], FloatArray], Any]) -> dict[str, Any]:
         """Return columns (p, r) or (r,) for each beam, computed for elements and fractions of them."""
-        found = {}
-        for alike in self._alike:
+        columns = {}
+        for alike in self._beams_by_cuts:
             elements = [k for own in alike.values() for k in own]
             together = compute(elements, _fractions(len(elements) // len(alike)))
             width = together[0].shape[-1] // len(alike)
             for k, name in enumerate(alike):
                 own = slice(k * width, (k + 1) * width)
-                found[name] = type(together)(*(part[..., own] for part in together))
-        return {name: found[name] for name in self.path.net.beams}
+                columns[name] = type(together)(*(part[..., own] for part in together))
+        return {name: columns[name] for name in self.path.net.beams}
 
     @cached_property
     def states(self) -> dict[str, beam_states.BeamStates]:
         """States at all rows of every beam at the poses."""
         path = self.path.take(self.keep)
-        return self._along_beams(lambda elements, places: beam_states.states_on(path.net, path.at, elements, places))
+        return self._compute_along_beams(partial(beam_states.states_of_elements, path.net, path.at))
 
     @cached_property
     def state(self) -> NetworkAtPoses:
@@ -249,12 +249,11 @@ class Response:
         NoAnswer
             Where the engine has none.
         """
-        known = self._gradient
-        states, sections = (self._along_beams(one).values() for one in (known.dual_states, known.dual_sections))
-        x, y = (np.concatenate([getattr(one, name).every_slope for one in states], axis=-1) for name in ("x", "y"))
-        bending, axial = (
-            np.concatenate([getattr(one, name).every_slope for one in sections], axis=-1)
-            for name in ("bending_stress", "axial_stress")
+        states = self._compute_along_beams(self._gradient.dual_states).values()
+        sections = self._compute_along_beams(self._gradient.dual_sections).values()
+        x, y, bending, axial = (
+            np.concatenate([getattr(beam, name).all_slopes for beam in beams], axis=-1)
+            for beams, name in ((states, "x"), (states, "y"), (sections, "bending_stress"), (sections, "axial_stress"))
         )
         return {"x": x, "y": y, "stress": bending, "left": axial + bending, "right": axial - bending}
 
