@@ -45,7 +45,7 @@ def _check_sizes(block: Positive | Bistable) -> None:
             raise ValueError(f"'structure: {block.structure}' needs '{key}', {what}")
 
 
-def _described(kinds: Iterable[StructureKind]) -> str:
+def _list_descriptions(kinds: Iterable[StructureKind]) -> str:
     *others, last = (kind.description for kind in kinds)
     return f"{', '.join(others)}, or {last}"
 
@@ -53,7 +53,7 @@ def _described(kinds: Iterable[StructureKind]) -> str:
 class Positive(Model):
     """The spring: the structure with a positive stiffness, whose far end the preload moves."""
 
-    structure: SpringName = Field(DIAMOND.name, description=_described(SPRING_KINDS.values()))
+    structure: SpringName = Field(DIAMOND.name, description=_list_descriptions(SPRING_KINDS.values()))
     loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
     length: PositiveLength = Field(description="of one flexible leaf, L1")
     angle: LeafAngle = Field(0.0, description="of a diamond's leaves from the direction across the motion, theta1")
@@ -77,7 +77,7 @@ class Positive(Model):
 class Bistable(Model):
     """The leaves between wall and shuttle that snap through, and so have a negative stiffness."""
 
-    structure: LeafName = Field(V_BEAM.name, description=_described(LEAF_KINDS.values()))
+    structure: LeafName = Field(V_BEAM.name, description=_list_descriptions(LEAF_KINDS.values()))
     half_beams: int = Field(
         ge=1, le=1000, description="leaves between wall and shuttle, all together: one V has two, two Vs have four"
     )

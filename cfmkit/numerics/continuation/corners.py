@@ -15,15 +15,18 @@ if TYPE_CHECKING:
     from cfmkit.numerics.continuation.path import Options, Walk
     from cfmkit.numerics.continuation.problem import PathEquilibrium
 
-BEND, SEEN_BEND = 0.3, 0.05
+MIN_CHANGE, MIN_CHANGE_OF_LARGEST = 0.3, 0.05
 """Change of the stiffness, as shares of the larger one and of the largest so far, that is a bend."""
-SHARPNESS = 2.0  # of a bend, in those of the curve before and behind it, from which on it is a corner
+MIN_SHARPNESS = 2.0  # of a bend, in those of the curve before and behind it, from which on it is a corner
 
 
-def bends(first: PathEquilibrium, last: PathEquilibrium, steepest: float) -> bool:
+def is_bent(first: PathEquilibrium, last: PathEquilibrium, steepest: float) -> bool:
     """Return True if the stiffness differs between two equilibria, seen against the largest, too."""
     change = abs(last.stiffness - first.stiffness)
-    return change > BEND * max(abs(first.stiffness), abs(last.stiffness)) and change > SEEN_BEND * steepest
+    return (
+        change > MIN_CHANGE * max(abs(first.stiffness), abs(last.stiffness))
+        and change > MIN_CHANGE_OF_LARGEST * steepest
+    )
 
 
 def crosses_bend(walk: Walk, new: PathEquilibrium) -> bool:
@@ -31,7 +34,7 @@ def crosses_bend(walk: Walk, new: PathEquilibrium) -> bool:
     longest, here = walk.options.longest_bend, walk.here
     if not longest or new.unstable != here.unstable or abs(new.drive - here.drive) <= longest:
         return False
-    return bends(here, new, walk.steepest)
+    return is_bent(here, new, walk.steepest)
 
 
 def mark_corners(
@@ -51,7 +54,7 @@ def mark_corners(
             steepest = max(steepest, abs(at.stiffness))
             if first is None:
                 near = [k for k, other in enumerate(passed) if abs(at.drive - other.drive) <= width]
-                first = next((k for k in near if bends(passed[k], at, steepest)), None)
+                first = next((k for k in near if is_bent(passed[k], at, steepest)), None)
             passed.append(at)
             yield item
             if first is None or abs(at.drive - passed[first].drive) <= 2.0 * width:
@@ -71,24 +74,24 @@ def _corner_at(passed: list[PathEquilibrium], number: int, width: float, steepes
     first, after = passed[number], passed[-1]
     last = next((at for at in passed[number:] if abs(at.drive - first.drive) >= width), after)
     before = next((at for at in passed[number::-1] if abs(at.drive - first.drive) >= width), None)
-    if before is None or not bends(first, last, steepest):
+    if before is None or not is_bent(first, last, steepest):
         return None
-    if _bend_rate(first, last) <= SHARPNESS * max(_bend_rate(before, first), _bend_rate(last, after)):
+    if _bend_rate(first, last) <= MIN_SHARPNESS * max(_bend_rate(before, first), _bend_rate(last, after)):
         return None
     return corner_between(first, last)
 
 
 def _bend_rate(first: PathEquilibrium, last: PathEquilibrium) -> float:
     """Return the change of the stiffness by the drive; 0 at one place."""
-    way = abs(last.drive - first.drive)
-    return abs(last.stiffness - first.stiffness) / way if way else 0.0
+    distance = abs(last.drive - first.drive)
+    return abs(last.stiffness - first.stiffness) / distance if distance else 0.0
 
 
 def corner_between(first: PathEquilibrium, last: PathEquilibrium) -> PathEvent | None:
     """Return the bifurcation between two equilibria beside it; None if the tangents of the curve do not meet there."""
-    way = last.drive - first.drive
-    share = (last.effort - first.effort - last.stiffness * way) / (way * (first.stiffness - last.stiffness))
+    distance = last.drive - first.drive
+    share = (last.effort - first.effort - last.stiffness * distance) / (distance * (first.stiffness - last.stiffness))
     if not 0.0 < share < 1.0:
         return None
-    drive = first.drive + share * way
+    drive = first.drive + share * distance
     return PathEvent("bifurcation", drive, first.unstable, last.unstable, within=(first, last))
