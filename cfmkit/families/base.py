@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.families.run_control import Run  # noqa: TC001  packages of other families may import it from here
 from cfmkit.results import OLD_KEY, OVERWRITTEN, PART_NOT_DRAWN, THIN_WALL, WINDOW_OUTSIDE, Quantity
-from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -61,11 +60,6 @@ class Block:
     values: Mapping[str, NDArray[Any]]
     measures: tuple[Measure, ...]
     size: int
-
-    def in_places(self, travel: tuple[float, float]) -> Block:
-        """Return the block with places for shares of a travel that all variants have, from its start to its end."""
-        measures = (Measure(one.name, between(one.window, travel) if one.window else None) for one in self.measures)
-        return Block(self.values, tuple(measures), self.size)
 
 
 @dataclass(frozen=True)

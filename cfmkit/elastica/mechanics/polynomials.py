@@ -69,12 +69,6 @@ def integrals_to_points(degree: int) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def powers_at_points(degree: int, count: int) -> FloatArray:
-    """Return the powers 0 ... count - 1 of u at the Gauss points, (count, q)."""
-    return read_only(np.vander(basis(degree).places, count, increasing=True).T)
-
-
-@lru_cache(maxsize=64)
 def slopes_at_points(degree: int) -> FloatArray:
     """Return the matrix (q, q) that takes values at the Gauss points to the slopes there by u."""
     x = 2 * basis(degree).places - 1
