@@ -23,7 +23,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria, dual_arrays, effort_slopes, unknown_slopes
-from cfmkit.elastica.mechanics.designs import design_of, set_up
+from cfmkit.elastica.mechanics.designs import design_of, make_up, set_up
 from cfmkit.elastica.mechanics.discretise import discretise_alike
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
@@ -238,8 +238,9 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
         moved[k] += 1j * COMPLEX_STEP
         built = build(moved)
         pairs.append(built if isinstance(built, tuple) else (built, path.given))
+    own = make_up(path.net)
     for k, (network, _) in enumerate(pairs):
-        if not _is_alike(network, path.net):
+        if make_up(network) != own:
             raise InputError(
                 f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
             )
@@ -248,20 +249,3 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
     )
     chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
     return Gradient(path, read_only(chosen, np.int64), designs)
-
-
-def _is_alike(network: Network, other: Network) -> bool:
-    """Return True if two networks have the same nodes, beams, joints, supports, links, springs and loads by name."""
-    return bool(_make_up(network) == _make_up(other))
-
-
-def _make_up(network: Network) -> Any:
-    nodes = [
-        (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
-    ]
-    beams = [(name, b.start, b.end, b.start_joint, b.end_joint) for name, b in network.beams.items()]
-    acting = [
-        (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
-        for one in (*network.springs, *network.loads)
-    ]
-    return nodes, beams, network.links, acting

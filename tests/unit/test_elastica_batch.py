@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from batch_networks import bent, last_effort, standing
+from batch_networks import bent, last_effort, standing, two_leaves
 
 from cfmkit.elastica import (
+    PINNED,
+    STRAIGHT,
     Control,
     Displacement,
     Network,
+    Node,
     PathStatus,
+    PointLoad,
+    SlideSpring,
     trace,
     trace_many,
 )
+from cfmkit.elastica.mechanics.march import engine
+from cfmkit.elastica.tracing.follow_alike import follow_alike
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+LEAVES = Displacement("d", np.pi, np.linspace(0, 5e-3, 17)[1:])
 DRIVE = Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
 
 
@@ -30,7 +39,54 @@ def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
     for sweep, outcome in zip(sweeps, found, strict=True):
         path = trace(bent(sweep), DRIVE)
         assert outcome.status == PathStatus.COMPLETE.name
-        np.testing.assert_array_equal(outcome.value.effort, path.effort[path.at_requested])
+        assert outcome.value.effort == pytest.approx(path.effort[path.at_requested], rel=2e-7)
+
+
+def test_networks_of_one_topology_are_followed_together_within_the_tolerance() -> None:
+    rng, tolerance = np.random.default_rng(3), 1e-5
+    networks = [two_leaves(*(1 + 0.1 * rng.standard_normal(6))) for _ in range(20)]
+    path = trace(networks[0], LEAVES, Control(tolerance=tolerance))
+    together = follow_alike(path, networks[1:], Control(tolerance=tolerance))
+    if engine() == "C":
+        assert together is not None
+        assert np.isfinite(together).all()
+    found = list(trace_many(networks, LEAVES, Control(tolerance=tolerance)))
+    for network, outcome in zip(networks, found, strict=True):
+        path = trace(network, LEAVES, Control(tolerance=1e-10))
+        exact = path.effort[path.at_requested]
+        assert outcome.value.effort == pytest.approx(exact, abs=tolerance * np.abs(exact).max())
+        assert (outcome.value.drive == LEAVES.points).all()
+        assert outcome.value.stable.all()
+
+
+@pytest.mark.skipif(engine() != "C", reason="networks are followed together by compiled code")
+def test_networks_are_traced_by_themselves_if_they_buckle_or_differ_in_their_make_up() -> None:
+    leaves = two_leaves()
+    straight = {name: replace(beam, shape=STRAIGHT) for name, beam in leaves.beams.items()}
+    columns = replace(leaves, beams=straight)
+    sprung = replace(leaves, springs=(SlideSpring("d", 0.0, 100.0),))
+    pinned = replace(leaves, nodes=leaves.nodes | {"b": Node(0, 0.01, PINNED)})
+    others = [columns, sprung, pinned, two_leaves(thick=0.7)]
+    path = trace(two_leaves(1), LEAVES)
+    together = follow_alike(path, others, Control())
+    assert together is not None
+    assert np.isfinite(together).all(axis=1).tolist() == [False, False, False, True]
+    for network, outcome in zip(others, list(trace_many([leaves, *others], LEAVES))[1:], strict=True):
+        alone = trace(network, LEAVES)
+        assert outcome.status == alone.status.name
+        assert outcome.value.effort == pytest.approx(alone.effort[alone.at_requested], rel=1e-6)
+        assert (outcome.value.stable == alone.stable[alone.at_requested]).all()
+
+
+@pytest.mark.skipif(engine() != "C", reason="networks are followed together by compiled code")
+def test_nothing_is_followed_with_a_network_that_bears_something_at_rest_or_is_made_imperfect() -> None:
+    leaves = two_leaves()
+    loaded = replace(leaves, loads=(PointLoad("d", fx=0.1),))
+    tight = replace(leaves, springs=(SlideSpring("d", 0.0, 100.0, free_displacement=1e-3),))
+    for network in (loaded, tight):
+        assert follow_alike(trace(network, LEAVES), [network], Control()) is None
+    assert follow_alike(trace(leaves, LEAVES), [leaves], Control(imperfection=1e-4)) is None
+    assert follow_alike(trace(leaves, LEAVES), [leaves], Control()) is not None
 
 
 def test_a_network_that_cannot_exist_fails_alone() -> None:
@@ -67,7 +123,7 @@ def test_what_a_function_collects_comes_from_processes_as_it_is() -> None:
     ]
 
 
-@pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 5 * 64)])
+@pytest.mark.parametrize(("workers", "most"), [(1, 128), (2, 5 * 128)])
 def test_networks_are_taken_as_they_are_needed(workers: int, most: int) -> None:
     """Endlessly many networks do not fill the memory."""
     taken = 0

@@ -15,11 +15,13 @@ from typing import Any
 import beam_networks
 import numpy as np
 import pytest
+from batch_networks import two_leaves
 
 import cfmkit
 from cfmkit.elastica import (
     CLAMPED,
     Beam,
+    Control,
     Displacement,
     Loading,
     Network,
@@ -32,6 +34,7 @@ from cfmkit.elastica import (
     Taper,
     arc,
     guided,
+    trace,
 )
 from cfmkit.elastica.mechanics import energy
 from cfmkit.elastica.mechanics.designs import NetworkDesigns, set_up
@@ -262,6 +265,15 @@ def test_a_batch_has_the_efforts_of_single_marches(taper: bool) -> None:
         march = own.march(begin(own), goals, MarchPlan(0.05 * goals[-1], goals[-1], tolerance=1e-9))
         known = [state.effort * own.effort_unit for state in march.states if state.target >= 0]
         assert row == pytest.approx(known, rel=1e-7)
+
+
+def test_a_batch_of_several_beams_has_the_efforts_of_single_marches() -> None:
+    pairs = [(two_leaves(bend=bend), Displacement("d", np.pi, TARGETS)) for bend in (0.8, 1.0, 1.3)]
+    efforts, codes = march_many(set_up(discretise(*pairs[0], 16), pairs[0], pairs), TARGETS)
+    assert (codes == MarchCode.DONE).all()
+    for pair, row in zip(pairs, efforts, strict=True):
+        path = trace(*pair, Control(tolerance=1e-8))
+        assert row == pytest.approx(path.effort[path.at_requested], rel=1e-6)
 
 
 def test_designs_of_a_batch_may_differ_in_their_springs() -> None:

@@ -15,7 +15,14 @@ import numpy as np
 from cfmkit.elastica.mechanics.discretise import Discretisation, discretise
 from cfmkit.elastica.mechanics.element_tables import plain_tables
 from cfmkit.elastica.model.network import PointLoad, SlideSpring
-from cfmkit.elastica.model.plain_beams_at_once import chords, coefficients_of, fit_to_ends, is_plain, rigidities_of
+from cfmkit.elastica.model.plain_beams_at_once import (
+    check_fits,
+    chords,
+    coefficients_of,
+    fit_to_ends,
+    is_plain,
+    rigidities_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -75,6 +82,19 @@ def set_up(
     return NetworkDesigns(template, len(pairs), stack, places, np.array([one.base for one in each]), each, pairs)
 
 
+def make_up(network: Network) -> Any:
+    """Return what networks of one topology share: nodes, beams, joints, supports, links, springs and loads by name."""
+    nodes = [
+        (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
+    ]
+    beams = [(name, b.start, b.end, b.start_joint, b.end_joint) for name, b in network.beams.items()]
+    acting = [
+        (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
+        for one in (*network.springs, *network.loads)
+    ]
+    return nodes, beams, network.links, acting
+
+
 def _all_plain(template: Discretisation, origin: tuple[Network, Drive], pairs: Sequence[tuple[Network, Drive]]) -> bool:
     """Return True if all networks have plain beams and differ in nothing but nodes, beams and sections.
 
@@ -108,7 +128,9 @@ def _plain(
     every = [beam for each in beams for beam in each]
     shape = len(beams), len(beams[0])
     coefficients = coefficients_of(every).reshape(*shape, -1)
-    rotation, length = fit_to_ends(*chords(coefficients), reach)
+    drawn = chords(coefficients)
+    check_fits(every, np.hypot(*np.moveaxis(np.real(reach), -1, 0)).ravel(), np.hypot(*map(np.real, drawn)).ravel())
+    rotation, length = fit_to_ends(*drawn, reach)
     turned = coefficients + rotation[..., None] * (np.arange(coefficients.shape[-1]) == 0)
     rigidities = rigidities_of(every).reshape(3, *shape)
     tables = plain_tables(turned, length * scales.length, rigidities, scales, template.degree, row, e.cuts)

@@ -230,7 +230,11 @@ def _plan_row(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
 
 
 def march_many(
-    designs: NetworkDesigns, targets: FloatArray, first_step: float = 0.05, tolerance: float = 1e-9
+    designs: NetworkDesigns,
+    targets: FloatArray,
+    first_step: float = 0.05,
+    tolerance: float = 1e-9,
+    largest_turn: float = MarchPlan.largest_turn,
 ) -> tuple[FloatArray, Any]:
     """Return the efforts of many designs under a drive by a motion, each followed from rest.
 
@@ -244,6 +248,8 @@ def march_many(
         Share of the range of the drive.
     tolerance : float
         Of corrections, relative to the largest motion and force.
+    largest_turn : float
+        Change of a motion in one step [rad, or lengths of a beam].
 
     Returns
     -------
@@ -255,7 +261,7 @@ def march_many(
     own = equations(designs.template)
     goals = np.ascontiguousarray(targets, float) / designs.template.scales.drive
     span = max(float(goals.max()), 0.0) - min(float(goals.min()), 0.0)
-    plan = MarchPlan(first_step * span, span, tolerance=tolerance)
+    plan = MarchPlan(first_step * span, span, largest_turn=largest_turn, tolerance=tolerance)
     efforts, codes = np.full((designs.count, len(goals)), np.nan), np.zeros(designs.count, np.int64)
     if isinstance(own, CompiledEquations) and not own.follows:
         kept = design_arrays(own, designs)
@@ -281,7 +287,7 @@ def march_one(own: NumpyEquations, goals: FloatArray, plan: MarchPlan, efforts: 
 def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, Any]:
     """Return the arrays of a `Model` that differ from design to design, with those as first axis."""
     rule, tables, products = basis(own.network.degree), designs.tables, slope_products(own.network.degree)
-    found = {name: np.ascontiguousarray(table, float) for name, table in (tables | designs.places).items()}
+    found = tables | designs.places
     bend = tables["weight"] * tables["rigidity"]
     if designs.each:
         found["bend"] = bend @ products
@@ -290,8 +296,8 @@ def design_arrays(own: CompiledEquations, designs: NetworkDesigns) -> dict[str, 
     else:  # the same along an element, but for the weights
         found["bend"] = (bend[..., 0] / rule.weights[0])[..., None] * (rule.weights @ products)
     if designs.base is not None:
-        found["base"] = np.ascontiguousarray(designs.base, float)
-    return found
+        found["base"] = designs.base
+    return {name: np.ascontiguousarray(array, float) for name, array in found.items()}
 
 
 def _rows(own: CompiledEquations, kept: Mapping[str, Any], count: int) -> Any:

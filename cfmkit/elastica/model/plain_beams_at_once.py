@@ -59,7 +59,7 @@ class Bundle:
         distance = np.sqrt(reach[:, 0] * reach[:, 0] + reach[:, 1] * reach[:, 1])
         cx, cy = chords(c)
         own = np.sqrt(cx * cx + cy * cy)
-        self._check(distance, own)
+        check_fits(beams, distance, own)
         nominal = [beam.shape.length for beam in beams]  # type: ignore[union-attr]
         first = distance
         if any(nominal):
@@ -83,19 +83,6 @@ class Bundle:
         first, cx, cy = self.drawn
         return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
 
-    def _check(self, distance: Any, own: Any) -> None:
-        """Refuse beams without length, and shapes that return to their start."""
-        if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
-            return
-        for k, far, reach in zip(self.plain, np.real(distance), np.real(own), strict=True):
-            beam = self.beams[k]
-            if not far > 0:
-                raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
-            if not reach > 1e-9:
-                raise InputError(
-                    f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted"
-                )
-
     def fit_of(self, name: str) -> Fit | None:
         """Return the fit of a plain beam, None of another."""
         number = self.names.index(name)
@@ -105,6 +92,30 @@ class Bundle:
         shape: Any = self.beams[number].shape
         chord = self.length[k] / self.scale[k]
         return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
+
+
+def check_fits(beams: Sequence[Beam], distance: Any, own: Any) -> None:
+    """Refuse beams without length, and shapes that return to their start.
+
+    Parameters
+    ----------
+    beams : sequence of Beam
+        Plain ones.
+    distance, own : (b,) arrays
+        Between the ends of each [m], and between those of its shape, over its length [1].
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If one cannot be fitted.
+    """
+    if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
+        return
+    for beam, far, reach in zip(beams, np.real(distance), np.real(own), strict=True):
+        if not far > 0:
+            raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
+        if not reach > 1e-9:
+            raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
 
 
 def is_plain(beam: Beam) -> bool:

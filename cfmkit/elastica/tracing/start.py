@@ -48,7 +48,7 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
     Springs are tightened first and beams forced into place, then constant loads and displacements of supports are
     applied: of several stable states it is the one to which this way leads.
     """
-    problem = NetworkProblem(network, next_correction=min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance))
+    problem = NetworkProblem(network, next_correction=next_correction(control))
     events: list[Event] = []
     branch: PathBranch | None = None
     first: Buckling | None = None
@@ -83,6 +83,11 @@ def find_start(network: Discretisation, control: Control) -> DriveStart:
     if not ramps:  # at rest nothing bears anything: forces that Newton's method leaves there are rounding
         at = at._replace(x=np.zeros_like(at.x), effort=0.0)
     return DriveStart(problem, at, tuple(events), branch, first, None)
+
+
+def next_correction(control: Control) -> float:
+    """Return the next correction at which a march accepts an equilibrium."""
+    return min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance)
 
 
 def _ramps(network: Discretisation) -> Iterator[tuple[str, NetworkProblem]]:

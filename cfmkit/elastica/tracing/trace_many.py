@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.model.drive import Control
+from cfmkit.elastica.results.path import PathStatus
+from cfmkit.elastica.tracing.follow_alike import follow_alike
 from cfmkit.elastica.tracing.trace import trace
 from cfmkit.errors import CfmError
 
@@ -18,11 +21,11 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.model.drive import Control, Drive
+    from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.results.path import Path
 
-_CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that are on their way
+_CHUNK, _AHEAD = 128, 2  # networks set up at once; chunks for each process that are on their way
 
 
 @dataclass(frozen=True)
@@ -66,10 +69,13 @@ def trace_many(
 ) -> Iterator[NetworkOutcome]:
     """Yield one outcome for each network, in their order; nothing but the collected values is kept.
 
+    Networks of one topology are followed together where nothing happens on their way (`follow_alike`): their efforts
+    have the tolerance of `trace`, not its last digits.
+
     Parameters
     ----------
     networks : iterable of Network, or of functions that return one
-        Taken one by one, or as they are needed by several processes: however many there are, few are kept. Functions
+        Taken some at a time: however many there are, few are kept. Functions
         (a `functools.partial` of what builds the network, importable for several workers) are called where the network
         is traced, which leaves less to do for the process that gives out the work.
     drive : Displacement, Rotation or Loading
@@ -81,9 +87,10 @@ def trace_many(
     workers : int
         Processes to use.
     """
-    one = partial(_outcome, drive=drive, control=control, collect=collect)
+    one = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
     if workers <= 1:
-        yield from map(one, networks)
+        for chunk in _chunks(networks):
+            yield from one(chunk)
         return
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
@@ -91,7 +98,7 @@ def trace_many(
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         waiting: deque[Future[_Packed]] = deque()
         for chunk in _chunks(networks):
-            waiting.append(pool.submit(_outcomes, chunk, one))
+            waiting.append(pool.submit(_pack, chunk, one))
             if len(waiting) > _AHEAD * workers:
                 yield from waiting.popleft().result().outcomes()
         while waiting:
@@ -123,8 +130,8 @@ class _Packed:
             yield NetworkOutcome(status, message, value)
 
 
-def _outcomes(networks: list[Any], one: Callable[[Any], NetworkOutcome]) -> _Packed:
-    found = [one(network) for network in networks]
+def _pack(networks: list[Any], outcomes: Callable[[list[Any]], Iterator[NetworkOutcome]]) -> _Packed:
+    found = list(outcomes(networks))
     said, values = [(each.status, each.message) for each in found], [each.value for each in found]
     rows = [value for value in values if value is not None]
     if not rows or not all(type(row) is Requested for row in rows):
@@ -135,11 +142,43 @@ def _outcomes(networks: list[Any], one: Callable[[Any], NetworkOutcome]) -> _Pac
     return _Packed(said, lengths, (drive, effort, stable))
 
 
-def _outcome(
-    network: Network | Callable[[], Network], drive: Drive, control: Control | None, collect: Callable[[Path], Any]
-) -> NetworkOutcome:
+def _outcomes(
+    networks: list[Network | Callable[[], Network]], drive: Drive, control: Control, collect: Callable[[Path], Any]
+) -> Iterator[NetworkOutcome]:
+    """Yield the outcomes of some networks: of those that are followed together, or each by itself."""
+    built = [_build(network) for network in networks]
+    together: dict[int, FloatArray] | None = None
+    for number, network in enumerate(built):
+        if isinstance(network, NetworkOutcome):
+            yield network
+        elif together is not None and number in together:
+            efforts = together[number]
+            value = Requested(drive.points, efforts, np.ones(len(efforts), np.bool_))
+            yield NetworkOutcome(PathStatus.COMPLETE.name, PathStatus.COMPLETE.value, value)
+        else:
+            try:
+                path = trace(network, drive, control)
+            except CfmError as error:
+                yield NetworkOutcome("INVALID", str(error), None)
+                continue
+            if together is None and collect is requested:
+                together = _follow_rest(path, built, number, control)
+            yield NetworkOutcome(path.status.name, path.message, collect(path))
+
+
+def _build(network: Network | Callable[[], Network]) -> Network | NetworkOutcome:
     try:
-        path = trace(network() if callable(network) else network, drive, control)
+        return network() if callable(network) else network
     except CfmError as error:
         return NetworkOutcome("INVALID", str(error), None)
-    return NetworkOutcome(path.status.name, path.message, collect(path))
+
+
+def _follow_rest(
+    path: Path, built: list[Network | NetworkOutcome], number: int, control: Control
+) -> dict[int, FloatArray] | None:
+    """Return the efforts of the networks behind one that was traced, by their numbers; None if they are not like it."""
+    rest = {k: one for k, one in enumerate(built) if k > number and not isinstance(one, NetworkOutcome)}
+    efforts = follow_alike(path, list(rest.values()), control)
+    if efforts is None:
+        return None
+    return {k: row for k, row in zip(rest, efforts, strict=True) if np.isfinite(row).all()}

@@ -1,0 +1,125 @@
+"""Networks that differ in places, shapes and sections alone: followed together by compiled code, each with its error.
+
+One of them has been traced by itself. The others are followed with the lowest degree that serves that one, and with a
+higher one through a few values of the drive: the difference is the error of each.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.mechanics.designs import make_up, set_up
+from cfmkit.elastica.mechanics.discretise import discretise
+from cfmkit.elastica.mechanics.equations import MarchCode
+from cfmkit.elastica.mechanics.march import engine, march_many
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.elastica.model.network import apart
+from cfmkit.elastica.model.plain_beams_at_once import is_plain
+from cfmkit.elastica.results.path import PathStatus
+from cfmkit.elastica.tracing.error_estimate import DEGREES_MORE, ROUNDING, SAFETY, pick_points
+from cfmkit.elastica.tracing.start import FREE, next_correction
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.drive import Control
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.results.path import Path
+
+LOWEST_DEGREE = 4
+MARGIN = 4.0  # tolerances over the error of the network that was traced, at the degree of all
+
+
+def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> FloatArray | None:
+    """Return the efforts of networks that are like one that was traced, at all requested values of the drive.
+
+    Parameters
+    ----------
+    path : Path
+        Of the one.
+    networks : sequence of Network
+        The others.
+    control : Control
+        As the one was traced.
+
+    Returns
+    -------
+    (d, k) array or None
+        [N or N m]; not a number in rows of networks that must be traced by themselves: those of another topology, those
+        that lose their stability, or miss the tolerance. None if the one has events, or bears anything at rest.
+    """
+    if not _goes_straight_on(path, control):
+        return None
+    efforts = np.full((len(networks), len(path.given.points)), np.nan)
+    own = _same_for_all(path.net)
+    alike = [k for k, network in enumerate(networks) if _same_for_all(network) == own]
+    if alike:
+        try:
+            efforts[alike] = _follow(path, [networks[k] for k in alike], control)
+        except InputError:  # one of them cannot exist
+            return efforts
+    return efforts
+
+
+def _same_for_all(network: Network) -> Any:
+    """Return what is the same in networks that are set up together; None if this one cannot be."""
+    if not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
+        return None
+    supports = [node.support for node in network.nodes.values()]
+    arms = [apart(network, link.node) for link in network.links]
+    beams = [_kept(beam) for beam in network.beams.values()]
+    return make_up(network), supports, arms, beams, network.springs, network.loads
+
+
+def _kept(beam: Beam) -> Any:
+    """Return whether a plain beam has offsets, stretches, and gets a floor of flexibility because it is straight."""
+    shape: Any = beam.shape
+    stretches = beam.section.axial
+    return any(beam.start_offset), any(beam.end_offset), stretches, not stretches and not any(shape.coefficients[1:])
+
+
+def _goes_straight_on(path: Path, control: Control) -> bool:
+    """Tell whether a network rests before its drive, is set up without cuts, and nothing happens on its path."""
+    arrays = path.network
+    springs = [spring.item for spring in arrays.springs]
+    rests = not (path.net.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE))
+    quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
+    simple = _same_for_all(path.net) is not None and arrays.pieces == 1 and not arrays.tension
+    alone = control.imperfection or isinstance(path.given, Loading) or np.any(arrays.floored)
+    return bool(rests and quiet and simple and not alone and engine() == "C")
+
+
+def _follow(path: Path, networks: list[Network], control: Control) -> Any:
+    """Return the efforts of networks that are like that of a path."""
+    drive, points = path.given, path.given.points
+    origin, pairs = (path.net, drive), [(network, drive) for network in networks]
+
+    def efforts_at(degree: int, some: list[Any], targets: FloatArray) -> FloatArray:
+        template = discretise(*origin, degree, scales=path.network.scales, fits=path.network.fits)
+        designs = set_up(template, origin, some)
+        correction, turn = next_correction(control), control.largest_turn
+        efforts, codes = march_many(designs, targets, tolerance=correction, largest_turn=turn)
+        return np.where((codes == MarchCode.DONE)[:, None], efforts, np.nan)
+
+    highest = path.network.degree + DEGREES_MORE
+    exact = efforts_at(highest, [origin], points)[0]
+    size = np.abs(exact).max()
+    errors = ((k, np.abs(efforts_at(k, [origin], points)[0] - exact).max()) for k in range(LOWEST_DEGREE, highest))
+    degree = next((k for k, error in errors if MARGIN * error <= control.tolerance * size), highest)
+    few = np.sort(path.requested[pick_points(path, ())])
+    efforts = np.full((len(pairs), len(points)), np.nan)
+    left = np.arange(len(pairs))
+    while left.size and degree <= highest:  # a degree for all, a higher one for those that miss the tolerance
+        some = [pairs[k] for k in left]
+        coarse = efforts_at(degree, some, points)
+        finer = efforts_at(degree + DEGREES_MORE, some, points[few])
+        error = SAFETY * np.abs(finer - coarse[:, few]).max(axis=1) + ROUNDING * size
+        accurate = error <= control.tolerance * np.abs(coarse).max(axis=1)
+        efforts[left[accurate]] = coarse[accurate]
+        left, degree = left[~accurate], degree + DEGREES_MORE
+    return efforts
