@@ -126,6 +126,8 @@ def bisect(holds: Callable[[float], bool], low: float, high: float) -> float:
     """Return the place between `low`, where a condition fails, and `high`, where it holds, from which on it holds."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
         low, high = (low, middle) if holds(middle) else (middle, high)
     return high
 

@@ -1,5 +1,6 @@
 """A pool of processes: what a death costs, what a timeout costs, and that nothing hangs."""
 
+import contextlib
 import gc
 import math
 import os
@@ -190,12 +191,13 @@ def test_random_kills_neither_hang_the_pool_nor_lose_a_job(doer, kills):
         while struck < kills and not finished.is_set():
             time.sleep(chance.uniform(0.0, 0.3))
             if victims := sorted(children()):
-                os.kill(chance.choice(victims), signal.SIGKILL)
-                struck += 1
+                with contextlib.suppress(ProcessLookupError):  # one that has just ended
+                    os.kill(chance.choice(victims), signal.SIGKILL)
+                    struck += 1
 
     def source():
         number = 0
-        while struck < kills:
+        while struck < kills and hunter.is_alive():
             yield number, "ten_ms"
             number += 1
 

@@ -14,7 +14,7 @@ Assumes: a path on which the drive, or under a load the motion, does not turn ba
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from cfmkit.arrays import Several, ShortRepr, distinct, read_only
 from cfmkit.elastica.mechanics.march import equations
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.results.smooth_variable_beside_bifurcation import Corner, SmoothStretch
-from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
+from cfmkit.elastica.results.stress_between_points import inserted, stress_knots
+from cfmkit.numerics.cubic_interpolation import crossing, inner_extremes, values_at
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -34,9 +35,6 @@ FEWEST = 4  # points of a path below which nothing is said of what lies between 
 
 ROUNDS = 3
 """Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
-
-NEARLY = 0.9
-"""Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
 
 STRAY, LEAST = 0.5, 1e-3
 """How far a pose may be from its first guess, as a share of the change between the two points around it, and at least
@@ -146,14 +144,14 @@ class BetweenPoints(ShortRepr):
         x, effort = self._points, self._efforts
         if len(self.corners):
             beside = np.setdiff1d(self._beside, x)
-            x, effort = _inserted(x, effort, beside, self.effort("", beside))
+            x, effort = inserted(x, effort, beside, self.effort("", beside))
         for _ in range(ROUNDS):
             more = inner_extremes(x, effort)
             for low, _, high in self._beside.tolist():
                 more = more[(more < low) | (more > high)]
             if not len(more):
                 break
-            x, effort = _inserted(x, effort, more, self.effort("", more))
+            x, effort = inserted(x, effort, more, self.effort("", more))
         return Several((read_only(x), read_only(effort)))
 
     @cached_property
@@ -166,58 +164,25 @@ class BetweenPoints(ShortRepr):
         corners = list(self._corners.values())
         numbers = np.searchsorted([corner.drive for corner in corners], self._drive)
         names = list(self.path.net.beams)
-        at_points = np.array([self.path.beam_stress(name, self.axial)[0][self._order] for name in names])
+        at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
         at_corners = np.empty((0, len(names)))
         if corners:
             there = self.at(self.corners)
-            at_corners = np.array([there.beam_stress(name, self.axial)[0] for name in names]).T
+            at_corners = there.beam_stresses(self.axial)[0].T
         found = []
         for number in range(len(corners) + 1):
             low, high = (corners[k] if 0 <= k < len(corners) else None for k in (number - 1, number))
             stretch, own = SmoothStretch(low, high), numbers == number
             ends = None if low is None else at_corners[number - 1], None if high is None else at_corners[number]
             x, rows = stretch.with_ends(self._drive[own], at_points[:, own].T, *ends)
-            found.append((stretch, self._with_tops(stretch, x, rows.T)))
+            solve = partial(self._solved_stress, stretch)
+            found.append((stretch, stress_knots(stretch.smooth(x), rows.T, solve, self.allowed)))
         return tuple(found)
 
-    def _with_tops(
-        self, stretch: SmoothStretch, x: FloatArray, rows: FloatArray
-    ) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """Return smooth variables and stresses of each beam on a stretch, with the places that are solved for."""
-        t, largest, found = stretch.smooth(x), rows.max(axis=0), []
-        for name, row in zip(self.path.net.beams, rows, strict=True):
-            own, values = t, row
-            for _ in range(ROUNDS):
-                top = inner_extremes(own, values)
-                beside = np.searchsorted(own, top)
-                more = top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
-                if not len(more):
-                    break
-                own, values = _inserted(own, values, more, self._stress_at(name, stretch, more, own, values))
-            found.append(self._with_passes(name, stretch, own, values))
-        return tuple(found)
-
-    def _with_passes(
-        self, name: str, stretch: SmoothStretch, t: FloatArray, row: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the same with the places where the stress of a beam passes the allowable one.
-
-        The last of some rounds only: knots that nearly coincide spoil a cubic.
-        """
-        own, values = t, row
-        for _ in range(ROUNDS if self.allowed is not None else 0):
-            passed = np.array(sorted({*crossings(own, values, self.allowed or 0.0)} - {*t.tolist()}))
-            if not len(passed):
-                break
-            own, values = _inserted(t, row, passed, self._stress_at(name, stretch, passed, own, values))
-        return own, values
-
-    def _stress_at(
-        self, name: str, stretch: SmoothStretch, places: FloatArray, t: FloatArray, row: FloatArray
-    ) -> FloatArray:
-        """Return the stress of a beam at places of a stretch [Pa]: solved, or on the cubic where that fails."""
-        there = self.at(self._scale * stretch.drive(places))
-        return np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(t, row, places))
+    def _solved_stress(self, stretch: SmoothStretch, t: FloatArray) -> tuple[FloatArray, Any]:
+        """Return the stress of each beam where the smooth variable has some values, and where it was solved."""
+        there = self.at(self._scale * stretch.drive(t))
+        return there.beam_stresses(self.axial)[0], there.accurate
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
@@ -246,11 +211,21 @@ class BetweenPoints(ShortRepr):
             largest[own] = np.max([values_at(x, stress, t) for x, stress in beams], axis=0)
         return np.asarray(largest.reshape(np.shape(places)))
 
+    def stress_reaches(self, level: float, sense: float = 1.0) -> float | None:
+        """Return the first place, in the sense of travel (1 or -1), at which a beam's stress is a level [m or rad]."""
+        stretches = self._stresses if sense > 0 else self._stresses[::-1]
+        for stretch, beams in stretches:
+            found = [crossing(*(pair if sense > 0 else (-pair[0][::-1], pair[1][::-1])), level) for pair in beams]
+            if reached := [sense * place for place in found if place is not None]:
+                places = self._scale * stretch.drive(np.array(reached))
+                return float(sense * (sense * places).min())
+        return None
+
     def largest_stress(self, branch: str, low: float, high: float, /) -> float:
         """Return the largest stress in a window [Pa]."""
         scale, ends = self._scale, np.array([low, high])
         there = self.at(ends)
-        solved = np.max([there.beam_stress(name, self.axial)[0] for name in self.path.net.beams], axis=0)
+        solved = there.beam_stresses(self.axial)[0].max(axis=0)
         known = self.stress(branch, ends)
         tops = [
             values[(places >= low) & (places <= high)]
@@ -492,9 +467,3 @@ def between_loads(
     if not row.any() or np.ptp(rest) > least or not ((steps > least).all() or (steps < -least).all()):
         return None
     return BetweenLoads(path, unit, axial, allowed, read_only(row), scale, float(rest.mean()))
-
-
-def _inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return increasing places with some more among them, and their values."""
-    at = np.searchsorted(x, places)
-    return np.insert(x, at, places), np.insert(y, at, values)

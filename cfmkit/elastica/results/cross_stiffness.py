@@ -49,10 +49,9 @@ def cross_stiffness(path: EquilibriumPath, node: str, direction: float, points: 
     (p,) array
         Negative where the node would leave sideways; nan where nothing gives way.
     """
-    chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
+    chosen = slice(None) if points is None else np.asarray(points, dtype=np.int64)
     scales = path.network.scales
-    found = [_condensed(*blocks) for blocks in _blocks(path, node, direction, chosen)]
-    return read_only(np.array(found) * scales.force / scales.length)
+    return read_only(_condensed_along(path, node, direction)[0][chosen] * scales.force / scales.length)
 
 
 def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool_]:
@@ -61,15 +60,28 @@ def poles(path: EquilibriumPath, node: str, direction: float) -> NDArray[np.bool
     It is the quotient of two determinants, of which that of the held node is below: where only the latter changes its
     sign, one mode of the part with its node held across passes neutral stability, and the stiffness has a pole.
     """
-    blocks = list(_blocks(path, node, direction, np.arange(len(path))))
-    held = np.array([np.linalg.slogdet(kept)[0] for _, _, kept in blocks])
-    value = np.array([_condensed(*each) for each in blocks])
+    value, held = _condensed_along(path, node, direction)
     return np.asarray((held[1:] * held[:-1] < 0) & (value[1:] * value[:-1] < 0))
 
 
-def _blocks(
-    path: EquilibriumPath, node: str, direction: float, chosen: Any
-) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+def _condensed_along(path: EquilibriumPath, node: str, direction: float) -> tuple[FloatArray, FloatArray]:
+    """Return the dimensionless stiffness at every point, and the sign of the determinant of all that follows, (p,)."""
+    known = path.condensed
+    if (node, direction) not in known:
+        across, coupled, kept = (np.array(each) for each in zip(*_blocks(path, node, direction), strict=True))
+        row, column = coupled[:, 0], coupled[:, 1]
+        value = np.full(len(across), np.nan)
+        with contextlib.suppress(np.linalg.LinAlgError):
+            follow = np.linalg.solve(kept, column[..., None])[..., 0]
+            plain = np.abs(follow).max(axis=1, initial=0.0) < LARGEST
+            value[plain] = (across - (row * follow).sum(axis=1))[plain]
+        for k in np.flatnonzero(np.isnan(value)):
+            value[k] = _condensed(float(across[k]), coupled[k], kept[k])
+        known[node, direction] = value, np.linalg.slogdet(kept)[0]
+    return known[node, direction]
+
+
+def _blocks(path: EquilibriumPath, node: str, direction: float) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield the stiffness across, its coupling (2, k) to what follows, by row and by column, and that of those (k, k).
 
     The network is the same but for the node, whose axes are turned along the direction and which nothing guides.
@@ -85,8 +97,8 @@ def _blocks(
     cos, sin = frame[place][0] @ old, old[0] * frame[place][0][1] - old[1] * frame[place][0][0]
     kept = network.free[(network.free != x) & (network.free != y)]
     own = equations(loose)
-    for k in chosen.tolist():
-        z = path.at.z[k].copy()
+    for k, state in enumerate(path.at.z):
+        z = state.copy()
         z[x], z[y] = cos * z[x] + sin * z[y], cos * z[y] - sin * z[x]
         _, hessian = own.evaluate(z, float(path.at.drive[k]))
         yield hessian[y, y], np.stack([hessian[y, kept], hessian[kept, y]]), hessian[np.ix_(kept, kept)]

@@ -263,15 +263,28 @@ class EquilibriumPath(ShortRepr):
     # -- stresses ----------------------------------------------------------------------------------------------------
     def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
         """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
-        known = self._beam_stresses.get((beam, axial))
-        if known is None:
-            value, place = stress_extremes.largest_stress(self.net, self.at, beam, axial)
-            known = self._beam_stresses[beam, axial] = read_only(value), read_only(place)
-        return known
+        known = self._beam_stresses.get(axial)
+        if known is not None:
+            number = list(self.net.beams).index(beam)
+            return known[0][number], known[1][number]
+        value, place = stress_extremes.largest_stresses(self.net, self.at, [beam], axial)
+        return value[0], place[0]
+
+    def beam_stresses(self, axial: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Return the largest stress of each of b beams at every point, (b, n) [Pa], and its place."""
+        if axial not in self._beam_stresses:
+            found = stress_extremes.largest_stresses(self.net, self.at, list(self.net.beams), axial)
+            self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])
+        return self._beam_stresses[axial]
 
     @cached_property
-    def _beam_stresses(self) -> dict[tuple[str, bool], tuple[FloatArray, FloatArray]]:
-        """Result of `beam_stress`, of which curves, metrics between their points and findings are made."""
+    def _beam_stresses(self) -> dict[bool, tuple[FloatArray, FloatArray]]:
+        """Results of `beam_stresses`, of which curves, metrics between their points and findings are made."""
+        return {}
+
+    @cached_property
+    def condensed(self) -> dict[tuple[str, float], tuple[FloatArray, FloatArray]]:
+        """Results of `cfmkit.elastica.results.cross_stiffness`, which asks for poles and values."""
         return {}
 
     def stress_extremes(self, beam: str, axial: bool = True) -> stress_extremes.SideExtremes:
@@ -281,8 +294,7 @@ class EquilibriumPath(ShortRepr):
     def peak_stress(self, axial: bool = True) -> StressPeak:
         """Return the largest stress of the network at every point, with its place; see `most_stressed`."""
         names = list(self.net.beams)
-        found = [self.beam_stress(name, axial) for name in names]
-        values, places = (np.array(column) for column in zip(*found, strict=True))
+        values, places = self.beam_stresses(axial)
         best, pick = most_stressed(values, places), np.arange(len(self))
         return StressPeak(
             read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])

@@ -1,30 +1,35 @@
 """Where the stress along a beam is largest: the extreme of the polynomial through places of each element.
 
 On an element the bending moment is a polynomial and the normal force as smooth as its rotation, so that a polynomial
-through as many places as the element resolves has the stress to the element's own accuracy; its extreme is found on
-grids that become finer, not sampled.
+through as many places as the element resolves has the stress to the element's own accuracy; its extreme is found by
+Newton's method from the highest place of a grid. All elements of some beams are looked at together.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from cfmkit.elastica.results.beam_states import elements_of, sections, states_of_elements
+from cfmkit.elastica.results.beam_states import elements_of, sections, sections_of_width, states_of_elements
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.mechanics.design_derivatives import Equilibria
     from cfmkit.elastica.model.network import Network
 
 N_MORE_PLACES = 8
 """Places on an element more than the degree of its rotation: sines of the angle, and tapers, are no polynomials."""
-N_GRID, N_ZOOMS = 49, 5
-"""Places of a grid between two ends, and how often the neighbours of its highest place become the ends of the next: the
-last grid is (2/48)^5 of an element wide, where a parabola's top is known to rounding."""
+N_GRID = 49
+"""Places of a grid on an element: the extreme lies between the neighbours of the highest one."""
+MAX_STEPS = 10  # of Newton's method, or halvings where it leaves the neighbours
+MAX_TOGETHER = 1_000_000  # numbers on the grids of some points: 8 MB
+ROUNDING = 4 * np.finfo(float).eps  # share by which a value is higher than another one
 AT_END = 1e-14  # fraction of an element within which a place is its end
 TIED = 1e-9  # share by which one element's stress must be higher than that of the one before it
 
@@ -49,78 +54,105 @@ def places(count: int) -> tuple[tuple[float, ...], Any]:
     return tuple(((1 + x) / 2).tolist()), np.linalg.inv(legendre.legvander(x, count - 1))
 
 
-def extremes(net: Network, at: Equilibria, beam: str, signs: FloatArray) -> tuple[Any, Any, Any, Any]:
-    """Return the highest combinations of bending and axial stress along a beam.
+def extremes(net: Network, at: Equilibria, beams: Sequence[str], signs: FloatArray) -> tuple[Any, Any, Any, Any]:
+    """Return the highest combinations of bending and axial stress along some beams.
 
     Parameters
     ----------
-    net, at, beam : Network, Equilibria, str
+    net, at : Network, Equilibria
         As of `states`.
+    beams : sequence of str
+        Their names, b.
     signs : (c, 2) array
         What bending and axial stress count for, in each of c combinations.
 
     Returns
     -------
-    value, place, element, fraction : (p, c) arrays
+    value, place, element, fraction : (b, p, c) arrays
         [Pa]; fraction of the arc length; number of the element on the beam, and place on it.
     """
+    own = [elements_of(at.network, beam) for beam in beams]
+    elements = [number for numbers in own for number in numbers]
+    together = max(1, MAX_TOGETHER // max(1, len(elements) * len(signs) * N_GRID))
+    parts = [
+        _on_elements(net, replace(at, z=at.z[k : k + together], drive=at.drive[k : k + together]), elements, signs)
+        for k in range(0, max(1, len(at.z)), together)
+    ]
+    value, place, fraction = (np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
+    shape, end = (len(beams), *value.shape[1:]), 0
+    best, chosen = np.full(shape, -np.inf), np.zeros(shape, int)
+    arc, where = np.zeros(shape), np.zeros(shape)
+    for k, numbers in enumerate(own):
+        for number in range(len(numbers)):
+            better = value[end] > np.where(best[k] > 0, best[k] * (1 + TIED), best[k])
+            best[k], chosen[k] = np.where(better, value[end], best[k]), np.where(better, number, chosen[k])
+            arc[k], where[k] = np.where(better, place[end], arc[k]), np.where(better, fraction[end], where[k])
+            end += 1
+    return best, np.clip(arc, 0.0, 1.0), chosen, where
+
+
+def _on_elements(net: Network, at: Equilibria, elements: list[int], signs: FloatArray) -> tuple[Any, Any, Any]:
+    """Return the highest stresses on each of m elements, places on their beams and on them, (m, p, c) each."""
     fractions, to_series = places(at.network.degree + N_MORE_PLACES)
-    shape = (len(at.z), len(signs))
-    best, place, chosen, where = np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape, int), np.zeros(shape)
-    for number, element in enumerate(elements_of(at.network, beam)):
-        found = states_of_elements(net, at, [element], fractions)
-        seen = sections(net, beam, found)
-        both = np.stack([seen.bending_stress, seen.axial_stress])
-        series = np.einsum("cs,spk->pck", signs, both) @ to_series.T
-        top, fraction = _top(series)
-        inner = legendre.legval(2 * fraction - 1, to_series @ found.place)
-        arc = np.where(fraction < AT_END, found.place[0], np.where(fraction > 1 - AT_END, found.place[-1], inner))
-        better = top > np.where(best > 0, best * (1 + TIED), best)
-        best, place = np.where(better, top, best), np.where(better, arc, place)
-        chosen, where = np.where(better, number, chosen), np.where(better, fraction, where)
-    return best, np.clip(place, 0.0, 1.0), chosen, where
+    widths = np.array([net.beams[at.network.elements.beam[number]].section.width for number in elements])
+    found = states_of_elements(net, at, elements, fractions)
+    seen = sections_of_width(np.repeat(widths, len(fractions)), found)
+    both = np.array([seen.bending_stress, seen.axial_stress]).reshape(2, len(at.z), len(elements), len(fractions))
+    series = np.einsum("cs,spmk->mpck", signs, both) @ to_series.T
+    top, x = _top(series)
+    arcs = found.place.reshape(len(elements), len(fractions))
+    inner = np.einsum("mpck,mk->mpc", legendre.legvander(x, len(fractions) - 1), arcs @ to_series.T)
+    fraction, first, last = (1 + x) / 2, arcs[:, :1, None], arcs[:, -1:, None]
+    place = np.where(fraction < AT_END, first, np.where(fraction > 1 - AT_END, last, inner))
+    return top, place, fraction
+
+
+@lru_cache(maxsize=32)
+def _polynomials(count: int) -> tuple[Any, Any]:
+    """Return Legendre polynomials at places of the grid, (grid, count), and the matrix to the series of the slope."""
+    table = legendre.legvander(np.linspace(-1.0, 1.0, N_GRID), count - 1)
+    return table, np.pad(legendre.legder(np.eye(count)), ((0, 1), (0, 0)))
 
 
 def _top(series: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest values of Legendre series (p, c, k) on [0, 1], (p, c), and where they are."""
-    low, high = np.full(series.shape[:-1], -1.0), np.full(series.shape[:-1], 1.0)
-    steps = np.linspace(0.0, 1.0, N_GRID)
-    first = series @ legendre.legvander(2 * steps - 1, series.shape[-1] - 1).T
-    values, grid = first, np.broadcast_to(2 * steps - 1, first.shape)
-    for zoom in range(N_ZOOMS):
-        if zoom:
-            grid = low[..., None] + (high - low)[..., None] * steps
-            values = _evaluate(series, grid)
-        at = values.argmax(axis=-1)[..., None]
-        top = np.take_along_axis(values, at, -1)[..., 0]
-        low = np.take_along_axis(grid, np.maximum(at - 1, 0), -1)[..., 0]
-        high = np.take_along_axis(grid, np.minimum(at + 1, N_GRID - 1), -1)[..., 0]
-        middle = np.take_along_axis(grid, at, -1)[..., 0]
-    return top, (1 + middle) / 2
-
-
-def _evaluate(series: FloatArray, grid: FloatArray) -> FloatArray:
-    """Return Legendre series (..., k) at places (..., m) of their own, by Clenshaw's recurrence."""
-    ahead, last = np.zeros_like(grid), np.zeros_like(grid)
-    for k in range(series.shape[-1] - 1, 0, -1):
-        ahead, last = series[..., k, None] + (2 * k + 1) / (k + 1) * grid * ahead - (k + 1) / (k + 2) * last, ahead
-    return np.asarray(series[..., 0, None] + grid * ahead - 0.5 * last)
+    """Return the largest values of Legendre series (..., k) on [-1, 1], (...), and where they are."""
+    count, grid = series.shape[-1], np.linspace(-1.0, 1.0, N_GRID)
+    table, slopes = _polynomials(count)
+    values = series @ table.T
+    at = values.argmax(axis=-1)
+    top = np.take_along_axis(values, at[..., None], -1)[..., 0]
+    place, low, high = grid[at], grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, N_GRID - 1)]
+    by_order = np.stack([series, series @ slopes.T, series @ (slopes @ slopes).T], axis=-2)
+    x, polynomials = place, table[at]
+    for number in range(MAX_STEPS):
+        value, slope, curvature = np.moveaxis(np.matmul(by_order, polynomials[..., None])[..., 0], -1, 0)
+        low, high = np.where(slope > 0, x, low), np.where(slope < 0, x, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = x - slope / curvature
+        follows = (curvature < 0) & (newton >= low) & (newton <= high)
+        step = np.where(follows, newton, 0.5 * (low + high)) - x
+        if number == MAX_STEPS - 1 or (np.abs(slope * step) <= ROUNDING * np.abs(top)).all():
+            break
+        x = x + step
+        polynomials = legendre.legvander(x, count - 1)
+    higher = value > top + ROUNDING * np.abs(top)
+    return np.where(higher, value, top), np.where(higher, x, place)
 
 
 def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> SideExtremes:
     """Return the highest and lowest stress on both sides of a beam at every point."""
     sense = np.array([1.0, -1.0, 1.0, -1.0])  # of highest and lowest
     signs = np.stack([sense * [1.0, 1.0, -1.0, -1.0], sense * float(axial)], axis=1)
-    value, place, element, fraction = extremes(net, at, beam, signs)
+    value, place, element, fraction = (found[0] for found in extremes(net, at, [beam], signs))
     return SideExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, element, fraction)))
 
 
-def largest_stress(net: Network, at: Equilibria, beam: str, axial: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the largest stress of a beam at every point [Pa], and its place as a fraction of the arc length."""
+def largest_stresses(net: Network, at: Equilibria, beams: Sequence[str], axial: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the largest stress of each of b beams at every point, (b, p) [Pa], and its place on the arc length."""
     signs = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] if axial else [(1.0, 0.0), (-1.0, 0.0)]
-    value, place, _, _ = extremes(net, at, beam, np.array(signs))
-    best = value.argmax(axis=1)[:, None]
-    return np.take_along_axis(value, best, 1)[:, 0], np.take_along_axis(place, best, 1)[:, 0]
+    value, place, _, _ = extremes(net, at, beams, np.array(signs))
+    best = value.argmax(axis=-1)[..., None]
+    return np.take_along_axis(value, best, -1)[..., 0], np.take_along_axis(place, best, -1)[..., 0]
 
 
 def stress_at(net: Network, at: Equilibria, beam: str, element: Any, fraction: Any, axial: bool) -> Any:

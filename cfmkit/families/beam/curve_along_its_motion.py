@@ -96,6 +96,12 @@ class AlongMotion:
         assert self.solution.everywhere is not None
         return self.solution.everywhere.stress("", self.sense * places)
 
+    def stress_reaches(self, level: float) -> float | None:
+        """Return where the largest stress first reaches a level, by the model between the points [m or rad]."""
+        assert self.solution.everywhere is not None
+        found = self.solution.everywhere.stress_reaches(level, self.sense)
+        return None if found is None else self.sense * found
+
     def back(self, value: float | None) -> float | None:
         """Return a place or a force as the specification has it."""
         return value if value is None or self.sense > 0 else 0.0 - value  # not -0

@@ -350,13 +350,14 @@ def _imperfection(solution: Solution) -> Iterator[Finding]:
 def _stress(solution: Solution) -> Iterator[Finding]:
     """Say where the stress in the window is too large, between points, too; of the beams whose strength is known."""
     known = known_allowable_stresses(solution.spec)
-    names = [name for name in solution.path.net.beams if name.split(".")[0] in known]
+    beams = list(solution.path.net.beams)
+    names = [name for name in beams if name.split(".")[0] in known]
     if not names or len(solution.keep) < 2:
         return
     allowable, axial, window = min(known.values()), solution.spec.stress == "total", window_of(solution)
 
     def stresses(path: Path) -> FloatArray:
-        return np.array([path.beam_stress(name, axial)[0] for name in names])
+        return path.beam_stresses(axial)[0][[beams.index(name) for name in names]]
 
     worst = largest(solution, stresses, window)
     if worst is None or worst <= allowable:

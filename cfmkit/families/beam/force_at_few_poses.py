@@ -50,8 +50,8 @@ def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
         return None
     assembly, path, at = found
     axial = spec.stress == "total"
-    stress = [path.beam_stress(name, axial)[0][at] for name in path.net.beams]
-    return Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress))
+    stress = path.beam_stresses(axial)[0][:, at]
+    return Sampled({"load": assembly.effort_unit * path.effort[at]}, stress)
 
 
 def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> SampledSlopes | None:

@@ -162,14 +162,7 @@ def _stress_reaches(along: AlongMotion, allowable: float) -> float | None:
     if along.solution.everywhere is None:
         found = [crossing(along.motion, value, allowable) for value, _ in along.solution.stresses.values()]
         return min((place for place in found if place is not None), default=None)
-    x = along.knots[0]
-    reached = np.flatnonzero(along.stress_at(x) >= allowable)
-    if not len(reached) or reached[0] == 0:
-        return float(x[0]) if len(reached) else None
-    first = int(reached[0])
-    return bisect(
-        lambda place: along.stress_at(np.array([place]))[0] >= allowable, float(x[first - 1]), float(x[first])
-    )
+    return along.stress_reaches(allowable)
 
 
 _ROUNDS = 4
@@ -235,10 +228,9 @@ def _across(solution: Solution) -> dict[str, float | None]:
     Of drives that turn it, only the stress.
     """
     drive, window, node = solution.spec.mechanism.drive, window_of(solution), solution.assembly.driven
-    names = list(solution.path.net.beams)
 
     def stresses(path: Path) -> FloatArray:
-        return np.array([path.beam_stress(name, True)[0] for name in names])
+        return path.beam_stresses()[0]
 
     total = {"stress_total_max": largest(solution, stresses, window)}
     if drive.kind not in ("displacement", "force", "loads"):

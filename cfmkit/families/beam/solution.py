@@ -156,8 +156,8 @@ class Solution(ShortRepr):
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
         axial, keep = self.spec.stress == "total", self.keep
-        found = {name: self.path.beam_stress(name, axial) for name in self.path.net.beams}
-        return Named({name: Several((value[keep], place[keep])) for name, (value, place) in found.items()})
+        rows = zip(self.path.net.beams, *self.path.beam_stresses(axial), strict=True)
+        return Named({name: Several((value[keep], place[keep])) for name, value, place in rows})
 
     @cached_property
     def stress(self) -> FloatArray:

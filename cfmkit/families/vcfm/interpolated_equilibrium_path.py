@@ -282,7 +282,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
     kept = np.flatnonzero(np.asarray(path.accurate) & (size > farthest + 1e-15))
     if not len(kept):
         return PathPoints(*(np.empty(0, kind) for kind in (float, float, float, bool, bool)))
-    stress = np.max([path.beam_stress(name)[0] for name in path.net.beams], axis=0)
+    stress = path.beam_stresses()[0].max(axis=0)
     buckled = np.char.startswith(np.asarray(path.branch).astype(str), "bifurcated")
     return PathPoints(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 

@@ -1,0 +1,95 @@
+"""Knots of the stress of each beam between the points of a path: its extremes, and where it passes a limit.
+
+They are solved for: a cubic through the points alone has errors where the stress of a beam turns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.numerics.cubic_interpolation import crossings, inner_extremes, values_at
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+
+    Knots = tuple[FloatArray, FloatArray]  # places, increasing, and stresses of one beam
+
+ROUNDS = 3
+"""Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
+
+NEARLY = 0.9
+"""Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
+
+
+def stress_knots(
+    t: FloatArray, rows: FloatArray, solve: Callable[[FloatArray], tuple[FloatArray, Any]], allowed: float | None
+) -> tuple[Knots, ...]:
+    """Return places and stresses of each beam, with extremes that may be the largest, and where a stress is allowed.
+
+    The latter are those of the last of some rounds only: knots that nearly coincide spoil a cubic.
+
+    Parameters
+    ----------
+    t, rows : (n,), (b, n) arrays
+        Places of points, increasing, and the stress of each of b beams there [Pa].
+    solve : callable
+        From places (m,) to stresses (b, m) and whether they were found, (m,).
+    allowed : float or None
+        Stress whose passes are solved for [Pa].
+    """
+    largest = rows.max(axis=0)
+    found = [(t, row) for row in rows]
+    for _ in range(ROUNDS):
+        more = [_tops(knots, t, largest) for knots in found]
+        if not any(map(len, more)):
+            break
+        found = _solved(solve, found, found, more)
+    before = found
+    for _ in range(ROUNDS if allowed is not None else 0):
+        more = [_passes(knots, allowed or 0.0, t) for knots in found]
+        if not any(map(len, more)):
+            break
+        found = _solved(solve, found, before, more)
+    return tuple(found)
+
+
+def _tops(knots: Knots, t: FloatArray, largest: FloatArray) -> FloatArray:
+    """Return where the stress of a beam has an extreme that may be the largest of all."""
+    own, values = knots
+    top = inner_extremes(own, values)
+    beside = np.searchsorted(own, top)
+    return top[np.maximum(values[beside - 1], values[beside]) >= NEARLY * np.interp(top, t, largest)]
+
+
+def _passes(knots: Knots, allowed: float, known: FloatArray) -> FloatArray:
+    """Return where the stress of a beam passes the allowable one, but for known places."""
+    return np.array(sorted({*crossings(*knots, allowed)} - {*known.tolist()}))
+
+
+def _solved(
+    solve: Callable[[FloatArray], tuple[FloatArray, Any]],
+    cubics: list[Knots],
+    knots: list[Knots],
+    more: list[FloatArray],
+) -> list[Knots]:
+    """Return the knots of each beam with more places: stresses there are solved, or on its cubic where that fails."""
+    stresses, accurate = solve(np.concatenate(more))
+    found: list[Knots] = []
+    end = 0
+    for own, cubic, places, row in zip(knots, cubics, more, stresses, strict=True):
+        mine = slice(end, end := end + len(places))
+        stress = row[mine]
+        if not accurate[mine].all():
+            stress = np.where(accurate[mine], stress, values_at(*cubic, places))
+        found.append(inserted(*own, places, stress) if len(places) else cubic)
+    return found
+
+
+def inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> Knots:
+    """Return increasing places with some more among them, and their values."""
+    at = np.searchsorted(x, places)
+    return np.insert(x, at, places), np.insert(y, at, values)
