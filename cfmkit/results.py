@@ -133,7 +133,7 @@ class Quantity:
 
     @property
     def word(self) -> str | None:
-        """The word that the value stands for; None where it stands for none."""
+        """The word that the value stands for; None if it stands for none."""
         return None if self.value is None or not self.words else self.words[int(self.value)]
 
 
@@ -150,24 +150,13 @@ def quantities(definitions: Mapping[str, tuple[str, str]], numbers: Mapping[str,
 
 @dataclass(frozen=True)
 class Searched:
-    """A number that only a design search knows, with the model and the window that it is of.
+    """A number that only a design search knows, with the model and the window that it is of."""
 
-    Attributes
-    ----------
-    quantity : Quantity
-        Its definition says in words of its own what it is: it never poses as a metric.
-    model : str
-        The model that was solved, as ``analysis.fidelity`` names it.
-    window : (float, float) or None
-        Between which ends of the motion it holds [m or rad]; None where there is no window to it.
-    motion : str
-        Dimension of the window: "length" or "angle".
-    """
-
-    quantity: Quantity
-    model: str
+    quantity: Quantity  # its definition says in words of its own what it is: it never poses as a metric
+    model: str  # the model that was solved, as ``analysis.fidelity`` names it
+    # between which ends of the motion it holds [m or rad]; None if there is no window to it
     window: tuple[float, float] | None = None
-    motion: str = "length"
+    motion: str = "length"  # dimension of the window: "length" or "angle"
 
 
 class ClosedForm(Protocol):

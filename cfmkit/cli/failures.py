@@ -25,17 +25,11 @@ ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
 class Stopped(StoppedBySignal):
-    """A signal asked the command to end: its exit code, and what is said of what it has finished.
+    """A signal asked the command to end: its exit code, and what is said of what it has finished."""
 
-    Attributes
-    ----------
-    began : bool
-        Whether the command has opened a journal, in which it keeps what it has finished; the same for all signals.
-    last : Stopped or None
-        The signal that came; libraries that are not written in Python make other exceptions of the one it raises.
-    """
-
+    # whether the command has opened a journal, in which it keeps what it has finished; the same for all signals
     began: ClassVar[bool] = False
+    # the signal that came; libraries that are not written in Python make other exceptions of the one it raises
     last: ClassVar[Stopped | None] = None
 
     def __init__(self, number: int) -> None:

@@ -40,22 +40,13 @@ LEAST_GAP = 2
 
 @dataclass(frozen=True)
 class Terminal:
-    """What is known about the user's wishes for output.
+    """What is known about the user's wishes for output."""
 
-    Attributes
-    ----------
-    arguments : tuple of str
-        The command line, without the program's name.
-    json, quiet : bool
-        Whether results are a JSON document, or not shown.
-    verbose : int
-        How often ``-v`` was given.
-    """
-
-    arguments: tuple[str, ...] = ()
+    arguments: tuple[str, ...] = ()  # the command line, without the program's name
+    # json, quiet: whether results are a JSON document, or not shown
     json: bool = False
     quiet: bool = False
-    verbose: int = 0
+    verbose: int = 0  # how often ``-v`` was given
 
     @classmethod
     def guess(cls, arguments: Sequence[str]) -> Terminal:

@@ -39,24 +39,12 @@ class Span(NamedTuple):
 
 
 class TextLine(NamedTuple):
-    """One line of text.
+    """One line of text."""
 
-    Attributes
-    ----------
-    spans : tuple of Span
-        From left to right.
-    right : str
-        What stands at its far end.
-    droppable : bool
-        Whether `right` goes where there is no room for it.
-    whole : bool
-        Whether it keeps its length where the terminal is narrower: paths and commands are copied.
-    """
-
-    spans: tuple[Span, ...] = ()
-    right: str = ""
-    droppable: bool = False
-    whole: bool = False
+    spans: tuple[Span, ...] = ()  # from left to right
+    right: str = ""  # what stands at its far end
+    droppable: bool = False  # whether `right` goes where there is no room for it
+    whole: bool = False  # whether it keeps its length where the terminal is narrower: paths and commands are copied
 
 
 BLANK = TextLine()
@@ -78,23 +66,12 @@ class GridColumn(NamedTuple):
 
 
 class CellGrid(NamedTuple):
-    """Cells in columns, without lines between them.
+    """Cells in columns, without lines between them."""
 
-    Attributes
-    ----------
-    columns : tuple of GridColumn
-        Heads are shown if one of them is not empty.
-    rows : sequence of sequences of str or Span
-        From the top down.
-    gap : int
-        Blanks between columns.
-    indented : bool
-        Whether the whole table stands in from the margin; else the cells of the first column see to that.
-    """
-
-    columns: tuple[GridColumn, ...]
-    rows: Sequence[Sequence[str | Span]]
-    gap: int = 3
+    columns: tuple[GridColumn, ...]  # heads are shown if one of them is not empty
+    rows: Sequence[Sequence[str | Span]]  # from the top down
+    gap: int = 3  # blanks between columns
+    # whether the whole table stands in from the margin; else the cells of the first column see to that
     indented: bool = False
 
 

@@ -35,21 +35,13 @@ class Desk:
 
 @dataclass(frozen=True)
 class Made:
-    """What a study was made from, for its manifest.
+    """What a study was made from, for its manifest."""
 
-    Attributes
-    ----------
-    command, source : str
-        The verb, and the specification as it was named.
-    spec : Spec
-        What it said.
-    seed, points : int
-        Of everything random, and how many points there are.
-    """
-
+    # command, source: the verb, and the specification as it was named
     command: str
     source: str
-    spec: Spec
+    spec: Spec  # what it said
+    # seed, points: of everything random, and how many points there are
     seed: int
     points: int
 

@@ -15,30 +15,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Answer:
-    """The outcome of one command.
+    """The outcome of one command."""
 
-    Attributes
-    ----------
-    data : mapping
-        More of the JSON document than the envelope has; values for its keys replace them.
-    page : iterable of Block
-        What a terminal shows; not looked at under ``--json`` and ``-q``, so it may be computed as it is read.
-    exit_code : ExitCode
-        Of the process.
-    complaints : tuple of str
-        Lines for standard error, whatever the options.
-    quiet_complaints : tuple of str
-        More of them where the page is not shown.
-    errors : tuple of mapping
-        The same for the JSON document.
-    """
-
+    # more of the JSON document than the envelope has; values for its keys replace them
     data: Mapping[str, Any] = field(default_factory=dict)
+    # what a terminal shows; not looked at under ``--json`` and ``-q``, so it may be computed as it is read
     page: Iterable[Block] = ()
-    exit_code: ExitCode = ExitCode.OK
-    complaints: tuple[str, ...] = ()
-    quiet_complaints: tuple[str, ...] = ()
-    errors: tuple[Mapping[str, Any], ...] = ()
+    exit_code: ExitCode = ExitCode.OK  # of the process
+    complaints: tuple[str, ...] = ()  # lines for standard error, whatever the options
+    quiet_complaints: tuple[str, ...] = ()  # more of them where the page is not shown
+    errors: tuple[Mapping[str, Any], ...] = ()  # the same for the JSON document
 
 
 def reported_for(skipped: Sequence[str], answer: Answer) -> Answer:

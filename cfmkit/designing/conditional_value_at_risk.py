@@ -36,7 +36,7 @@ def tail_risk(parts: FloatArray, share: float) -> float:
 def best_move(
     parts: FloatArray, slopes: NDArray[np.float64], share: float, bounds: FloatArray, x: FloatArray, trust: float
 ) -> FloatArray | None:
-    """Return the move of the values (n,) that lowers the risk most within the trust; None where there is none.
+    """Return the move of the values (n,) that lowers the risk most within the trust; None if there is none.
 
     Parameters
     ----------

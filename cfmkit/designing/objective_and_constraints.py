@@ -23,24 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LimitRows:
-    """Some rows of one limit; each must be at least zero, all are of order one.
+    """Some rows of one limit; each must be at least zero, all are of order one."""
 
-    Attributes
-    ----------
-    name : str
-        The limit.
-    values : (m,) array
-        By how much it holds.
-    slopes : (m, k) array or None
-        Derivatives by the first k variables, if they were requested; by all others they are zero.
-    about : callable
-        Returns what each row is about.
-    """
-
-    name: str
-    values: FloatArray
-    slopes: FloatArray | None = None
-    about: Callable[[], list[str]] = list  # nothing: no report speaks of these rows
+    name: str  # the limit
+    values: FloatArray  # (m,) by how much it holds
+    slopes: FloatArray | None = (
+        None  # (m, k) derivatives by the first k variables, if requested; others: zero
+    )
+    about: Callable[[], list[str]] = list  # what each row is about; nothing: no report speaks of these rows
 
 
 STILL = 1e-9
@@ -91,22 +81,16 @@ class SeenPoint:
 
 
 class DesignProgram(ABC):
-    """A program of `cfmkit.numerics.sqp` from what a family sees of its design at a point.
+    """A program of `cfmkit.numerics.sqp` from what a family sees of its design at a point."""
 
-    Attributes
-    ----------
-    elastic : tuple of str
-        Limits that give way, by the last variable.
-    """
-
-    elastic: tuple[str, ...] = ()
+    elastic: tuple[str, ...] = ()  # limits that give way, by the last variable
 
     @abstractmethod
     def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
-        """Return objective and rows at z, with derivatives or without; None where the model has no answer."""
+        """Return objective and rows at z, with derivatives or without; None if the model has no answer."""
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
-        """Return the objective and the constraints (m,) at z (n,); None where the model has no answer."""
+        """Return the objective and the constraints (m,) at z (n,); None if the model has no answer."""
         elastic = self.elastic
         seen = self.seen(z[:-1] if elastic else z, False)
         if seen is None:

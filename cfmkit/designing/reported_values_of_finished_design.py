@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def measured(result: Result, window: tuple[float, float], *names: str) -> list[float | None]:
-    """Return metrics [SI] that the analysis of a design measures over a window [m or rad]; None where it cannot."""
+    """Return metrics [SI] that the analysis of a design measures over a window [m or rad]; None if it cannot."""
     if not result.curves:
         return [None] * len(names)
     found = evaluate(result, names, Window(*window))

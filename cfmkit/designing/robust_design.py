@@ -68,25 +68,17 @@ class SeenPart(Protocol):
 
 @dataclass(frozen=True)
 class PartSlopes:
-    """Exact derivatives of the numbers of a part; NaN where one is not known.
+    """Exact derivatives of the numbers of a part; NaN where one is not known."""
 
-    Attributes
-    ----------
-    by_x : (q, n) array
-        By the values of its design.
-    by_error : (q, d) array
-        By its errors.
-    """
-
-    by_x: FloatArray
-    by_error: FloatArray
+    by_x: FloatArray  # (q, n): by the values of its design
+    by_error: FloatArray  # (q, d): by its errors
 
 
 class SlopedPart(Protocol):
     """What a family knows of the derivatives of a part's numbers."""
 
     def __call__(self, x: FloatArray, errors: FloatArray, /) -> PartSlopes | None:
-        """Return the derivatives at the values x (n,) and errors (d,); None where none is known."""
+        """Return the derivatives at the values x (n,) and errors (d,); None if none is known."""
 
 
 def no_slopes(_x: FloatArray, _errors: FloatArray) -> PartSlopes | None:
@@ -105,43 +97,21 @@ def unheard(_share: float, _steps: int) -> None:
 
 @dataclass(frozen=True)
 class RobustProblem:
-    """What may vary, what errors there are, and what must hold.
+    """What may vary, what errors there are, and what must hold."""
 
-    Attributes
-    ----------
-    seen : callable
-        Numbers of a part: its design's values (n,) and its errors (d,) in, (q,) out; None where it has none.
-    bounds : (n, 2) array
-        Of the values.
-    errors : (k, d) array
-        Errors of drawn parts.
-    deviations : (d,) array
-        Standard deviations of the errors.
-    matrix, constant : (m, q) array and (m,) array
-        Rows of the numbers, which must be at least zero: ``matrix @ numbers + constant``.
-    about : (m,) array of int
-        Which limit each row belongs to.
-    share : float
-        Of parts that are to be good.
-    late : callable
-        Tells whether the time is up.
-    tell : callable
-        Takes the share estimated and the number of steps so far.
-    slopes : callable
-        Exact derivatives of a part's numbers, where there are any.
-    """
-
+    # numbers of a part: its design's values (n,) and its errors (d,) in, (q,) out; None if it has none
     seen: SeenPart
-    bounds: FloatArray
-    errors: FloatArray
-    deviations: FloatArray
+    bounds: FloatArray  # (n, 2): of the values
+    errors: FloatArray  # (k, d): errors of drawn parts
+    deviations: FloatArray  # (d,): standard deviations of the errors
+    # matrix, constant, (m, q), (m,): rows of the numbers, which must be at least zero: ``matrix @ numbers + constant``
     matrix: FloatArray
     constant: FloatArray
-    about: NDArray[np.int64]
-    share: float
-    late: Callable[[], bool] = never
-    tell: Callable[[float, int], None] = unheard
-    slopes: SlopedPart = no_slopes
+    about: NDArray[np.int64]  # (m,): which limit each row belongs to
+    share: float  # of parts that are to be good
+    late: Callable[[], bool] = never  # tells whether the time is up
+    tell: Callable[[float, int], None] = unheard  # takes the share estimated and the number of steps so far
+    slopes: SlopedPart = no_slopes  # exact derivatives of a part's numbers, where there are any
 
     @property
     def reach(self) -> FloatArray:
@@ -162,24 +132,12 @@ class RobustProblem:
 
 @dataclass(frozen=True)
 class Linear:
-    """A design to first order.
+    """A design to first order."""
 
-    Attributes
-    ----------
-    x : (n,) array
-        Its values.
-    rows : (m,) array
-        Limits of the perfect part.
-    by_x : (m, n) array
-        Their derivatives by the values.
-    by_error : (m, d) array
-        By the errors.
-    """
-
-    x: FloatArray
-    rows: FloatArray
-    by_x: FloatArray
-    by_error: FloatArray
+    x: FloatArray  # (n,): its values
+    rows: FloatArray  # (m,): limits of the perfect part
+    by_x: FloatArray  # (m, n): their derivatives by the values
+    by_error: FloatArray  # (m, d): by the errors
 
     def parts(self, errors: FloatArray) -> FloatArray:
         """Return the limits of parts, (k, m)."""
@@ -197,31 +155,16 @@ class Linear:
 
 @dataclass(frozen=True)
 class RobustResult:
-    """Where the steps ended.
+    """Where the steps ended."""
 
-    Attributes
-    ----------
-    x : (n,) array
-        Values of the design.
-    share : float
-        Of good parts, estimated to first order, even where drawn parts were solved themselves.
-    began : float
-        The same where the steps began.
-    steps, seen : int
-        Steps that gained something, and parts that were solved.
-    linear : Linear
-        The design to first order.
-    reached : bool
-        Whether the share is what was requested.
-    """
-
-    x: FloatArray
-    share: float
-    began: float
+    x: FloatArray  # (n,): values of the design
+    share: float  # of good parts, estimated to first order, even where drawn parts were solved themselves
+    began: float  # the same where the steps began
+    # steps, seen: steps that gained something, and parts that were solved
     steps: int
     seen: int
-    linear: Linear
-    reached: bool
+    linear: Linear  # the design to first order
+    reached: bool  # whether the share is what was requested
 
 
 class NoPart(Exception):
@@ -245,7 +188,7 @@ class _Counted:
 
 
 def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | None:
-    """Return a design to first order; None where it, or a neighbour that a difference needs, has no numbers."""
+    """Return a design to first order; None if it, or a neighbour that a difference needs, has no numbers."""
     middle = seen(x, problem.perfect)
     if middle is None:
         return None
@@ -379,7 +322,7 @@ class _Parts:
     seen: _Counted
 
     def rows(self, x: FloatArray) -> FloatArray | None:
-        """Return the rows of all parts, (k, m); None where a part has no numbers."""
+        """Return the rows of all parts, (k, m); None if a part has no numbers."""
         found = [self.seen(x, error) for error in self.errors]
         return None if any(one is None for one in found) else np.array([self.seen.rows(one) for one in found])  # type: ignore[arg-type]
 

@@ -78,18 +78,11 @@ NEVER = Clock()
 
 @dataclass(frozen=True)
 class OneStart:
-    """What a process does: from the number of a start to the record of what it led to.
+    """What a process does: from the number of a start to the record of what it led to."""
 
-    Attributes
-    ----------
-    search : callable
-        From the number to a dataclass of numbers, words and arrays; None: nothing. It is sent to other processes.
-    clock : Clock
-        When the search ends whether it is done or not.
-    """
-
+    # from the number to a dataclass of numbers, words and arrays; None: nothing. It is sent to other processes
     search: Callable[[int], Any]
-    clock: Clock
+    clock: Clock  # when the search ends whether it is done or not
 
     def __call__(self, number: int) -> dict[str, Any]:
         """Return the record; what was found is empty where there is nothing."""
@@ -113,41 +106,22 @@ def restored(kind: type[Anything], record: Mapping[str, Any]) -> Anything:
 
 @dataclass(frozen=True)
 class Stage:
-    """One round of jobs.
+    """One round of jobs."""
 
-    Attributes
-    ----------
-    work : callable
-        From the number of a job to its record, of plain numbers, words, lists and mappings: what it found, under
-        "found", and under "late" whether the time was up before it was done (`OneStart`). Sent to other processes.
-    jobs : tuple of int
-        Their numbers.
-    identity : str
-        Of everything that decides an outcome but the number.
-    """
-
+    # from the number of a job to its record, of plain numbers, words, lists and mappings: what it found, under "found",
+    # and under "late" whether the time was up before it was done (`OneStart`). Sent to other processes
     work: Callable[[int], dict[str, Any]]
-    jobs: tuple[int, ...]
-    identity: str
+    jobs: tuple[int, ...]  # their numbers
+    identity: str  # of everything that decides an outcome but the number
 
 
 @dataclass(frozen=True)
 class Done:
-    """What the jobs of a stage led to.
+    """What the jobs of a stage led to."""
 
-    Attributes
-    ----------
-    records : mapping
-        Number of the job -> its record; those that were not done are left out.
-    reused : int
-        How many were noted by a run before.
-    lost : tuple of str
-        Why processes died.
-    """
-
-    records: Mapping[int, dict[str, Any]]
-    reused: int
-    lost: tuple[str, ...]
+    records: Mapping[int, dict[str, Any]]  # number of the job -> its record; those that were not done are left out
+    reused: int  # how many were noted by a run before
+    lost: tuple[str, ...]  # why processes died
 
 
 def done(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, dict[str, Any]]], None]) -> Done:

@@ -43,20 +43,11 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 @dataclass(frozen=True)
 class DrivenNetwork:
-    """A network of beams with what is done to it.
+    """A network of beams with what is done to it."""
 
-    Attributes
-    ----------
-    name : str
-        For files.
-    network : Network
-    drive : Displacement or Rotation
-        Of rotations the node must not be free to move.
-    """
-
-    name: str
+    name: str  # for files
     network: Network
-    drive: Displacement | Rotation
+    drive: Displacement | Rotation  # of rotations the node must not be free to move
 
 
 @dataclass(frozen=True)

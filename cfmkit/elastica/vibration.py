@@ -87,24 +87,16 @@ class NetworkMasses:
 
 @dataclass(frozen=True, repr=False)
 class Frequencies(ShortRepr):
-    """Natural frequencies of a network about some equilibria.
+    """Natural frequencies of a network about some equilibria."""
 
-    Attributes
-    ----------
-    points : (p,) int array
-        Indices of the points of the path.
-    held, free : (p, n) arrays
-        The lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has no stiffness;
-        nan where the pose is unstable, and where a network has fewer.
-    flutters, diverges : (p,) bool arrays
-        Whether loads that turn with their node make motions grow that swing, or that do not: two squares of
-        frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if it is a load.
-        Other networks do not flutter, and whether they diverge is reported by the path.
-    """
-
-    points: Any
+    points: Any  # (p,): indices of the points of the path
+    # held, free, (p, n): the lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has
+    # no stiffness; nan where the pose is unstable, and where a network has fewer
     held: FloatArray
     free: FloatArray
+    # flutters, diverges, (p,): whether loads that turn with their node make motions grow that swing, or that do not:
+    # two squares of frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if
+    # it is a load. Other networks do not flutter, and whether they diverge is reported by the path
     flutters: Any
     diverges: Any
 

@@ -50,24 +50,13 @@ _FEWEST = 4
 
 @dataclass(frozen=True)
 class Stroke:
-    """One stroke, from one reversal to the next.
+    """One stroke, from one reversal to the next."""
 
-    Attributes
-    ----------
-    branch : str
-        ``load`` where the motion increases, ``unload`` where it decreases.
-    cycle : int
-        From 1; a cycle is one way up and one way down. 0 for a short first stroke on the way to where cycles start.
-    points : (n,) array of int
-        Indices into the recording, in its order, pauses left out.
-    way : float
-        What it covers of the motion [m or rad].
-    """
-
-    branch: str
+    branch: str  # ``load`` where the motion increases, ``unload`` where it decreases
+    # from 1; a cycle is one way up and one way down. 0 for a short first stroke on the way to where cycles start
     cycle: int
-    points: NDArray[np.intp]
-    way: float
+    points: NDArray[np.intp]  # (n,): indices into the recording, in its order, pauses left out
+    way: float  # what it covers of the motion [m or rad]
 
 
 @dataclass(frozen=True)

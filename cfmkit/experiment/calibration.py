@@ -70,34 +70,17 @@ FINDINGS = {
 
 @dataclass(frozen=True, repr=False)
 class Calibration(ShortRepr):
-    """A fitted specification.
+    """A fitted specification."""
 
-    Attributes
-    ----------
-    spec : Spec
-        With the fitted values, complete.
-    parameters : tuple of FitParameter
-        What was fitted.
-    fit : FittedValues
-        Values and their uncertainty, in the order of the parameters.
-    before, after : Comparison
-        Model and measurement at the start and at the end; the latter less the fitted zeros.
-    zeros : Zeros
-        Of the recording, as fitted.
-    result : Result
-        Of the fitted specification.
-    warnings : tuple of Finding
-        What the user must know about the fit.
-    """
-
-    spec: Spec
-    parameters: tuple[FitParameter, ...]
-    fit: FittedValues
+    spec: Spec  # with the fitted values, complete
+    parameters: tuple[FitParameter, ...]  # what was fitted
+    fit: FittedValues  # values and their uncertainty, in the order of the parameters
+    # before, after: model and measurement at the start and at the end; the latter less the fitted zeros
     before: Comparison
     after: Comparison
-    result: Result
-    zeros: Zeros = field(default_factory=Zeros)
-    warnings: tuple[Finding, ...] = ()
+    result: Result  # of the fitted specification
+    zeros: Zeros = field(default_factory=Zeros)  # of the recording, as fitted
+    warnings: tuple[Finding, ...] = ()  # what the user must know about the fit
 
 
 def resolved(spec: Spec) -> Spec:

@@ -44,31 +44,16 @@ MOST = 2000
 
 @dataclass(frozen=True)
 class Samples:
-    """Measured points of one branch, all cycles, inside the window.
+    """Measured points of one branch, all cycles, inside the window."""
 
-    Attributes
-    ----------
-    branch : str
-        Name in the measurement.
-    model_branch : str
-        Name in the model.
-    motion, effort : (n,) array
-        As measured [m, N] or [rad, N m].
-    elapsed : (n,) array
-        Which part of the recording had passed, 0 to 1.
-    weight : (n,) array
-        The way that each stands for, over that of all on average.
-    cycle : (n,) array of int
-        Which cycle each is of, counted from 0.
-    """
-
-    branch: str
-    model_branch: str
+    branch: str  # name in the measurement
+    model_branch: str  # name in the model
+    # motion, effort, (n,): as measured [m, N] or [rad, N m]
     motion: FloatArray
     effort: FloatArray
-    elapsed: FloatArray
-    weight: FloatArray
-    cycle: NDArray[np.intp]
+    elapsed: FloatArray  # (n,): which part of the recording had passed, 0 to 1
+    weight: FloatArray  # (n,): the way that each stands for, over that of all on average
+    cycle: NDArray[np.intp]  # (n,): which cycle each is of, counted from 0
 
     def less(self, zeros: Zeros) -> Samples:
         """Return the samples with the errors of the zeros taken out."""
@@ -82,48 +67,28 @@ class Samples:
 
 @dataclass(frozen=True)
 class Zeros:
-    """What the sensors show where they should show nothing.
+    """What the sensors show where they should show nothing."""
 
-    Attributes
-    ----------
-    effort, motion : float
-        Without load, and at the mechanism's zero [N, m] or [N m, rad].
-    drift : float
-        By how much more without load at the end of the recording [N or N m].
-    """
-
+    # effort, motion: without load, and at the mechanism's zero [N, m] or [N m, rad]
     effort: float = 0.0
     motion: float = 0.0
-    drift: float = 0.0
+    drift: float = 0.0  # by how much more without load at the end of the recording [N or N m]
 
 
 @dataclass(frozen=True, repr=False)
 class Comparison(ShortRepr):
-    """A model and a measurement, over a common window.
+    """A model and a measurement, over a common window."""
 
-    Attributes
-    ----------
-    samples : tuple of Samples
-        One a branch.
-    window : Window
-        Where they are compared.
-    curve : Curve
-        Of the model.
-    holes : tuple of UnrecordedInterval
-        Those of the recording in the window that are too large for numbers over it.
-    branches : tuple of Samples
-        The branches as measured, where the samples are their mean; else empty.
-    """
-
-    samples: tuple[Samples, ...]
-    window: Window
-    curve: Curve
+    samples: tuple[Samples, ...]  # one a branch
+    window: Window  # where they are compared
+    curve: Curve  # of the model
+    # those of the recording in the window that are too large for numbers over it
     holes: tuple[UnrecordedInterval, ...] = ()
-    branches: tuple[Samples, ...] = ()
+    branches: tuple[Samples, ...] = ()  # the branches as measured, where the samples are their mean; else empty
 
     @property
     def loop(self) -> MeasuredLoop | None:
-        """Both measured branches at even places of the window; None where one way only was measured."""
+        """Both measured branches at even places of the window; None if one way only was measured."""
         found = {item.branch: item for item in self.branches or self.samples}
         if set(found) != {LOAD, UNLOAD}:
             return None

@@ -34,7 +34,7 @@ class UnrecordedInterval:
     low: float
     high: float
     branch: str = ""
-    cycle: int | None = None  # None where there is one only
+    cycle: int | None = None  # None if there is one only
 
     @property
     def width(self) -> float:
@@ -67,7 +67,7 @@ def share_covered(holes: Sequence[UnrecordedInterval], window: Window) -> float:
 
 
 def number_of(curve: Curve) -> int | None:
-    """Return the number of a curve's cycle; None where there is one only."""
+    """Return the number of a curve's cycle; None if there is one only."""
     return int(curve.label["cycle"][0]) if "cycle" in curve.label else None
 
 

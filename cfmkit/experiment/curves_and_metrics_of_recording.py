@@ -63,36 +63,17 @@ CYCLES_PER_STROKE = 60.0
 
 @dataclass(frozen=True, repr=False)
 class MeasuredCurves(ShortRepr):
-    """A recording as curves.
+    """A recording as curves."""
 
-    Attributes
-    ----------
-    recording : Recording
-        As recorded.
-    strokes : Strokes
-        How it was split.
-    raw : tuple of Curve
-        One a cycle, raw; columns `time` where there is one, and `raw`'s order is that of the motion.
-    filtered : tuple of Curve
-        The same points with filtered forces; empty without a filter.
-    reached : Window
-        What every branch reached before points next to reversals were left out.
-    passage : float
-        Longest way next to a reversal that was left out [m or rad].
-    low_pass : LowPass or None
-        The filter.
-    warnings : tuple of Finding
-        What the user must know.
-    """
-
-    recording: Recording
-    strokes: Strokes
+    recording: Recording  # as recorded
+    strokes: Strokes  # how it was split
+    # one a cycle, raw; columns `time` where there is one, and `raw`'s order is that of the motion
     raw: tuple[Curve, ...]
-    reached: Window
-    passage: float = 0.0
-    filtered: tuple[Curve, ...] = ()
-    low_pass: LowPass | None = None
-    warnings: tuple[Finding, ...] = ()
+    reached: Window  # what every branch reached before points next to reversals were left out
+    passage: float = 0.0  # longest way next to a reversal that was left out [m or rad]
+    filtered: tuple[Curve, ...] = ()  # the same points with filtered forces; empty without a filter
+    low_pass: LowPass | None = None  # the filter
+    warnings: tuple[Finding, ...] = ()  # what the user must know
 
     @cached_property
     def curve(self) -> Curve:
@@ -306,28 +287,15 @@ def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Numbers of a measured mechanism.
+    """Numbers of a measured mechanism."""
 
-    Attributes
-    ----------
-    raw, filtered : mapping of str to Quantity
-        Metrics by name, SI; `filtered` is empty without a filter.
-    each : tuple of mapping
-        Raw metrics of every cycle.
-    window : Window
-        Where they hold.
-    warnings : tuple of Finding
-        What the user must know of the window.
-    holes : tuple of UnrecordedInterval
-        Those so large that what they are in has no value.
-    """
-
+    # raw, filtered: metrics by name, SI; `filtered` is empty without a filter
     raw: Mapping[str, Quantity]
     filtered: Mapping[str, Quantity]
-    each: tuple[Mapping[str, Quantity], ...]
-    window: Window
-    warnings: tuple[Finding, ...] = ()
-    holes: tuple[UnrecordedInterval, ...] = ()
+    each: tuple[Mapping[str, Quantity], ...]  # raw metrics of every cycle
+    window: Window  # where they hold
+    warnings: tuple[Finding, ...] = ()  # what the user must know of the window
+    holes: tuple[UnrecordedInterval, ...] = ()  # those so large that what they are in has no value
 
     @property
     def shortfall(self) -> str:

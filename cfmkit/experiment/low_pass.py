@@ -32,24 +32,12 @@ _TEXT = re.compile(r"(?P<cutoff>.+?)(?:[, ]+order +(?P<order>[0-9]+))?(?P<correc
 
 @dataclass(frozen=True)
 class LowPass:
-    """A zero-phase Butterworth low-pass.
+    """A zero-phase Butterworth low-pass."""
 
-    Attributes
-    ----------
-    cutoff : float
-        [Hz] for `per` "time", [1/m] for "length", [1/rad] for "angle".
-    per : {"time", "length", "angle"}
-        What it counts cycles over.
-    order : int
-        Of each of the two passes.
-    corrected : bool
-        Whether both passes together have -3 dB at the cut-off, instead of -6 dB.
-    """
-
-    cutoff: float
-    per: Per
-    order: int = DEFAULT_ORDER
-    corrected: bool = False
+    cutoff: float  # [Hz] for `per` "time", [1/m] for "length", [1/rad] for "angle"
+    per: Per  # what it counts cycles over
+    order: int = DEFAULT_ORDER  # of each of the two passes
+    corrected: bool = False  # whether both passes together have -3 dB at the cut-off, instead of -6 dB
 
     def __post_init__(self) -> None:
         """Refuse what is no filter."""

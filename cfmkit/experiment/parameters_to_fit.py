@@ -37,26 +37,15 @@ INSIDE = 1e-9
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A number that is fitted.
+    """A number that is fitted."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted.
-    dimension : str
-        Of `cfmkit.specs.units`.
-    start, low, high : float
-        SI.
-    size : float
-        Typical size, SI.
-    """
-
-    path: str
-    dimension: str
+    path: str  # dotted
+    dimension: str  # of `cfmkit.specs.units`
+    # start, low, high: SI
     start: float
     low: float
     high: float
-    size: float
+    size: float  # typical size, SI
 
 
 def parameters(

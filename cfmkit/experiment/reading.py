@@ -40,32 +40,17 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Decisions:
-    """What was found out about a file, for the user to check.
+    """What was found out about a file, for the user to check."""
 
-    Attributes
-    ----------
-    encoding, separator, decimal : str
-        In words.
-    first_line : int
-        Line of the file, from 1, with the first numbers.
-    header_line : int or None
-        Line with the names.
-    skipped_lines : int
-        Lines above and below that are neither header nor numbers.
-    columns : mapping of str to str
-        Role -> name and unit.
-    unused : tuple of str
-        Columns that are not used.
-    """
-
+    # encoding, separator, decimal: in words
     encoding: str
     separator: str
     decimal: str
-    first_line: int
-    header_line: int | None
-    skipped_lines: int
-    columns: dict[str, str]
-    unused: tuple[str, ...]
+    first_line: int  # line of the file, from 1, with the first numbers
+    header_line: int | None  # line with the names
+    skipped_lines: int  # lines above and below that are neither header nor numbers
+    columns: dict[str, str]  # role -> name and unit
+    unused: tuple[str, ...]  # columns that are not used
 
     def lines(self) -> list[str]:
         """Return sentences for the terminal."""
@@ -285,7 +270,7 @@ def _parts(table: LabTable, column: ColumnInfo) -> dict[str, LabTable]:
 
 
 def _specimens(table: LabTable, roles: Mapping[str, ColumnInfo]) -> ColumnInfo | None:
-    """Return the column that tells specimens apart; None where none does.
+    """Return the column that tells specimens apart; None if none does.
 
     It has words or whole numbers without a unit, each over much of the travel, and in rows that follow each other
     unless its name says what it is.

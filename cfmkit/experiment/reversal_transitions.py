@@ -56,21 +56,12 @@ _MARGIN = 1.05
 
 @dataclass(frozen=True)
 class Settled:
-    """Strokes without the passages at their ends.
+    """Strokes without the passages at their ends."""
 
-    Attributes
-    ----------
-    strokes : Strokes
-        What is left of each.
-    points : int
-        How many points were left out.
-    length : float
-        Longest passage [m or rad]; 0 where only samples at reversals themselves were left out, which
-        are of no branch on any machine.
-    """
-
-    strokes: Strokes
-    points: int
+    strokes: Strokes  # what is left of each
+    points: int  # how many points were left out
+    # longest passage [m or rad]; 0 where only samples at reversals themselves were left out, which are of no branch on
+    # any machine
     length: float
 
 
@@ -104,21 +95,14 @@ def settled(recording: Recording, strokes: Strokes) -> Settled:
 
 @dataclass(frozen=True)
 class End:
-    """An end of the travel with the two strokes that meet there, seen from it.
+    """An end of the travel with the two strokes that meet there, seen from it."""
 
-    Attributes
-    ----------
-    at : tuple of int
-        Which strokes end here; the first and the last of a recording do so alone.
-    place, way : float
-        Where it is [m or rad], and the sign of the motion away from it.
-    up, down : ((n,) array, (n,) array)
-        Distance from the end [m or rad], increasing, and effort of the way up and the way down [N or N m].
-    """
-
-    at: tuple[int, ...]
+    at: tuple[int, ...]  # which strokes end here; the first and the last of a recording do so alone
+    # place, way: where it is [m or rad], and the sign of the motion away from it
     place: float
     way: float
+    # up, down, ((n,), (n,): distance from the end [m or rad], increasing, and effort of the way up and the way down [N
+    # or N m]
     up: tuple[FloatArray, FloatArray]
     down: tuple[FloatArray, FloatArray]
 

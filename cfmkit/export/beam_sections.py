@@ -25,21 +25,13 @@ ALLOWED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class BeamSection:
-    """A section of a beam as specified.
+    """A section of a beam as specified."""
 
-    Attributes
-    ----------
-    beam : str
-        Its name, for messages.
-    at, across : (2,) arrays
-        Its middle [m], and the unit vector along it.
-    thickness, length : float
-        Of the beam there, and of its piece that is smooth [m].
-    """
-
-    beam: str
+    beam: str  # its name, for messages
+    # at, across, (2,): its middle [m], and the unit vector along it
     at: FloatArray
     across: FloatArray
+    # thickness, length: of the beam there, and of its piece that is smooth [m]
     thickness: float
     length: float
 

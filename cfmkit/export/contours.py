@@ -230,41 +230,22 @@ class Region:
 
 @dataclass(frozen=True)
 class Sheet:
-    """How thick parts are across the plane of the drawing.
+    """How thick parts are across the plane of the drawing."""
 
-    Attributes
-    ----------
-    thickness : float, optional
-        Wherever no region says otherwise [m]; None where the specification does not tell.
-    regions : tuple of Region
-        Where two overlap, the thicker one holds.
-    key : str
-        What in a specification says it, for messages.
-    """
-
-    thickness: float | None = None
-    regions: tuple[Region, ...] = ()
-    key: str = ""
+    thickness: float | None = None  # wherever no region says otherwise [m]; None if the specification does not tell
+    regions: tuple[Region, ...] = ()  # where two overlap, the thicker one holds
+    key: str = ""  # what in a specification says it, for messages
 
 
 @dataclass(frozen=True)
 class DrawnDimension:
-    """A length that a drawing states: between two points, measured along x, along y or straight.
+    """A length that a drawing states: between two points, measured along x, along y or straight."""
 
-    Attributes
-    ----------
-    name : str
-        In words, as the family's keys have it.
-    start, end : (float, float)
-        What is measured between [m].
-    along : {"x", "y", "line"}
-        In which direction.
-    """
-
-    name: str
+    name: str  # in words, as the family's keys have it
+    # start, end: what is measured between [m]
     start: tuple[float, float]
     end: tuple[float, float]
-    along: Literal["x", "y", "line"] = "line"
+    along: Literal["x", "y", "line"] = "line"  # in which direction
 
     @property
     def value(self) -> float:

@@ -32,18 +32,10 @@ GRID = 1e-9
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles.
+    """A closed surface of triangles."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m]
-    triangles : (m, 3) array of int
-        Counter-clockwise seen from outside.
-    """
-
-    points: FloatArray
-    triangles: NDArray[np.int64]
+    points: FloatArray  # (n, 3) [m]
+    triangles: NDArray[np.int64]  # (m, 3): counter-clockwise seen from outside
 
     @property
     def corners(self) -> FloatArray:

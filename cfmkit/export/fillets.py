@@ -56,7 +56,7 @@ def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, .
 
 
 def _used_up(edge: Edge) -> bool:
-    """Tell whether an edge is a line without a length."""
+    """Return True if an edge is a line without a length."""
     return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) <= 1e-12
 
 
@@ -77,7 +77,7 @@ def _direction(edge: Edge, end: int) -> complex:
 
 
 def _rounded(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
-    """Return two edges, shortened, and the arc between them; None where it does not fit."""
+    """Return two edges, shortened, and the arc between them; None if it does not fit."""
     if _used_up(before) or _used_up(after):
         return None
     if isinstance(before, Line) and isinstance(after, Line):

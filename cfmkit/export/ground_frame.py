@@ -29,18 +29,10 @@ DEEPER = 0.25
 
 @dataclass(frozen=True)
 class GroundFrame:
-    """What joins all that is held.
+    """What joins all that is held."""
 
-    Attributes
-    ----------
-    sides : tuple of four (4, 2) arrays
-        Bars of the frame, which overlap at its corners [m].
-    bars : tuple of (4, 2) arrays
-        From pads to the frame [m].
-    """
-
-    sides: tuple[FloatArray, ...]
-    bars: tuple[FloatArray, ...]
+    sides: tuple[FloatArray, ...]  # bars of the frame, which overlap at its corners [m]
+    bars: tuple[FloatArray, ...]  # from pads to the frame [m]
 
     @property
     def pieces(self) -> tuple[FloatArray, ...]:

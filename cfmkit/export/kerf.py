@@ -151,7 +151,7 @@ def parallel(chain: ArcChain, distance: float) -> ArcChain | None:
     Returns
     -------
     ArcChain or None
-        None where neighbours at a corner do not meet.
+        None if neighbours at a corner do not meet.
     """
     pieces, breaks = _pieces(chain, distance)
     kept = list(range(len(pieces)))

@@ -39,23 +39,12 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class DrawnStrip:
-    """A beam as it is drawn.
-
-    Attributes
-    ----------
-    name : str
-    points : (n, 2) array
-        Of its centre line [m].
-    thickness : (n,) array
-        There [m].
-    ends : tuple of two str
-        Nodes that it joins.
-    """
+    """A beam as it is drawn."""
 
     name: str
-    points: FloatArray
-    thickness: FloatArray
-    ends: tuple[str, str]
+    points: FloatArray  # (n, 2): of its centre line [m]
+    thickness: FloatArray  # (n,): there [m]
+    ends: tuple[str, str]  # nodes that it joins
 
     def sampled(self, fillet: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (k, 2), the way to them from the start (k,) and half thicknesses (k,) there, closely [m]."""
@@ -68,57 +57,30 @@ class DrawnStrip:
 
 @dataclass(frozen=True, eq=False)
 class DrawnBlock:
-    """A pad, an eye or a bar as it is drawn: rigid beside beams.
+    """A pad, an eye or a bar as it is drawn: rigid beside beams."""
 
-    Attributes
-    ----------
-    name : str
-        In words, for messages.
-    nodes : tuple of str
-        Those that it holds together, of one rigid body.
-    shape : (n, 2) array
-        Polygon [m].
-    """
-
-    name: str
-    nodes: tuple[str, ...]
-    shape: FloatArray
+    name: str  # in words, for messages
+    nodes: tuple[str, ...]  # those that it holds together, of one rigid body
+    shape: FloatArray  # (n, 2): polygon [m]
 
 
 @dataclass(frozen=True)
 class Join:
-    """Two parts of a drawing that are one piece.
+    """Two parts of a drawing that are one piece."""
 
-    Attributes
-    ----------
-    one, other : str
-        Names.
-    at : (2,) array
-        Where [m].
-    gap : float
-        Between them before the outline was made [m]; negative where they overlap.
-    """
-
+    # one, other: names
     one: str
     other: str
-    at: FloatArray
-    gap: float
+    at: FloatArray  # (2,): where [m]
+    gap: float  # between them before the outline was made [m]; negative where they overlap
 
 
 @dataclass(frozen=True, eq=False)
 class NodesAndBodies:
-    """Nodes, and which of them belong to one rigid body.
+    """Nodes, and which of them belong to one rigid body."""
 
-    Attributes
-    ----------
-    places : mapping of str to (2,) array
-        Nodes [m].
-    bodies : mapping of str to str
-        The body of a node, where it has one.
-    """
-
-    places: Mapping[str, FloatArray]
-    bodies: Mapping[str, str]
+    places: Mapping[str, FloatArray]  # nodes [m]
+    bodies: Mapping[str, str]  # the body of a node, where it has one
 
     def ways(self, strips: Sequence[DrawnStrip]) -> tuple[dict[str, int], FloatArray]:
         """Return the number of each node, and the shortest ways between all, (m, m) [m]; inf where there is none."""
@@ -274,7 +236,7 @@ class _Look:
 
 
 def _found_in_other_half(one: str, other: str) -> bool:
-    """Tell whether both are of the mirrored half: what they do, the described half does."""
+    """Return True if both are of the mirrored half: what they do, the described half does."""
     return one.endswith("'") and other.endswith("'")
 
 

@@ -35,18 +35,10 @@ AROUND = 4.0
 
 @dataclass(frozen=True)
 class ThinWall:
-    """A wall where it is thinnest.
+    """A wall where it is thinnest."""
 
-    Attributes
-    ----------
-    thickness : float
-        [m].
-    at : (float, float)
-        In the middle of the wall [m].
-    """
-
-    thickness: float
-    at: tuple[float, float]
+    thickness: float  # [m]
+    at: tuple[float, float]  # in the middle of the wall [m]
 
 
 def facing_lines(
@@ -80,23 +72,15 @@ def facing_lines(
 
 @dataclass(frozen=True)
 class EdgeLines:
-    """The lines of all outlines of a part, the material on their left.
+    """The lines of all outlines of a part, the material on their left."""
 
-    Attributes
-    ----------
-    starts, along : (n, 2) arrays
-        [m].
-    ring, at : (n,) arrays
-        Which outline each is of, and the way along it to where it begins [m].
-    around : (r,) array
-        Lengths of the outlines [m].
-    """
-
+    # starts, along, (n, 2): [m]
     starts: FloatArray
     along: FloatArray
+    # ring, at, (n,): which outline each is of, and the way along it to where it begins [m]
     ring: NDArray[np.int64]
     at: FloatArray
-    around: FloatArray
+    around: FloatArray  # (r,): lengths of the outlines [m]
 
     @classmethod
     def of(cls, contours: Sequence[Contour], sagitta: float) -> EdgeLines:

@@ -48,18 +48,11 @@ CHUNK = 0.5 * math.pi
 
 @dataclass(frozen=True, eq=False)
 class OutlinePiece:
-    """What is united: an area, and the edges that may bound it.
+    """What is united: an area, and the edges that may bound it."""
 
-    Attributes
-    ----------
-    edges : tuple of Edge
-        Of its boundary, the material on their left.
-    areas : tuple of (n, 2) arrays
-        Polygons that cover it together [m], whose corners are those of lines and the points of smooth edges; none where
-        its edges are one closed chain that does not cross itself.
-    """
-
-    edges: tuple[Edge, ...]
+    edges: tuple[Edge, ...]  # of its boundary, the material on their left
+    # polygons that cover it together [m], whose corners are those of lines and the points of smooth edges; none where
+    # its edges are one closed chain that does not cross itself
     areas: tuple[FloatArray, ...] = ()
 
     @classmethod
@@ -265,7 +258,7 @@ class _Sources:
         return [_Run(*run) for run in runs]
 
     def _follows(self, run: list[Any], one: tuple[int, float, float]) -> bool:
-        """Tell whether a line goes on where a run ends."""
+        """Return True if a line goes on where a run ends."""
         return run[0] is self.tracks[one[0]] and abs(run[2] - one[1]) < 0.01
 
 

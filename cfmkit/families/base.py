@@ -28,112 +28,62 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Measure:
-    """One number requested of each design of a block: a metric over a window, or a value of the family.
+    """One number requested of each design of a block: a metric over a window, or a value of the family."""
 
-    Attributes
-    ----------
-    name : str
-        ``force_ripple``, ``theoretical_force``; never with a branch in brackets.
-    window : tuple of WindowEnd, optional
-        Ends of the window [m or rad], or shares of each variant's own travel, where the family's blocks take
-        them (`Family.block_shares`); None: the full travel.
-    """
-
-    name: str
+    name: str  # ``force_ripple``, ``theoretical_force``; never with a branch in brackets
+    # ends of the window [m or rad], or shares of each variant's own travel, where the family's blocks take them
+    # (`Family.block_shares`); None: the full travel
     window: Ends | None = None
 
 
 @dataclass(frozen=True)
 class Block:
-    """Many variants of one specification, and what is to be known about each.
+    """Many variants of one specification, and what is to be known about each."""
 
-    Attributes
-    ----------
-    values : mapping of str to (n,) array
-        Dotted path -> SI value in each variant; words and whole numbers as they are.
-    measures : tuple of Measure
-        What is requested.
-    size : int
-        n.
-    """
-
-    values: Mapping[str, NDArray[Any]]
-    measures: tuple[Measure, ...]
-    size: int
+    values: Mapping[str, NDArray[Any]]  # dotted path -> SI value in each variant; words and whole numbers as they are
+    measures: tuple[Measure, ...]  # what is requested
+    size: int  # n
 
 
 @dataclass(frozen=True)
 class BlockAnswer:
-    """What a vectorised model knows about a block.
+    """What a vectorised model knows about a block."""
 
-    Attributes
-    ----------
-    done : (n,) array of bool
-        The variants that it solved completely; all others are analysed one by one.
-    values : tuple of mappings
-        For each measure: branch -> (n,) array of SI values, NaN where undefined. What
-        is no matter of one branch stands under the name "" alone.
-    target : (n,) array, optional
-        Force or torque that each curve should have [N or N m].
-    kind : {"force", "torque"}, optional
-        Whether the curves are of force or of torque; None: what the names of the metrics imply.
-    warnings : mapping of str to (n,) array of bool, optional
-        Name of a finding -> the variants whose analysis would warn of it; None: the model does not know.
-    """
-
-    done: NDArray[Any]
+    done: NDArray[Any]  # (n,): the variants that it solved completely; all others are analysed one by one
+    # for each measure: branch -> (n,) array of SI values, NaN where undefined. What is no matter of one branch stands
+    # under the name "" alone
     values: tuple[Mapping[str, FloatArray], ...]
-    target: FloatArray | None = None
-    kind: Kind | None = None
+    target: FloatArray | None = None  # (n,): force or torque that each curve should have [N or N m]
+    kind: Kind | None = None  # whether the curves are of force or of torque; None: what the names of the metrics imply
+    # name of a finding -> the variants whose analysis would warn of it; None: the model does not know
     warnings: Mapping[str, NDArray[Any]] | None = None
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """Effort and stress of one part at p places of its motion.
+    """Effort and stress of one part at p places of its motion."""
 
-    Attributes
-    ----------
-    effort : mapping of str to (p,) array
-        Branch -> force [N] or torque [N m].
-    stress : (s, p) array
-        Stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none.
-    """
-
-    effort: Mapping[str, FloatArray]
+    effort: Mapping[str, FloatArray]  # branch -> force [N] or torque [N m]
+    # (s, p): stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none
     stress: FloatArray
 
 
 @dataclass(frozen=True)
 class SampledSlopes:
-    """Effort and stress of one part at p places of its motion, and their exact derivatives by some of its values.
+    """Effort and stress of one part at p places of its motion, and their exact derivatives by some of its values."""
 
-    Attributes
-    ----------
-    sampled : Sampled
-        The effort and the stresses themselves.
-    by : mapping of str to Sampled
-        Dotted path of a value -> derivatives of both by it, per SI unit of the value; paths whose derivatives are not
-        known exactly are left out.
-    """
-
-    sampled: Sampled
+    sampled: Sampled  # the effort and the stresses themselves
+    # dotted path of a value -> derivatives of both by it, per SI unit of the value; paths whose derivatives are not
+    # known exactly are left out
     by: Mapping[str, Sampled]
 
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """Both branches of a measured loop at the same places.
+    """Both branches of a measured loop at the same places."""
 
-    Attributes
-    ----------
-    places : (n,) array
-        Displacement [m] or angle [rad], increasing, where the model exists.
-    up, down : (n,) array
-        Force [N] or torque [N m] on the way up and on the way back, mean of all cycles.
-    """
-
-    places: FloatArray
+    places: FloatArray  # (n,): displacement [m] or angle [rad], increasing, where the model exists
+    # up, down, (n,): force [N] or torque [N m] on the way up and on the way back, mean of all cycles
     up: FloatArray
     down: FloatArray
 
@@ -213,33 +163,17 @@ SHARED = {
 
 @dataclass(frozen=True)
 class Room:
-    """The box that a mechanism stays in over all of its travel, with everything that is drawn of it.
+    """The box that a mechanism stays in over all of its travel, with everything that is drawn of it."""
 
-    Attributes
-    ----------
-    across, along : float
-        In the plane, across and along the direction of travel [m].
-    depth : float or None
-        Out of the plane [m]; None where nothing is known of it.
-    parts : int
-        Separate pieces that the mechanism is put together from, bought ones included.
-    assumed : str
-        What of it no value of the specification says, in one clause; empty if all of it does.
-    corner : (float, float)
-        Its lower left corner in the drawings of the mechanism [m].
-    sideways : bool
-        Whether the travel is along x in the drawings, not along y.
-    drawn : (float, float), optional
-        Width and height of the box along x and y of the drawings [m], where the travel is along neither.
-    """
-
+    # across, along: in the plane, across and along the direction of travel [m]
     across: float
     along: float
-    depth: float | None = None
-    parts: int = 1
-    assumed: str = ""
-    corner: tuple[float, float] = (0.0, 0.0)
-    sideways: bool = False
+    depth: float | None = None  # out of the plane [m]; None if nothing is known of it
+    parts: int = 1  # separate pieces that the mechanism is put together from, bought ones included
+    assumed: str = ""  # what of it no value of the specification says, in one clause; empty if all of it does
+    corner: tuple[float, float] = (0.0, 0.0)  # its lower left corner in the drawings of the mechanism [m]
+    sideways: bool = False  # whether the travel is along x in the drawings, not along y
+    # width and height of the box along x and y of the drawings [m], where the travel is along neither
     drawn: tuple[float, float] | None = None
 
     @property
@@ -260,139 +194,82 @@ ENVELOPE = {
 
 @dataclass(frozen=True)
 class Search:
-    """What a family's design may say that no analysis of the specification it writes can: what only the search knows.
+    """Findings and tables of a design that no analysis of the specification it writes can have: those of its search."""
 
-    Attributes
-    ----------
-    findings : tuple of str
-        Names of findings about the search.
-    tables : tuple of str
-        Names of tables about it, as ``starts.csv``.
-    """
-
-    findings: tuple[str, ...] = ()
-    tables: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()  # names of findings about the search
+    tables: tuple[str, ...] = ()  # names of tables about it, as ``starts.csv``
 
 
 @dataclass(frozen=True)
 class Family:
-    """One family of mechanisms, as the registry knows it.
+    """One family of mechanisms, as the registry knows it."""
 
-    Attributes
-    ----------
-    name, summary : str
-        As written in ``family:`` of a spec, and one line on what it is.
-    spec_type : type of Spec
-        What the YAML may say.
-    models : mapping of str to Analyzer or str
-        What `analysis.fidelity` may say, the coarsest first and the finest last, and the model that it picks:
-        ``model(spec, run) -> Result``, or its ``"module:function"``, imported when it is to run. A family with
-        one model gives it a name, too.
-    design : callable, optional
-        ``design(spec, run) -> Design``; its spec is analysed like any other.
-    search : Search, optional
-        What a design says beside the analysis; None: nothing, it only computes.
-    values : mapping
-        The family's own scalar results beside the metrics of the contract:
-        name -> (dimension, definition).
-    words : mapping
-        For values of the dimension ``text``: name -> the words that the value is an index into.
-    resolve : callable, optional
-        ``resolve(spec) -> spec`` with every derived part written out.
-    analyze_block : callable, optional
-        ``analyze_block(spec, block) -> answer``: many variants of a specification at once;
-        None where the model cannot vary these paths or measure these metrics.
-    rows : callable, optional
-        ``rows(specs) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
-        (`cfmkit.families.rows`); it takes the place of `analyze_block`.
-    block_shares : bool
-        Whether `analyze_block` takes windows whose ends are shares of the travel, which each variant has of its own.
-    gradient : callable, optional
-        ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
-        metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
-    sampled : str, optional
-        ``"module:function"`` with ``sampled(spec, places) -> Sampled``: effort and stress at a few places [m or
-        rad], faster than the analysis and equal to it; None where it cannot. Searches over many parts ask for it.
-    sampled_slopes : str, optional
-        ``"module:function"`` with ``sampled_slopes(spec, places, paths) -> SampledSlopes``: the same with exact
-        derivatives by the values at those paths that the family knows; None where it cannot.
-    free : str, optional
-        ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
-        specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
-    errors : str, optional
-        ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position" or "rate"}``: which values of a part
-        err, and in what: by the process that makes it, or as the rate of a spring.
-    attribution : str, optional
-        ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
-        of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
-    draw : str, optional
-        ``"module"`` with ``figures(result)``, imported when drawing.
-    dimension_drawing : str
-        The mechanism with its dimensions and their keys named: a file of a package, ``"package/folder/file.svg"``;
-        a PNG and a PDF of the same name may stand beside it.
-    outline : str, optional
-        ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
-        `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
-    propose : str, optional
-        ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws.
-    room : str, optional
-        ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in.
-    elastic_parts : str, optional
-        ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks
-        of finite-element solvers; imported when exporting.
-    elastic_networks : str, optional
-        ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks.
-    levels : tuple of str
-        Dotted paths of the forces that its `design` block may ask for.
-    headline : tuple of str
-        Values and metrics that are shown first after a run, in this order.
-    branches : tuple of str
-        Every name that a branch of its curves may have; none where the curve decides.
-    template : str
-        What ``cfmkit new`` starts from: a file of a package, ``"package/folder/file"``.
-    findings : mapping of str to str
-        Every warning or failure name the family can report, with its meaning.
-    references : tuple of str
-        The papers, in one line each.
-    bibliography : str
-        The same in BibTeX: a file of a package, ``"package/folder/file"``.
-    interface : int, optional
-        The `INTERFACE` that a family of another package was written for, as a plain number.
-    """
-
+    # name, summary: as written in ``family:`` of a spec, and one line on what it is
     name: str
     summary: str
-    spec_type: type[Spec]
+    spec_type: type[Spec]  # what the YAML may say
+    # what `analysis.fidelity` may say, the coarsest first and the finest last, and the model that it picks:
+    # ``model(spec, run) -> Result``, or its ``"module:function"``, imported when it is to run. A family with one model
+    # gives it a name, too
     models: Mapping[str, Analyzer | str]
+    # ``design(spec, run) -> Design``; its spec is analysed like any other
     design: Callable[[Any, Run], Design] | None = None
-    search: Search | None = None
+    search: Search | None = None  # what a design says beside the analysis; None: nothing, it only computes
+    # the family's own scalar results beside the metrics of the contract: name -> (dimension, definition)
     values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    # for values of the dimension ``text``: name -> the words that the value is an index into
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    resolve: Callable[[Any], Any] | None = None
+    resolve: Callable[[Any], Any] | None = None  # ``resolve(spec) -> spec`` with every derived part written out
+    # ``analyze_block(spec, block) -> answer``: many variants of a specification at once; None if the model cannot
+    # vary these paths or measure these metrics
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
+    # ``rows(specs) -> iterator of (indices, SolvedRows)``: the mechanisms of closed form, those of one kind together
+    # (`cfmkit.families.rows`); it takes the place of `analyze_block`
     rows: Callable[[Sequence[Any]], Iterator[tuple[NDArray[Any], SolvedRows[Any]]]] | None = None
+    # whether `analyze_block` takes windows whose ends are shares of the travel, which each variant has of its own
     block_shares: bool = False
+    # ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those metrics (over the
+    # window of the analysis) and paths that the family knows; `local` asks for it
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
+    # ``"module:function"`` with ``sampled(spec, places) -> Sampled``: effort and stress at a few places [m or rad],
+    # faster than the analysis and equal to it; None if it cannot. Searches over many parts ask for it
     sampled: str | None = None
+    # ``"module:function"`` with ``sampled_slopes(spec, places, paths) -> SampledSlopes``: the same with exact
+    # derivatives by the values at those paths that the family knows; None if it cannot
     sampled_slopes: str | None = None
+    # ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
+    # specification may move, and in which ranges [SI], as its `design` block says it for the design itself
     free: str | None = None
+    # ``"module:function"`` with ``errors(spec) -> {path: "thickness", "position" or "rate"}``: which values of a part
+    # err, and in what: by the process that makes it, or as the rate of a spring
     errors: str | None = None
+    # ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes of its
+    # departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement
     attribution: str | None = None
-    draw: str | None = None
+    draw: str | None = None  # ``"module"`` with ``figures(result)``, imported when drawing
+    # the mechanism with its dimensions and their keys named: a file of a package, ``"package/folder/file.svg"``; a PNG
+    # and a PDF of the same name may stand beside it
     dimension_drawing: str = ""
+    # ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not `Smooth` lie within
+    # the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them
     outline: str | None = None
+    # ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks of
+    # finite-element solvers; imported when exporting
     elastic_parts: str | None = None
+    # ``"module:function"`` with ``function(spec) -> (DrivenNetwork, ...)``: the same parts as beams, for decks
     elastic_networks: str | None = None
+    # ``"module:function"``, ``propose(wish, run) -> FamilyOffer``: what it could do with a wish, by scaling laws
     propose: str | None = None
-    room: str | None = None
-    levels: tuple[str, ...] = ()
-    headline: tuple[str, ...] = ()
-    branches: tuple[str, ...] = ()
-    template: str = ""
+    room: str | None = None  # ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in
+    levels: tuple[str, ...] = ()  # dotted paths of the forces that its `design` block may ask for
+    headline: tuple[str, ...] = ()  # values and metrics that are shown first after a run, in this order
+    branches: tuple[str, ...] = ()  # every name that a branch of its curves may have; none where the curve decides
+    template: str = ""  # what ``cfmkit new`` starts from: a file of a package, ``"package/folder/file"``
+    # every warning or failure name the family can report, with its meaning
     findings: dict[str, str] = field(default_factory=dict)
-    references: tuple[str, ...] = ()
-    bibliography: str = ""
-    interface: int | None = None
+    references: tuple[str, ...] = ()  # the papers, in one line each
+    bibliography: str = ""  # the same in BibTeX: a file of a package, ``"package/folder/file"``
+    interface: int | None = None  # the `INTERFACE` that a family of another package was written for, as a plain number
 
     def __post_init__(self) -> None:
         """Add the findings that every family has, and the values of those that know their box."""
@@ -434,7 +311,7 @@ class Family:
         return sized(result, self.envelope(result))
 
     def envelope(self, result: Result) -> Room | None:
-        """Return the box that a solved mechanism stays in; None where it is not known."""
+        """Return the box that a solved mechanism stays in; None if it is not known."""
         found: Room | None = function_named(self.room)(result) if self.room else None
         return found
 

@@ -42,20 +42,11 @@ class Unusable(UsageError):
 
 @dataclass(frozen=True)
 class InstalledFamily:
-    """A family that an installed package offers.
+    """A family that an installed package offers."""
 
-    Attributes
-    ----------
-    name : str
-        Of the family.
-    target : str
-        ``module:record``.
-    package, version : str
-        What was installed.
-    """
-
-    name: str
-    target: str
+    name: str  # of the family
+    target: str  # ``module:record``
+    # package, version: what was installed
     package: str
     version: str
 

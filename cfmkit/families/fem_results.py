@@ -66,29 +66,14 @@ def unknown_to_beams() -> dict[str, Quantity]:
 
 @dataclass(frozen=True, eq=False)
 class FilletRow:
-    """One fillet with its largest stress.
+    """One fillet with its largest stress."""
 
-    Attributes
-    ----------
-    place : str
-        What it joins, by names of the specification.
-    arc : FilletArc
-    stress : float
-        Largest in the window, tension positive [Pa].
-    motion : float
-        Where it occurs [m or rad].
-    preload : float, optional
-        At which it occurs [m], of springs that are preloaded.
-    nominal : float
-        Stress of beams at the end of the fillet there [Pa], see `nominal_stress_beside_fillets`; NaN where there is
-        none.
-    """
-
-    place: str
+    place: str  # what it joins, by names of the specification
     arc: FilletArc
-    stress: float
-    motion: float
-    preload: float | None = None
+    stress: float  # largest in the window, tension positive [Pa]
+    motion: float  # where it occurs [m or rad]
+    preload: float | None = None  # at which it occurs [m], of springs that are preloaded
+    # stress of beams at the end of the fillet there [Pa], see `nominal_stress_beside_fillets`; NaN where there is none
     nominal: float = math.nan
 
     @property

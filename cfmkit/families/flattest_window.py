@@ -20,7 +20,7 @@ INSIDE = 1e-6
 def flattest(result: Result, length: float) -> tuple[float, float] | None:
     """Return the ends of the window of a length [m or rad] with the smallest ripple of its worst branch.
 
-    Of the nominal curve; None where it is shorter, or has no force.
+    Of the nominal curve; None if it is shorter, or has no force.
     """
     if not result.curves:
         return None

@@ -17,20 +17,11 @@ ROUNDS = 60
 
 @dataclass(frozen=True)
 class GuideFriction:
-    """What a guide takes.
+    """What a guide takes."""
 
-    Attributes
-    ----------
-    friction : float
-        Coefficient of Coulomb friction mu.
-    drag : float
-        What it takes without load [N].
-    tilt : float
-        Distance of the line of force from the guide's middle line over half the guide's length; mu tilt < 1.
-    """
-
-    friction: float = 0.0
-    drag: float = 0.0
+    friction: float = 0.0  # coefficient of Coulomb friction mu
+    drag: float = 0.0  # what it takes without load [N]
+    # distance of the line of force from the guide's middle line over half the guide's length; mu tilt < 1
     tilt: float = 0.0
 
     @classmethod

@@ -106,12 +106,7 @@ def with_steps(travel: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class SolvedBeams:
-    """Beams at the points of a path, whose stress is wanted at places on their edges.
-
-    Attributes
-    ----------
-    path : Path
-    """
+    """Beams at the points of a path, whose stress is wanted at places on their edges."""
 
     path: Path
 
@@ -149,7 +144,7 @@ class SolvedBeams:
         return worst if abs(worst) > NEGLIGIBLE * float(self.largest[point]) else float("nan")
 
     def _point(self, travel: float) -> int | None:
-        """Return the point of the path at a travel; None where there is none that is accurate."""
+        """Return the point of the path at a travel; None if there is none that is accurate."""
         known = self.path.at_requested
         off = np.abs(self.path.drive[known] - travel)
         if not len(known) or off.min() > TOGETHER * float(np.abs(self.path.drive).max()):
@@ -158,7 +153,7 @@ class SolvedBeams:
         return point if self.path.accurate[point] else None
 
     def _on_edge(self, name: str, beam: Beam, place: FloatArray, point: int) -> float | None:
-        """Return the stress of a beam at a place on its edge (2,) [m]; None where it is not on it."""
+        """Return the stress of a beam at a place on its edge (2,) [m]; None if it is not on it."""
         axis, found = self.axes[name], self.sections[name]
         k, share, off = _foot(axis, place)
         way = (axis[k + 1] - axis[k]) / np.hypot(*(axis[k + 1] - axis[k]))

@@ -142,7 +142,7 @@ class Run:
         object.__setattr__(self, "time_budget", read_time(self.time_budget))
 
     def wants(self, names: Iterable[str]) -> bool:
-        """Tell whether any of these metrics is looked at."""
+        """Return True if any of these metrics is looked at."""
         return self.wanted is None or not self.wanted.isdisjoint(names)
 
     def part(self, begun: float, ended: float) -> Run:

@@ -45,53 +45,28 @@ STATED_ERROR = 1e-12
 
 @dataclass(frozen=True)
 class MeasuringFrame:
-    """What a curve is measured against.
+    """What a curve is measured against."""
 
-    Attributes
-    ----------
-    target : float or None
-        The force or torque it should have [N or N m].
-    reference : float or None
-        Motion of the reference pose [m or rad]; default: the centre of the window.
-    allowable_stress : float or None
-        [Pa].
-    band : float
-        Half width of the force band of ``usable_stroke``, as a fraction.
-    valid : tuple of (float, float) or None
-        Intervals of the motion in which the mechanism works as intended; None: everywhere.
-    load_cases : tuple of Curve
-        Whose stress counts beside the curve's own.
-    closed : ClosedForm or None
-        The model at every place, for metrics that are places.
-    ends : Curve or None
-        Points at which windows end between those of the curve, with their stress.
-    winding : WindingPath or None
-        The model of a branch whose motion turns back.
-    durability : Durability or None
-        Fatigue and relaxation of the material.
-    curve : TargetCurve or None
-        What it should follow where it is not to be constant.
-    effort_error : float or None
-        Numerical error of the effort [N or N m], below which there is nothing to compare with; None: not stated.
-    part_efforts : callable or None
-        Returns the largest effort of one spring or member of a branch at places of its motion (`Result.part_efforts`).
-    """
-
-    target: float | None = None
-    reference: float | None = None
-    allowable_stress: float | None = None
-    band: float = 0.05
+    target: float | None = None  # the force or torque it should have [N or N m]
+    reference: float | None = None  # motion of the reference pose [m or rad]; default: the centre of the window
+    allowable_stress: float | None = None  # [Pa]
+    band: float = 0.05  # half width of the force band of ``usable_stroke``, as a fraction
+    # intervals of the motion in which the mechanism works as intended; None: everywhere
     valid: tuple[tuple[float, float], ...] | None = None
-    load_cases: tuple[Curve, ...] = ()
+    load_cases: tuple[Curve, ...] = ()  # whose stress counts beside the curve's own
+    # the model at every place, for metrics that are places
     closed: ClosedForm | None = field(default=None, compare=False)
+    # points at which windows end between those of the curve, with their stress
     ends: Curve | None = field(default=None, compare=False)
-    winding: WindingPath | None = field(default=None, compare=False)
-    durability: Durability | None = None
-    curve: TargetCurve | None = None
+    winding: WindingPath | None = field(default=None, compare=False)  # the model of a branch whose motion turns back
+    durability: Durability | None = None  # fatigue and relaxation of the material
+    curve: TargetCurve | None = None  # what it should follow where it is not to be constant
     over_motion: bool = False
     """Whether means are over the motion and not over the points: those of a recording stand where its clock put them.
     """
+    # numerical error of the effort [N or N m], below which there is nothing to compare with; None: not stated
     effort_error: float | None = None
+    # returns the largest effort of one spring or member of a branch at places of its motion (`Result.part_efforts`)
     part_efforts: Callable[[str, FloatArray], FloatArray] | None = field(default=None, compare=False)
 
     def has_target(self) -> bool:
@@ -139,24 +114,12 @@ class Function(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One branch of a curve, as metrics see it.
+    """One branch of a curve, as metrics see it."""
 
-    Attributes
-    ----------
-    trace : BranchTrace
-        The whole branch, in path order.
-    kind : {"force", "torque"}
-        What its effort is.
-    frame : MeasuringFrame
-        What it is measured against.
-    window : Window or None
-        Where it is measured; None: everywhere.
-    """
-
-    trace: BranchTrace
-    kind: Kind
-    frame: MeasuringFrame
-    window: Window | None = None
+    trace: BranchTrace  # the whole branch, in path order
+    kind: Kind  # what its effort is
+    frame: MeasuringFrame  # what it is measured against
+    window: Window | None = None  # where it is measured; None: everywhere
 
     @property
     def name(self) -> str:

@@ -58,22 +58,13 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class BranchTrace:
-    """One branch of a curve, or the part of it inside a window, in path order.
+    """One branch of a curve, or the part of it inside a window, in path order."""
 
-    Attributes
-    ----------
-    name : str
-        The branch.
-    motion, effort : (n,) array
-        Displacement and force [m, N], or angle and torque [rad, N m].
-    stress : (n,) array or None
-        The curve's column ``max_stress`` [Pa], if it has one.
-    """
-
-    name: str
+    name: str  # the branch
+    # motion, effort, (n,): displacement and force [m, N], or angle and torque [rad, N m]
     motion: FloatArray
     effort: FloatArray
-    stress: FloatArray | None = None
+    stress: FloatArray | None = None  # (n,): the curve's column ``max_stress`` [Pa], if it has one
 
     @cached_property
     def way(self) -> int:

@@ -25,20 +25,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What one curve has more than another on one branch.
+    """What one curve has more than another on one branch."""
 
-    Attributes
-    ----------
-    values : (n,) array
-        One less the other at each place [N or N m]; NaN where one of them has no value.
-    reason : str
-        Why they cannot be summed up, should one of them be NaN.
-    weights : (n,) array or None
-        How much each place counts, such as the way that it stands for; None: all alike.
-    """
-
-    values: FloatArray
-    reason: str
+    values: FloatArray  # (n,): one less the other at each place [N or N m]; NaN where one of them has no value
+    reason: str  # why they cannot be summed up, should one of them be NaN
+    # (n,): how much each place counts, such as the way that it stands for; None: all alike
     weights: FloatArray | None = None
 
 

@@ -29,21 +29,12 @@ over long before that one, where the force is hardly more than at it, which errs
 
 @dataclass(frozen=True)
 class FatigueLaw:
-    """Fully reversed stress amplitude over the number of cycles, and the mean stress that it bears.
+    """Fully reversed stress amplitude over the number of cycles, and the mean stress that it bears."""
 
-    Attributes
-    ----------
-    points : tuple of (float, float)
-        Cycles and amplitude [Pa], cycles increasing; empty where `basquin` is given.
-    basquin : (float, float) or None
-        Coefficient s_f' [Pa] and exponent b.
-    ultimate : float
-        Ultimate strength s_u [Pa].
-    """
-
+    # cycles and amplitude [Pa], cycles increasing; empty where `basquin` is given
     points: tuple[tuple[float, float], ...]
-    basquin: tuple[float, float] | None
-    ultimate: float
+    basquin: tuple[float, float] | None  # coefficient s_f' [Pa] and exponent b
+    ultimate: float  # ultimate strength s_u [Pa]
 
     def life(self, largest: float, least: float = 0.0) -> float:
         """Return the number of cycles between two stresses [Pa] until failure.
@@ -87,18 +78,11 @@ class FatigueLaw:
 
 @dataclass(frozen=True)
 class RelaxationLaw:
-    """How the modulus falls at a constant strain.
+    """How the modulus falls at a constant strain."""
 
-    Attributes
-    ----------
-    terms : tuple of (float, float)
-        Share and relaxation time [s] of each Prony term; empty where `points` are given.
-    points : tuple of (float, float)
-        Time [s] and modulus [Pa], times increasing.
-    """
-
+    # share and relaxation time [s] of each Prony term; empty where `points` are given
     terms: tuple[tuple[float, float], ...] = ()
-    points: tuple[tuple[float, float], ...] = ()
+    points: tuple[tuple[float, float], ...] = ()  # time [s] and modulus [Pa], times increasing
 
     def ratio(self, time: float) -> float:
         """Return E(t)/E(0) after a time [s]: by the Prony series, or along log t between the points.

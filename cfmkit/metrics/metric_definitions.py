@@ -44,47 +44,23 @@ _WORDS = {"force": "displacement", "torque": "angle"}
 
 @dataclass(frozen=True)
 class Definition:
-    """What a metric is.
+    """What a metric is."""
 
-    Attributes
-    ----------
-    name : str
-        As requirements and tables call it.
-    dimension : str
-        A name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve.
-    definition : str
-        One sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words.
-    function : callable or None
-        Takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`;
-        None: the family computes it and puts it into `Result.values`.
-    worst : {"largest", "smallest", "farthest-from-target"}
-        Which branch counts where none is named; without a target the farthest is the smallest.
-    scope : {"branch", "cycle", "loop", "value"}
-        What it belongs to: one branch; all branches together, or one of them alone; the
-        closed loop only; or no curve at all.
-    windowed : bool
-        Whether it looks only inside the window.
-    argument : str
-        What stands in its brackets in place of a branch: a dimension, or nothing.
-    of_material : bool
-        Whether it is there only where the material says something about use.
-    of_curve : bool
-        Whether it is there only where a target curve is.
-    of_parts : bool
-        Whether it is there only where the model knows the efforts of single springs and members.
-    """
-
-    name: str
-    dimension: str
-    definition: str
+    name: str  # as requirements and tables call it
+    dimension: str  # a name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve
+    definition: str  # one sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words
+    # takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`; None: the family computes it and
+    # puts it into `Result.values`
     function: Callable[..., float] | None = None
-    worst: Worst = "largest"
+    worst: Worst = "largest"  # which branch counts where none is named; without a target the farthest is the smallest
+    # what it belongs to: one branch; all branches together, or one of them alone; the closed loop only; or no curve at
+    # all
     scope: Scope = "branch"
-    windowed: bool = True
-    argument: str = ""
-    of_material: bool = False
-    of_curve: bool = False
-    of_parts: bool = False
+    windowed: bool = True  # whether it looks only inside the window
+    argument: str = ""  # what stands in its brackets in place of a branch: a dimension, or nothing
+    of_material: bool = False  # whether it is there only where the material says something about use
+    of_curve: bool = False  # whether it is there only where a target curve is
+    of_parts: bool = False  # whether it is there only where the model knows the efforts of single springs and members
 
     @property
     def per_branch(self) -> bool:
@@ -298,7 +274,7 @@ def values_of_family(values: Mapping[str, tuple[str, str]]) -> tuple[Definition,
 
 
 def split_name(name: str) -> tuple[str, str | None]:
-    """Return metric and branch of ``force_mean[load]``; the branch is None where none is named."""
+    """Return metric and branch of ``force_mean[load]``; the branch is None if none is named."""
     metric, bracket, rest = name.partition("[")
     return metric, rest.removesuffix("]") if bracket else None
 

@@ -200,7 +200,7 @@ def frame_of(result: Result) -> MeasuringFrame:
 
 
 def travel_of(result: Result) -> tuple[float, float] | None:
-    """Return where the motion was to start and to end [m or rad]; None where that is not known."""
+    """Return where the motion was to start and to end [m or rad]; None if that is not known."""
     if result.travel is not None or not result.curves or not len(result.curves[0]):
         return result.travel
     first = traces(result.curves[0])[0]
@@ -304,24 +304,12 @@ def _named(view: Survey | None, name: str, known: Mapping[str, Definition], resu
 
 @dataclass(frozen=True)
 class UncoveredWindow:
-    """A window that some branch of the nominal curve does not cover.
+    """A window that some branch of the nominal curve does not cover."""
 
-    Attributes
-    ----------
-    window : Window
-        In places.
-    paths : tuple of str
-        Where the specification states it.
-    common : tuple of (float, float)
-        What all branches cover [m or rad].
-    kind : {"force", "torque"}
-        Of the curve.
-    """
-
-    window: Window
-    paths: tuple[str, ...]
-    common: tuple[float, float]
-    kind: Kind
+    window: Window  # in places
+    paths: tuple[str, ...]  # where the specification states it
+    common: tuple[float, float]  # what all branches cover [m or rad]
+    kind: Kind  # of the curve
 
     @property
     def short(self) -> str:

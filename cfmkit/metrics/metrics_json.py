@@ -31,7 +31,7 @@ def as_json(quantity: Quantity) -> dict[str, Any]:
 
 
 def finite_border(value: float, dimension: str) -> float | None:
-    """Return an SI value in its border unit; None where it is beyond what a float, and so JSON, can hold."""
+    """Return an SI value in its border unit; None if it is beyond what a float, and so JSON, can hold."""
     number = float(to_border(value, dimension))
     return number if math.isfinite(number) else None
 

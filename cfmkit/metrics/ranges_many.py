@@ -33,32 +33,20 @@ UNIFORM_POINTS = 100
 
 @dataclass(frozen=True, eq=False)
 class ManyBranches:
-    """One branch of many curves.
+    """One branch of many curves."""
 
-    Attributes
-    ----------
-    motion, effort : (d, n) array
-        Increasing along each row [m or rad], and what is known there [N or N m].
-    low, high : (d,) array
-        Ends of the window, or of the travel where there is no window.
-    pose : (d,) array, optional
-        Where bands are taken; default: the middle of the window.
-    exact : callable, optional
-        ``exact(places, rows)``, the effort at any places of some rows, (r, m) -> (r, m): then places are solved for,
-        not interpolated.
-    excess : callable, optional
-        By what share the stress there exceeds what is allowed, likewise.
-    error : (d,) array, optional
-        Numerical error of the effort [N or N m]: an effort that is not above it is none to compare with.
-    """
-
+    # motion, effort, (d, n): increasing along each row [m or rad], and what is known there [N or N m]
     motion: FloatArray
     effort: FloatArray
+    # low, high, (d,): ends of the window, or of the travel where there is no window
     low: FloatArray
     high: FloatArray
+    # ``exact(places, rows)``, the effort at any places of some rows, (r, m) -> (r, m): then places are solved for, not
+    # interpolated
     exact: Exact | None = None
-    excess: Exact | None = None
-    pose: FloatArray | None = None
+    excess: Exact | None = None  # by what share the stress there exceeds what is allowed, likewise
+    pose: FloatArray | None = None  # (d,): where bands are taken; default: the middle of the window
+    # (d,): numerical error of the effort [N or N m]: an effort that is not above it is none to compare with
     error: FloatArray | float = 0.0
 
     @property

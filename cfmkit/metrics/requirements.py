@@ -35,7 +35,7 @@ ROUNDING = 1e-9
 
 @lru_cache(maxsize=256)
 def bound(text: str | None, dimensions: tuple[str, ...]) -> float | None:
-    """Return a bound in SI from its text, read in one of some dimensions; None where there is none."""
+    """Return a bound in SI from its text, read in one of some dimensions; None if there is none."""
     return None if text is None else read_one_of(text, dimensions)[0]
 
 
@@ -100,37 +100,19 @@ _MOTION = {"force": "length", "torque": "angle"}
 
 @dataclass(frozen=True, repr=False)
 class Outcome(ShortRepr):
-    """What became of one requirement; SI throughout.
+    """What became of one requirement; SI throughout."""
 
-    Attributes
-    ----------
-    metric : str
-        As written in the requirement.
-    dimension : str
-        Of the metric.
-    value : float or None
-        The branch that is closest to breaking the requirement, or breaks it most; None: no value.
-    min, max : float or None
-        The bounds.
-    over : tuple of (float, float) or None
-        The window it was measured over; None: the full travel, or not a matter of a window.
-    kind : {"force", "torque"}
-        Of the curve, which says whether `over` is a length or an angle.
-    ok : bool
-        Whether it is met. Without a value it is not.
-    sentence : str
-        All of that in one line.
-    """
-
-    metric: str
-    dimension: str
-    value: float | None
+    metric: str  # as written in the requirement
+    dimension: str  # of the metric
+    value: float | None  # the branch that is closest to breaking the requirement, or breaks it most; None: no value
+    # min, max: the bounds
     min: float | None
     max: float | None
+    # the window it was measured over; None: the full travel, or not a matter of a window
     over: tuple[float, float] | None
-    kind: Kind
-    ok: bool
-    sentence: str
+    kind: Kind  # of the curve, which says whether `over` is a length or an angle
+    ok: bool  # whether it is met. Without a value it is not
+    sentence: str  # all of that in one line
 
     @property
     def unit(self) -> str:

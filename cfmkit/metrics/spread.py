@@ -29,23 +29,14 @@ ROUNDED = 1e-13
 
 
 class Spread(NamedTuple):
-    """Mean and extremes of the effort over the points in a window, times `sign` so that the mean is not negative.
+    """Mean and extremes of the effort over the points in a window, times `sign` so that the mean is not negative."""
 
-    Attributes
-    ----------
-    mean, max, min : float or (d,) array
-        In the effort's own direction [N or N m].
-    sign : float or (d,) array
-        1 or -1.
-    error : float or (d,) array
-        Numerical error of the effort [N or N m]: what is not above it is no reference.
-    """
-
+    # mean, max, min: in the effort's own direction [N or N m]
     mean: Number
     max: Number
     min: Number
-    sign: Number
-    error: Number = 0.0
+    sign: Number  # 1 or -1
+    error: Number = 0.0  # numerical error of the effort [N or N m]: what is not above it is no reference
 
     @classmethod
     def of(cls, mean: Number, largest: Number, smallest: Number, error: Number = 0.0) -> Spread:

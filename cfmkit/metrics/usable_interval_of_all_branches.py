@@ -38,7 +38,7 @@ class Cycle:
 
     @cached_property
     def usable(self) -> tuple[float, float] | None:
-        """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
+        """Start and end of the largest usable interval; None if the mechanism is usable nowhere."""
         return usable_interval(self)
 
 

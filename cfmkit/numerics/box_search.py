@@ -18,19 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BoxAxis:
-    """A variable: its bounds, and whether its size matters rather than its difference.
+    """A variable: its bounds, and whether its size matters rather than its difference."""
 
-    Attributes
-    ----------
-    low, high : float
-        Bounds; of a logarithmic axis they have one sign, or one of them is zero.
-    log : bool
-        Whether steps are ratios. From a bound of zero it starts at `SMALLEST` of the other.
-    """
-
+    # low, high: bounds; of a logarithmic axis they have one sign, or one of them is zero
     low: float
     high: float
-    log: bool = False
+    log: bool = False  # whether steps are ratios. From a bound of zero it starts at `SMALLEST` of the other
 
     def value(self, share: float) -> float:
         """Return the value at a share of the way, 0 to 1; the bounds exactly."""
@@ -50,20 +43,11 @@ SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class Lowest:
-    """Where a function is smallest.
+    """Where a function is smallest."""
 
-    Attributes
-    ----------
-    place : tuple of float
-        The variables.
-    value : float
-        The function there; infinite if it is so everywhere.
-    profile : tuple of (tuple of float, float)
-        The best place and value for each grid value of the first variable.
-    """
-
-    place: tuple[float, ...]
-    value: float
+    place: tuple[float, ...]  # the variables
+    value: float  # the function there; infinite if it is so everywhere
+    # the best place and value for each grid value of the first variable
     profile: tuple[tuple[tuple[float, ...], float], ...] = ()
 
 

@@ -38,21 +38,12 @@ _TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODE
 
 @dataclass(frozen=True, repr=False)
 class ChebyshevPanels(ShortRepr):
-    """A function that is one polynomial on each panel.
+    """A function that is one polynomial on each panel."""
 
-    Attributes
-    ----------
-    ends : (k + 1,) array
-        Of the panels, increasing.
-    spans : (k, 2) array
-        What each polynomial was made over: its panel, or the most of it where no value could be had at an end.
-    coefficients : (k, NODES) array
-        Of the Chebyshev polynomials; NaN where a node is not known.
-    """
-
-    ends: FloatArray
+    ends: FloatArray  # (k + 1,): of the panels, increasing
+    # (k, 2): what each polynomial was made over: its panel, or the most of it where no value could be had at an end
     spans: FloatArray
-    coefficients: FloatArray
+    coefficients: FloatArray  # (k, NODES): of the Chebyshev polynomials; NaN where a node is not known
 
     def at(self, x: FloatArray) -> FloatArray:
         """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""

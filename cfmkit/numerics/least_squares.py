@@ -40,29 +40,17 @@ class NotFinite(ValueError):
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """A problem: what to make small, from where, within which bounds.
+    """A problem: what to make small, from where, within which bounds."""
 
-    Attributes
-    ----------
-    residuals : callable
-        ``residuals(values) -> (n,) array``; NaN where there is none.
-    start, low, high : (p,) array
-        Starting values and bounds.
-    size : (p,) array
-        Typical size of each parameter, positive.
-    level : float
-        Typical size of the data, in the unit of the residuals.
-    design_effect : float
-        How many residuals count as one because they have unequal weights: the mean square of the weights over the
-        square of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2).
-    """
-
-    residuals: Callable[[FloatArray], FloatArray]
+    residuals: Callable[[FloatArray], FloatArray]  # ``residuals(values) -> (n,) array``; NaN where there is none
+    # start, low, high, (p,): starting values and bounds
     start: FloatArray
     low: FloatArray
     high: FloatArray
-    size: FloatArray
-    level: float
+    size: FloatArray  # (p,): typical size of each parameter, positive
+    level: float  # typical size of the data, in the unit of the residuals
+    # how many residuals count as one because they have unequal weights: the mean square of the weights over the square
+    # of their mean (L. Kish, Survey Sampling, Wiley 1965, sec. 8.2)
     design_effect: float = 1.0
 
     def jacobian(self, values: FloatArray) -> FloatArray:
@@ -90,36 +78,17 @@ class LeastSquares:
 
 @dataclass(frozen=True)
 class FittedValues:
-    """The outcome of a fit.
+    """The outcome of a fit."""
 
-    Attributes
-    ----------
-    values : (p,) array
-        Best values.
-    covariance : (p, p) array
-        Of the values, inflated by `inflation`.
-    residuals : (n,) array
-        At the best values.
-    noise : float
-        Standard deviation of the residuals, by their median absolute deviation under a robust loss.
-    inflation : float
-        Correlation time of the residuals in samples, times the effect of their weights: so many count as one.
-    at_bound : (p,) array of bool
-        Which values lie on a bound.
-    freedom : float
-        Degrees of freedom left.
-    converged : bool
-        Whether the solver says so.
-    """
-
-    values: FloatArray
-    covariance: FloatArray
-    residuals: FloatArray
-    noise: float
+    values: FloatArray  # (p,): best values
+    covariance: FloatArray  # (p, p): of the values, inflated by `inflation`
+    residuals: FloatArray  # (n,): at the best values
+    noise: float  # standard deviation of the residuals, by their median absolute deviation under a robust loss
+    # correlation time of the residuals in samples, times the effect of their weights: so many count as one
     inflation: float
-    at_bound: Any
-    freedom: float
-    converged: bool
+    at_bound: Any  # (p,): which values lie on a bound
+    freedom: float  # degrees of freedom left
+    converged: bool  # whether the solver says so
 
     @property
     def deviations(self) -> FloatArray:
@@ -249,21 +218,11 @@ def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """Whether residuals swing along the data by more than their noise explains.
+    """Whether residuals swing along the data by more than their noise explains."""
 
-    Attributes
-    ----------
-    swing : float
-        Root mean square of what is systematic in them.
-    noise : float
-        Standard deviation of what is not.
-    chance : float
-        Probability that noise alone makes means of neighbours as large.
-    """
-
-    swing: float
-    noise: float
-    chance: float
+    swing: float  # root mean square of what is systematic in them
+    noise: float  # standard deviation of what is not
+    chance: float  # probability that noise alone makes means of neighbours as large
 
 
 BLOCKS = 24

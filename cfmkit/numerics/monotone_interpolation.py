@@ -25,15 +25,6 @@ if TYPE_CHECKING:
 class ThroughPoints:
     """A function through points.
 
-    Attributes
-    ----------
-    places : tuple of float
-        Increasing, at least two.
-    values : tuple of float
-        One for each place.
-    smooth : bool
-        Monotone cubics with a continuous slope; else straight lines.
-
     Examples
     --------
     >>> step = ThroughPoints((0.0, 1.0, 2.0, 3.0), (1.0, 1.0, 2.0, 2.0))
@@ -43,9 +34,9 @@ class ThroughPoints:
     4.5
     """
 
-    places: tuple[float, ...]
-    values: tuple[float, ...]
-    smooth: bool = True
+    places: tuple[float, ...]  # increasing, at least two
+    values: tuple[float, ...]  # one for each place
+    smooth: bool = True  # monotone cubics with a continuous slope; else straight lines
 
     @cached_property
     def _knots(self) -> FloatArray:

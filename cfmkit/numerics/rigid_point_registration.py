@@ -38,23 +38,14 @@ _FEET = 12
 
 @dataclass(frozen=True)
 class CurveFrame:
-    """A smooth curve at some parameters.
+    """A smooth curve at some parameters."""
 
-    Attributes
-    ----------
-    points, tangents, normals : (n, 2) array
-        Unit tangents along increasing parameter; unit normals to the outside.
-    speed : (n,) array
-        Length per parameter.
-    curvature : (n,) array
-        Positive where the curve bends away from its normal (convex outside).
-    """
-
+    # points, tangents, normals, (n, 2): unit tangents along increasing parameter; unit normals to the outside
     points: FloatArray
     tangents: FloatArray
     normals: FloatArray
-    speed: FloatArray
-    curvature: FloatArray
+    speed: FloatArray  # (n,): length per parameter
+    curvature: FloatArray  # (n,): positive where the curve bends away from its normal (convex outside)
 
 
 class SmoothCurve(Protocol):
@@ -70,43 +61,20 @@ class SmoothCurve(Protocol):
 
 @dataclass(frozen=True)
 class Registration:
-    """Where measured points lie on their curves.
+    """Where measured points lie on their curves."""
 
-    Attributes
-    ----------
-    angle : float
-        Of the motion from measured to registered points [rad].
-    shift : (2,) array
-        Of the motion, after the turn.
-    points : tuple of (n, 2) array
-        Registered points of each curve.
-    parameters : tuple of (n,) array
-        Of their feet.
-    errors : tuple of (n,) array
-        Distance from the curve along its normal; positive outside.
-    weights : tuple of (n,) array
-        Last weights; 0 for outliers and for points beyond the ends of their curve.
-    covariance : (3, 3) array
-        Of angle and shift, inflated where successive residuals are alike.
-    growth : (2,) array
-        Shift, at the centre of the points, by which the registration would answer a part that is
-        larger by one along all normals: an error of width that it takes for a place. 0 where the width is fitted.
-    width : float
-        By how much the part is larger along all normals, as fitted; 0 where it was not.
-    width_deviation : float
-        Its standard deviation.
-    """
-
-    angle: float
-    shift: FloatArray
-    points: tuple[FloatArray, ...]
-    parameters: tuple[FloatArray, ...]
-    errors: tuple[FloatArray, ...]
-    weights: tuple[FloatArray, ...]
-    covariance: FloatArray
+    angle: float  # of the motion from measured to registered points [rad]
+    shift: FloatArray  # (2,): of the motion, after the turn
+    points: tuple[FloatArray, ...]  # registered points of each curve
+    parameters: tuple[FloatArray, ...]  # of their feet
+    errors: tuple[FloatArray, ...]  # distance from the curve along its normal; positive outside
+    weights: tuple[FloatArray, ...]  # last weights; 0 for outliers and for points beyond the ends of their curve
+    covariance: FloatArray  # (3, 3): of angle and shift, inflated where successive residuals are alike
+    # (2,): shift, at the centre of the points, by which the registration would answer a part that is larger by one
+    # along all normals: an error of width that it takes for a place. 0 where the width is fitted
     growth: FloatArray
-    width: float = 0.0
-    width_deviation: float = 0.0
+    width: float = 0.0  # by how much the part is larger along all normals, as fitted; 0 where it was not
+    width_deviation: float = 0.0  # its standard deviation
 
     @property
     def deviations(self) -> FloatArray:

@@ -23,20 +23,11 @@ _STIFFEST, _SOFTEST = 6.0, -14.0
 
 @dataclass(frozen=True)
 class SmoothedFunction:
-    """A smooth function through noisy points.
+    """A smooth function through noisy points."""
 
-    Attributes
-    ----------
-    spline : BSpline
-        The function.
-    residual : float
-        Root mean square of (points - function).
-    low, high : float
-        Where the points begin and end.
-    """
-
-    spline: Any
-    residual: float
+    spline: Any  # the function
+    residual: float  # root mean square of (points - function)
+    # low, high: where the points begin and end
     low: float
     high: float
 

@@ -40,7 +40,7 @@ class Program(Protocol):
     """What is minimised: an objective, and constraints that are to be at least zero, both of order one."""
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
-        """Return the objective and the constraints (m,) at z (n,); None where the model has no answer."""
+        """Return the objective and the constraints (m,) at z (n,); None if the model has no answer."""
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return their derivatives by z, (n,) and (m, n)."""
@@ -53,61 +53,32 @@ def _never() -> bool:
 
 @dataclass(frozen=True)
 class Effort:
-    """How long to try.
+    """How long to try."""
 
-    Attributes
-    ----------
-    steps : int
-        At most so many.
-    tolerance : float
-        A change of the objective that is small.
-    violation : float
-        What counts as none.
-    stop : callable
-        Asked before each evaluation whether the time is up.
-    enough : float
-        End at the first point without violation whose objective is this or less.
-    last : bool
-        Whether to return the point where the steps end, though a better one was seen: of those without violation the
-        best is likely to be one that just counts as such, the last one has next to none if the steps converge.
-    patience : int, optional
-        End where in so many evaluations no point without violation was seen and the worst violation has not fallen by
-        `_FALL`: the constraints contradict each other there, and the steps are the rounding of a line search.
-    """
-
-    steps: int = 60
-    tolerance: float = 1e-6
-    violation: float = 1e-5
-    stop: Callable[[], bool] = _never
-    enough: float = -np.inf
+    steps: int = 60  # at most so many
+    tolerance: float = 1e-6  # a change of the objective that is small
+    violation: float = 1e-5  # what counts as none
+    stop: Callable[[], bool] = _never  # asked before each evaluation whether the time is up
+    enough: float = -np.inf  # end at the first point without violation whose objective is this or less
+    # whether to return the point where the steps end, though a better one was seen: of those without violation the best
+    # is likely to be one that just counts as such, the last one has next to none if the steps converge
     last: bool = False
+    # end where in so many evaluations no point without violation was seen and the worst violation has not fallen by
+    # `_FALL`: the constraints contradict each other there, and the steps are the rounding of a line search
     patience: int | None = None
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The point that was found.
+    """The point that was found."""
 
-    Attributes
-    ----------
-    z : (n,) array
-        Where.
-    objective, constraints : float and (m,) array
-        There; infinite and none where the model has no answer.
-    ending : SearchEnding
-        Why the search ended.
-    evaluations : int
-        How often the model was evaluated.
-    allowed : float
-        Violation that counts as none.
-    """
-
-    z: FloatArray
+    z: FloatArray  # (n,): where
+    # objective, constraints: there; infinite and none where the model has no answer
     objective: float
     constraints: FloatArray
-    ending: SearchEnding
-    evaluations: int
-    allowed: float
+    ending: SearchEnding  # why the search ended
+    evaluations: int  # how often the model was evaluated
+    allowed: float  # violation that counts as none
 
     @property
     def violation(self) -> float:
@@ -222,7 +193,7 @@ class _Memory:
             raise _Enough(SearchEnding.STUCK)
 
     def optimum(self, z: FloatArray, answer: Any, ending: SearchEnding) -> Optimum:
-        """Return a point with its answer, None where the model has none."""
+        """Return a point with its answer, None if the model has none."""
         objective, constraints = (np.inf, np.zeros(0)) if answer is None else answer
         return Optimum(z, objective, constraints, ending, self.evaluations, self.effort.violation)
 

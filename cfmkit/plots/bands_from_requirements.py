@@ -29,26 +29,16 @@ Bounds = tuple[float | None, float | None]
 
 @dataclass(frozen=True)
 class Band:
-    """Where a force or torque must be, in SI.
+    """Where a force or torque must be, in SI."""
 
-    Attributes
-    ----------
-    low, high : float or None
-        Bounds of the effort [N or N m]; None where there is none.
-    start, stop : float
-        Window of the motion [m or rad].
-    text : str
-        What the requirement says and what the curve does.
-    met : bool
-        Whether the curve keeps it.
-    """
-
+    # low, high: bounds of the effort [N or N m]; None if there is none
     low: float | None
     high: float | None
+    # start, stop: window of the motion [m or rad]
     start: float
     stop: float
-    text: str
-    met: bool
+    text: str  # what the requirement says and what the curve does
+    met: bool  # whether the curve keeps it
 
 
 def bands_of(result: Result) -> tuple[Band, ...]:

@@ -48,25 +48,15 @@ larger share."""
 
 @dataclass(frozen=True)
 class CurveLook:
-    """What `plot_curve` draws beside the lines.
+    """What `plot_curve` draws beside the lines."""
 
-    Attributes
-    ----------
-    bands, names, arrows : bool
-        Requirement bands, names beside the lines, arrows along the path.
-    levels : tuple of Limit
-        Dashed lines to compare with.
-    regions : tuple of MarkedRange
-        Parts of the motion to shade and name.
-    window : ((float, float), (float, float)), optional
-        Limits of motion and effort in SI; default: everything, zero effort included.
-    """
-
+    # bands, names, arrows: requirement bands, names beside the lines, arrows along the path
     bands: bool = True
     names: bool = True
     arrows: bool = True
-    levels: tuple[Limit, ...] = ()
-    regions: tuple[MarkedRange, ...] = ()
+    levels: tuple[Limit, ...] = ()  # dashed lines to compare with
+    regions: tuple[MarkedRange, ...] = ()  # parts of the motion to shade and name
+    # limits of motion and effort in SI; default: everything, zero effort included
     window: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 

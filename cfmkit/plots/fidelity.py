@@ -27,20 +27,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """What one curve has more than the finest one.
+    """What one curve has more than the finest one."""
 
-    Attributes
-    ----------
-    curve : int
-        Which of the curves it is.
-    name : str
-        To write beside the line; empty for none.
-    places, values : (n,) array
-        Motion and difference of the effort [SI].
-    """
-
-    curve: int
-    name: str
+    curve: int  # which of the curves it is
+    name: str  # to write beside the line; empty for none
+    # places, values, (n,): motion and difference of the effort [SI]
     places: FloatArray
     values: FloatArray
 

@@ -25,24 +25,12 @@ NARROWEST, WIDEST = 0.06, 0.6
 
 @dataclass(frozen=True)
 class FigureForm:
-    """How figures are to be written.
+    """How figures are to be written."""
 
-    Attributes
-    ----------
-    formats : tuple of {"png", "svg", "pdf"}
-        One file for each.
-    width : float, optional
-        Of the print [m]; default: each figure as it is drawn.
-    titles : bool
-        Whether headings stand above figures; in print the caption says what they say.
-    settings : tuple of (str, Any)
-        Of matplotlib, on top of ours.
-    """
-
-    formats: tuple[str, ...] = ("png",)
-    width: float | None = None
-    titles: bool = True
-    settings: tuple[tuple[str, Any], ...] = field(default=(), repr=False)
+    formats: tuple[str, ...] = ("png",)  # one file for each
+    width: float | None = None  # of the print [m]; default: each figure as it is drawn
+    titles: bool = True  # whether headings stand above figures; in print the caption says what they say
+    settings: tuple[tuple[str, Any], ...] = field(default=(), repr=False)  # of matplotlib, on top of ours
 
     @property
     def plain(self) -> bool:

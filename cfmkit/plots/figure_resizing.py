@@ -51,30 +51,14 @@ Box = tuple[float, float, float, float]
 
 @dataclass
 class FigureLayout:
-    """What a drawing asks for, and what it gets: while `boxes` is empty it is only listened to.
+    """What a drawing asks for, and what it gets: while `boxes` is empty it is only listened to."""
 
-    Attributes
-    ----------
-    size : (float, float)
-        Of the figure [mm].
-    asked : list of (left, bottom, width, height)
-        Boxes of the axes, in the order of the drawing [mm].
-    boxes : sequence of (left, bottom, width, height)
-        What it gets instead.
-    host : Figure, optional
-        Where it draws, if not in a figure of its own.
-    above : float
-        Room at the top that it is to leave free, for the letter of a panel [mm].
-    stacked : bool
-        Whether boxes that stood side by side stand below each other: each has its own scales, then.
-    """
-
-    size: tuple[float, float] = (0.0, 0.0)
-    asked: list[Box] = dataclasses.field(default_factory=list)
-    boxes: Sequence[Box] = ()
-    host: Any = None
-    above: float = 0.0
-    stacked: bool = False
+    size: tuple[float, float] = (0.0, 0.0)  # of the figure [mm]
+    asked: list[Box] = dataclasses.field(default_factory=list)  # boxes of the axes, in the order of the drawing [mm]
+    boxes: Sequence[Box] = ()  # what it gets instead
+    host: Any = None  # where it draws, if not in a figure of its own
+    above: float = 0.0  # room at the top that it is to leave free, for the letter of a panel [mm]
+    stacked: bool = False  # whether boxes that stood side by side stand below each other: each has its own scales, then
 
     def sized(self, width: float, height: float) -> tuple[float, float]:
         """Return the size of the figure, and note it where none is set."""
@@ -184,7 +168,7 @@ _LAYOUT: ContextVar[FigureLayout | None] = ContextVar("layout", default=None)
 
 
 def current() -> FigureLayout | None:
-    """Return the layout of the figure that is being drawn; None where it is drawn as it says."""
+    """Return the layout of the figure that is being drawn; None if it is drawn as it says."""
     return _LAYOUT.get()
 
 

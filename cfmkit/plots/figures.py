@@ -37,7 +37,7 @@ def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]
 
 
 def moving_of(family: Family, result: Result) -> Moving | None:
-    """Return a mechanism in motion; None where there is no curve, or its family has no film."""
+    """Return a mechanism in motion; None if there is no curve, or its family has no film."""
     if not family.draw or not result.curves:
         return None
     draw = getattr(import_module(family.draw), "moving", None)  # optional: a family may have figures without a film

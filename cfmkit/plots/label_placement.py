@@ -58,28 +58,15 @@ _SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [
 
 @dataclass(frozen=True)
 class Label:
-    """A name and what it belongs to.
+    """A name and what it belongs to."""
 
-    Attributes
-    ----------
-    text, color : str
-        What to write, and how.
-    points : (n, 2) array
-        The line that is named, in data coordinates.
-    prefer : float
-        Where along the points the name should stand, 0 to 1.
-    toward : (float, float), optional
-        Direction in which the name should stand from its line.
-    halo : bool
-        Whether to clear the background behind the name.
-    """
-
+    # text, color: what to write, and how
     text: str
     color: str
-    points: FloatArray
-    prefer: float = 0.6
-    toward: tuple[float, float] | None = None
-    halo: bool = True
+    points: FloatArray  # (n, 2): the line that is named, in data coordinates
+    prefer: float = 0.6  # where along the points the name should stand, 0 to 1
+    toward: tuple[float, float] | None = None  # direction in which the name should stand from its line
+    halo: bool = True  # whether to clear the background behind the name
 
 
 @styled

@@ -37,23 +37,12 @@ _LINK = "http://www.w3.org/1999/xlink"
 
 @dataclass(frozen=True)
 class Moving:
-    """What a family says about its mechanism in motion.
+    """What a family says about its mechanism in motion."""
 
-    Attributes
-    ----------
-    motion : (n,) array
-        Displacement [m] or angle [rad] of each pose, as the curve has it.
-    box : (float, float, float, float)
-        Left, bottom, right and top of what all poses need [m].
-    draw : callable
-        ``draw(ax, number)`` draws one pose to scale.
-    draw_as_made : callable, optional
-        The same where `draw` has symbols that are not to scale: with the size of every part that takes room.
-    """
-
-    motion: FloatArray
-    box: tuple[float, float, float, float]
-    draw: Callable[[Axes, int], Any]
+    motion: FloatArray  # (n,): displacement [m] or angle [rad] of each pose, as the curve has it
+    box: tuple[float, float, float, float]  # left, bottom, right and top of what all poses need [m]
+    draw: Callable[[Axes, int], Any]  # ``draw(ax, number)`` draws one pose to scale
+    # the same where `draw` has symbols that are not to scale: with the size of every part that takes room
     draw_as_made: Callable[[Axes, int], Any] | None = None
 
 

@@ -74,28 +74,15 @@ class Scale:
 
 @dataclass(frozen=True)
 class Diagram:
-    """Everything on one pair of axes.
+    """Everything on one pair of axes."""
 
-    Attributes
-    ----------
-    over : (n,) array
-        What is on the horizontal axis [SI].
-    x, y : Scale
-        The axes.
-    series : sequence of Series
-        Lines, each of n values.
-    limits : sequence of Limit
-        Horizontal lines.
-    regions : sequence of MarkedRange
-        Shaded parts of the horizontal axis.
-    """
-
-    over: FloatArray
+    over: FloatArray  # (n,): what is on the horizontal axis [SI]
+    # x, y: the axes
     x: Scale
     y: Scale
-    series: Sequence[Series]
-    limits: Sequence[Limit] = ()
-    regions: Sequence[MarkedRange] = ()
+    series: Sequence[Series]  # lines, each of n values
+    limits: Sequence[Limit] = ()  # horizontal lines
+    regions: Sequence[MarkedRange] = ()  # shaded parts of the horizontal axis
 
 
 @styled

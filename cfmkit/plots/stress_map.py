@@ -36,22 +36,12 @@ NEAREST = 8
 
 @dataclass(frozen=True)
 class StressView:
-    """One part at one pose.
-
-    Attributes
-    ----------
-    solved : MeshSolution
-    pose : int
-        Number of the pose.
-    name : str
-        What stands above it.
-    fillets : mapping
-        Fillets that are to be numbered, by their numbers in fillets.csv.
-    """
+    """One part at one pose."""
 
     solved: MeshSolution
-    pose: int
-    name: str
+    pose: int  # number of the pose
+    name: str  # what stands above it
+    # fillets that are to be numbered, by their numbers in fillets.csv
     fillets: Mapping[int, FilletArc] = field(default_factory=dict)
 
     @property

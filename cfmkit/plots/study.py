@@ -337,21 +337,11 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
 
 @dataclass(frozen=True)
 class MapPlaces:
-    """The values of one parameter of a grid along an axis.
+    """The values of one parameter of a grid along an axis."""
 
-    Attributes
-    ----------
-    scale : DrawnScale
-        The parameter.
-    values : (n,) array
-        Increasing.
-    order : (n,) array of int
-        Which of the grid's levels they are.
-    """
-
-    scale: DrawnScale
-    values: FloatArray
-    order: NDArray[np.intp]
+    scale: DrawnScale  # the parameter
+    values: FloatArray  # (n,): increasing
+    order: NDArray[np.intp]  # (n,): which of the grid's levels they are
 
     @property
     def words(self) -> bool:

@@ -26,28 +26,15 @@ LONGEST = 64
 
 @dataclass(frozen=True)
 class DrawnScale:
-    """Something that is drawn: a parameter or a metric, in border units.
+    """Something that is drawn: a parameter or a metric, in border units."""
 
-    Attributes
-    ----------
-    name, dimension : str
-        For its label.
-    values : (n,) array
-        One for each point; indices into `words` where those are given.
-    words : tuple of str
-        Of a parameter or a metric that is not a number.
-    short : str
-        What it is called beside others; the last part of the name where that is empty.
-    about : str
-        What it is, in a few words; for its axis.
-    """
-
+    # name, dimension: for its label
     name: str
     dimension: str
-    values: FloatArray
-    words: tuple[str, ...] = ()
-    short: str = ""
-    about: str = ""
+    values: FloatArray  # (n,): one for each point; indices into `words` where those are given
+    words: tuple[str, ...] = ()  # of a parameter or a metric that is not a number
+    short: str = ""  # what it is called beside others; the last part of the name where that is empty
+    about: str = ""  # what it is, in a few words; for its axis
 
     @property
     def label(self) -> str:
@@ -102,31 +89,16 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class StudyMarks:
-    """What a study found, as its pictures need it.
+    """What a study found, as its pictures need it."""
 
-    Attributes
-    ----------
-    varied, metrics : tuple of DrawnScale
-        Parameters and the metrics to draw.
-    shape : tuple of int
-        Numbers of values of the parameters of a grid; empty if the points are no grid.
-    meets : (n,) array of bool
-        Whether a point was solved and meets every requirement.
-    best : int or None
-        Index of the best point.
-    name : str
-        Whose study it is, for the heading.
-    best_words : str
-        What makes the best point the best, for the key.
-    """
-
+    # varied, metrics: parameters and the metrics to draw
     varied: tuple[DrawnScale, ...]
     metrics: tuple[DrawnScale, ...]
-    shape: tuple[int, ...]
-    meets: NDArray[np.bool_]
-    best: int | None = None
-    name: str = ""
-    best_words: str = ""
+    shape: tuple[int, ...]  # numbers of values of the parameters of a grid; empty if the points are no grid
+    meets: NDArray[np.bool_]  # (n,): whether a point was solved and meets every requirement
+    best: int | None = None  # index of the best point
+    name: str = ""  # whose study it is, for the heading
+    best_words: str = ""  # what makes the best point the best, for the key
 
 
 @dataclass(frozen=True)

@@ -43,24 +43,12 @@ class BatchJob:
 
 @dataclass(frozen=True)
 class BatchWork:
-    """What a worker needs to do any job of a batch.
+    """What a worker needs to do any job of a batch."""
 
-    Attributes
-    ----------
-    common : Request
-        What holds for every specification; its folder is that of the batch.
-    verb : str or None
-        ``design`` or ``analyze``; None: design what has a block `design`.
-    arguments : tuple of str
-        The command line, for the manifests.
-    fresh : bool
-        Whether searches begin anew, too, where an earlier one was ended.
-    """
-
-    common: Request
-    verb: str | None
-    arguments: tuple[str, ...]
-    fresh: bool = False
+    common: Request  # what holds for every specification; its folder is that of the batch
+    verb: str | None  # ``design`` or ``analyze``; None: design what has a block `design`
+    arguments: tuple[str, ...]  # the command line, for the manifests
+    fresh: bool = False  # whether searches begin anew, too, where an earlier one was ended
 
     @property
     def deciding(self) -> list[Any]:

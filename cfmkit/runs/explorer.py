@@ -49,30 +49,17 @@ OWN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.ya?ml")
 
 @dataclass(frozen=True)
 class Slider:
-    """A number of the specification that can be moved.
+    """A number of the specification that can be moved."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted, as ``--set`` takes it.
-    value, low, high, step : float
-        In its unit.
-    unit : str
-        As the file has it; empty for a plain number.
-    about : str
-        What it is.
-    whole : bool
-        Whether it is a whole number.
-    """
-
-    path: str
+    path: str  # dotted, as ``--set`` takes it
+    # value, low, high, step: in its unit
     value: float
     low: float
     high: float
     step: float
-    unit: str
-    about: str
-    whole: bool
+    unit: str  # as the file has it; empty for a plain number
+    about: str  # what it is
+    whole: bool  # whether it is a whole number
 
     @property
     def label(self) -> str:
@@ -86,21 +73,11 @@ class Slider:
 
 @dataclass
 class Explorer:
-    """A specification to be explored.
+    """A specification to be explored."""
 
-    Attributes
-    ----------
-    source : str
-        The file.
-    document : Document
-        What it says.
-    folder : Path
-        That of the file; what the page saves is written there, and nowhere else.
-    """
-
-    source: str
-    document: Document
-    folder: Path = field(init=False)
+    source: str  # the file
+    document: Document  # what it says
+    folder: Path = field(init=False)  # that of the file; what the page saves is written there, and nowhere else
 
     def __post_init__(self) -> None:
         """Note the folder beside which nothing is read or written."""

@@ -93,7 +93,7 @@ def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
 
 
 def part_of(spec: Spec) -> Drawing | None:
-    """Return what is to be cut or printed; None where there is no part, or none that can be cut."""
+    """Return what is to be cut or printed; None if there is no part, or none that can be cut."""
     try:
         return _checked_part(spec)
     except (SolutionError, GeometryError):  # the analysis, or `warnings_of_part`, has a warning that says why

@@ -142,31 +142,17 @@ def _value(quantity: Quantity) -> str:
 
 @dataclass(frozen=True)
 class Film:
-    """The mechanism in motion beside its curve.
+    """The mechanism in motion beside its curve."""
 
-    Attributes
-    ----------
-    drawing : str
-        SVG of all poses.
-    curve : str
-        Name of the figure that has the cursors.
-    data : str
-        JSON for the script: texts and places of the cursors of each pose.
-    poses : int
-        How many there are.
-    first : str
-        What stands below the slider before it is moved.
-    """
-
-    drawing: str
-    curve: str
-    data: str
-    poses: int
-    first: str
+    drawing: str  # SVG of all poses
+    curve: str  # name of the figure that has the cursors
+    data: str  # JSON for the script: texts and places of the cursors of each pose
+    poses: int  # how many there are
+    first: str  # what stands below the slider before it is moved
 
 
 def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> Film | None:
-    """Return the film of a result; None where its family has none. The figure beside it gets its cursors."""
+    """Return the film of a result; None if its family has none. The figure beside it gets its cursors."""
     moving = moving_of(family(result.spec.family), result)
     if moving is None or not drawn:
         return None

@@ -173,7 +173,7 @@ def _short(text: str) -> str:
 
 
 def _numbers(column: Sequence[str], exact: bool) -> list[Any]:
-    """Return a column for the script: numbers where there are any, else texts; None where nothing stands.
+    """Return a column for the script: numbers where there are any, else texts; None if nothing stands.
 
     What was varied keeps every digit: the command of a point is made of it.
     """

@@ -43,52 +43,24 @@ VERDICTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PrintedRow:
-    """What a paper prints at one place.
+    """What a paper prints at one place."""
 
-    Attributes
-    ----------
-    paper : str
-        First author and year, as `cfmkit show references` has it.
-    family : str
-        Of the mechanism.
-    place, what : str
-        Section, table, figure or equation; the quantity.
-    printed : tuple of str
-        As printed, with units; ``>``, ``<`` and ``~`` (about) may lead.
-    verdict : str
-        One of `VERDICTS`.
-    why : str
-        The reason, of every verdict that needs one.
-    spec : str
-        Name of the example; empty where nothing is computed from one.
-    changes : tuple of str
-        As ``--set`` takes them.
-    verb : {"analyze", "design", "sweep"}
-        `design` asks the specification that it finds, and the analysis of that; `sweep` what is varied.
-    ask : tuple of str
-        As many as `printed`, or one that has as many values; empty where nothing is computed.
-    here : tuple of str
-        What comes out where that is not what is printed.
-    tolerance : str
-        How far off an agreeing number may be; empty: half a unit of its last digit.
-    heavy : bool
-        Whether it takes long.
-    """
-
-    paper: str
-    family: str
+    paper: str  # first author and year, as `cfmkit show references` has it
+    family: str  # of the mechanism
+    # place, what: section, table, figure or equation; the quantity
     place: str
     what: str
-    printed: tuple[str, ...]
-    verdict: str
-    why: str = ""
-    spec: str = ""
-    changes: tuple[str, ...] = ()
+    printed: tuple[str, ...]  # as printed, with units; ``>``, ``<`` and ``~`` (about) may lead
+    verdict: str  # one of `VERDICTS`
+    why: str = ""  # the reason, of every verdict that needs one
+    spec: str = ""  # name of the example; empty where nothing is computed from one
+    changes: tuple[str, ...] = ()  # as ``--set`` takes them
+    # `design` asks the specification that it finds, and the analysis of that; `sweep` what is varied
     verb: Literal["analyze", "design", "sweep"] = "analyze"
-    ask: tuple[str, ...] = ()
-    here: tuple[str, ...] = ()
-    tolerance: str = ""
-    heavy: bool = False
+    ask: tuple[str, ...] = ()  # as many as `printed`, or one that has as many values; empty where nothing is computed
+    here: tuple[str, ...] = ()  # what comes out where that is not what is printed
+    tolerance: str = ""  # how far off an agreeing number may be; empty: half a unit of its last digit
+    heavy: bool = False  # whether it takes long
 
     @property
     def command(self) -> str:
@@ -103,24 +75,12 @@ class PrintedRow:
 
 @dataclass(frozen=True)
 class ComputedRow:
-    """A row with what was computed.
+    """A row with what was computed."""
 
-    Attributes
-    ----------
-    row : PrintedRow
-        What the paper prints.
-    computed : tuple of str
-        In the units of the paper, with two digits more; empty where nothing was computed.
-    trouble : str
-        Why the verdict does not hold; empty: it does.
-    skipped : bool
-        Whether the row was left out because it takes long.
-    """
-
-    row: PrintedRow
-    computed: tuple[str, ...] = ()
-    trouble: str = ""
-    skipped: bool = False
+    row: PrintedRow  # what the paper prints
+    computed: tuple[str, ...] = ()  # in the units of the paper, with two digits more; empty where nothing was computed
+    trouble: str = ""  # why the verdict does not hold; empty: it does
+    skipped: bool = False  # whether the row was left out because it takes long
 
 
 def rows() -> tuple[PrintedRow, ...]:

@@ -28,24 +28,14 @@ EDITED = "it was changed since it was written"
 
 @dataclass(frozen=True)
 class Remains:
-    """What is left of runs in one folder.
+    """What is left of runs in one folder."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where.
-    files : tuple of str
-        Names below it that are proven to be ours, the manifest last, so that it lists what is left at any moment.
-    size : int
-        Bytes in them.
-    edited : tuple of str
-        Names that a manifest lists, but whose content is another one now, and a journal with lines of somebody
-        else: they stay.
-    """
-
-    folder: Path
+    folder: Path  # where
+    # names below it that are proven to be ours, the manifest last, so that it lists what is left at any moment
     files: tuple[str, ...]
-    size: int
+    size: int  # bytes in them
+    # names that a manifest lists, but whose content is another one now, and a journal with lines of somebody else: they
+    # stay
     edited: tuple[str, ...] = ()
 
 
@@ -92,7 +82,7 @@ def _is_empty(file: Path) -> bool:
 
 
 def _manifest(folder: Path) -> Manifest | None:
-    """Return the manifest of a folder; None where there is none, or one that cfmkit did not write."""
+    """Return the manifest of a folder; None if there is none, or one that cfmkit did not write."""
     try:
         return Manifest.read(folder)
     except OutputError:

@@ -111,42 +111,18 @@ class RunRequest(Protocol):
 
 @dataclass(frozen=True)
 class Request:
-    """What a run is to do.
+    """What a run is to do."""
 
-    Attributes
-    ----------
-    spec : str
-        The file; ``-`` is standard input.
-    out : str
-        The output folder.
-    changes : tuple of str
-        What ``--set`` says.
-    fidelity : str, optional
-        What ``--fidelity`` says.
-    seed : int
-        Of everything random.
-    plots : bool
-        Whether to draw.
-    of_many : bool
-        Whether it is one of many, and changes may be for others.
-    page : bool
-        Whether to write ``report.html``.
-    form : FigureForm
-        How figures are written.
-    animate : {"gif", "mp4"}, optional
-        Whether to write the mechanism in motion, and as what.
-    """
-
-    spec: str
-    out: str
-    changes: tuple[str, ...] = ()
-    fidelity: str | None = None
-    seed: int = 0
-    plots: bool = True
-    of_many: bool = False
-    page: bool = False
-    form: FigureForm = PLAIN
-    animate: str | None = None
+    spec: str  # the file; ``-`` is standard input
+    out: str  # the output folder
+    changes: tuple[str, ...] = ()  # what ``--set`` says
+    fidelity: str | None = None  # what ``--fidelity`` says
+    seed: int = 0  # of everything random
+    plots: bool = True  # whether to draw
+    of_many: bool = False  # whether it is one of many, and changes may be for others
+    page: bool = False  # whether to write ``report.html``
+    form: FigureForm = PLAIN  # how figures are written
+    animate: str | None = None  # whether to write the mechanism in motion, and as what
 
 
 def carry_out(

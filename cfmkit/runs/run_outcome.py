@@ -36,33 +36,15 @@ SEVERITY = (
 
 @dataclass(frozen=True)
 class Supplement:
-    """What a verb adds to the report on a result.
+    """What a verb adds to the report on a result."""
 
-    Attributes
-    ----------
-    data : mapping
-        More keys of metrics.json.
-    files : mapping of str to callable
-        More files: what makes the content of each.
-    figures : mapping of str to callable
-        More figures: what draws each, by name.
-    lines : tuple of (str, str)
-        More paragraphs of the page: the word that begins each, and the text.
-    warnings : tuple of Finding
-        More of them.
-    curves : tuple of Curve
-        What curve.csv holds, where that is not what the result has.
-    shortfall : str
-        What was requested in addition to the result and is missing, in one sentence.
-    """
-
-    data: Mapping[str, Any] = field(default_factory=dict)
-    files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
-    lines: tuple[tuple[str, str], ...] = ()
-    warnings: tuple[Finding, ...] = ()
-    curves: tuple[Curve, ...] = ()
-    shortfall: str = ""
-    figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    data: Mapping[str, Any] = field(default_factory=dict)  # more keys of metrics.json
+    files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)  # more files: what makes the content of each
+    lines: tuple[tuple[str, str], ...] = ()  # more paragraphs of the page: the word that begins each, and the text
+    warnings: tuple[Finding, ...] = ()  # more of them
+    curves: tuple[Curve, ...] = ()  # what curve.csv holds, where that is not what the result has
+    shortfall: str = ""  # what was requested in addition to the result and is missing, in one sentence
+    figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # more figures: what draws each, by name
 
     def plus(self, more: Supplement) -> Supplement:
         """Return both, this one first."""
@@ -79,27 +61,13 @@ class Supplement:
 
 @dataclass(frozen=True)
 class Report:
-    """A result with everything that is read off it.
+    """A result with everything that is read off it."""
 
-    Attributes
-    ----------
-    result : Result
-        Of any status.
-    metrics : mapping of str to Quantity
-        By name, in SI.
-    requirements : tuple of Outcome
-        In the order of the specification.
-    design : Design or None
-        What led to the result, if it was designed.
-    supplement : Supplement
-        What else the verb has to say.
-    """
-
-    result: Result
-    metrics: Mapping[str, Quantity]
-    requirements: tuple[Outcome, ...]
-    design: Design | None = None
-    supplement: Supplement = Supplement()
+    result: Result  # of any status
+    metrics: Mapping[str, Quantity]  # by name, in SI
+    requirements: tuple[Outcome, ...]  # in the order of the specification
+    design: Design | None = None  # what led to the result, if it was designed
+    supplement: Supplement = Supplement()  # what else the verb has to say
 
     @property
     def warnings(self) -> tuple[Finding, ...]:

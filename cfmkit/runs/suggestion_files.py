@@ -45,18 +45,10 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Deadlines:
-    """What a run leaves out when it is late.
+    """What a run leaves out when it is late."""
 
-    Attributes
-    ----------
-    figures : Clock
-        Of the search and of proposals whose turn comes after it.
-    files : Clock
-        Of proposals, all but ``design.yaml``.
-    """
-
-    figures: Clock
-    files: Clock
+    figures: Clock  # of the search and of proposals whose turn comes after it
+    files: Clock  # of proposals, all but ``design.yaml``
 
 
 def reported(proposal: Proposal) -> dict[str, Any]:

@@ -48,15 +48,9 @@ the rest of a part is a flaw of its drawing."""
 
 @dataclass(frozen=True)
 class Ring:
-    """A closed chain of lines, the material on its left.
+    """A closed chain of lines, the material on its left."""
 
-    Attributes
-    ----------
-    points : (n, 2) array
-        Vertices, the first not repeated [m].
-    """
-
-    points: FloatArray
+    points: FloatArray  # (n, 2): vertices, the first not repeated [m]
 
     @classmethod
     def of(cls, points: FloatArray, hole: bool, step: float = 0.0) -> Ring:
@@ -143,21 +137,11 @@ def _without_steps(ring: FloatArray, least: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Sizes:
-    """How long the sides of elements should be [m], anywhere in the part.
+    """How long the sides of elements should be [m], anywhere in the part."""
 
-    Attributes
-    ----------
-    places : (m, 2) array
-        Along the boundary [m].
-    sizes : (m,) array
-        Wanted there [m]; they grow from place to place by `GRADING` at most.
-    largest : float
-        [m]
-    """
-
-    places: FloatArray
-    sizes: FloatArray
-    largest: float
+    places: FloatArray  # (m, 2): along the boundary [m]
+    sizes: FloatArray  # (m,): wanted there [m]; they grow from place to place by `GRADING` at most
+    largest: float  # [m]
 
     @cached_property
     def _tree(self) -> cKDTree:

@@ -50,19 +50,11 @@ def shape_functions(at: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Elements:
-    """All elements of a mesh, ready for many states.
-
-    Attributes
-    ----------
-    mesh : TriangleMesh
-    law : Law
-    width : (m,) array
-        Out of the plane, by element [m].
-    """
+    """All elements of a mesh, ready for many states."""
 
     mesh: TriangleMesh
     law: Law
-    width: FloatArray
+    width: FloatArray  # (m,): out of the plane, by element [m]
 
     def only(self, chosen: NDArray[np.bool_]) -> Elements:
         """Return some of the elements (m,), on all nodes."""
@@ -272,17 +264,11 @@ def equivalent(stress: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the entries of elements go in a sparse symmetric matrix.
+    """Where the entries of elements go in a sparse symmetric matrix."""
 
-    Attributes
-    ----------
-    slots : (k,) array of int
-        Of each entry among the matrix's different pairs of row and column.
-    pairs, indices, starts : arrays of int
-        The matrix in compressed columns: pair of each of its entries, rows, and where columns start.
-    """
-
-    slots: NDArray[np.int64]
+    slots: NDArray[np.int64]  # (k,): of each entry among the matrix's different pairs of row and column
+    # pairs, indices, starts: the matrix in compressed columns: pair of each of its entries, rows, and where columns
+    # start
     pairs: NDArray[np.int64]
     indices: NDArray[np.int32]
     starts: NDArray[np.int32]

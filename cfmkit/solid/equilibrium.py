@@ -42,36 +42,16 @@ FAR = 0.5
 
 @dataclass(frozen=True)
 class Balance:
-    """Equilibrium at a travel.
+    """Equilibrium at a travel."""
 
-    Attributes
-    ----------
-    travel : float
-        [m or rad]
-    unknowns : (q,) array
-        [m or rad]
-    effort : float
-        On the drive, along its motion [N or N m].
-    stiffness : float
-        Derivative of the effort along the path [N/m or N m/rad].
-    unstable : int
-        Number of directions in which the part moves on by itself, the drive held.
-    slope : (q,) array
-        Of the unknowns along the path, per unit of travel.
-    factors : Factors or None
-        Of the tangent.
-    solved : bool
-        False if it is put together from poses that are.
-    """
-
-    travel: float
-    unknowns: FloatArray
-    effort: float
-    stiffness: float
-    unstable: int
-    slope: FloatArray
-    factors: Factors | None
-    solved: bool = True
+    travel: float  # [m or rad]
+    unknowns: FloatArray  # (q,) [m or rad]
+    effort: float  # on the drive, along its motion [N or N m]
+    stiffness: float  # derivative of the effort along the path [N/m or N m/rad]
+    unstable: int  # number of directions in which the part moves on by itself, the drive held
+    slope: FloatArray  # (q,): of the unknowns along the path, per unit of travel
+    factors: Factors | None  # of the tangent
+    solved: bool = True  # false if it is put together from poses that are
 
     def kept(self) -> Balance:
         """Return the same without the factors, which take a hundred times the room of all the rest."""
@@ -80,18 +60,10 @@ class Balance:
 
 @dataclass(frozen=True)
 class Factors:
-    """A factored symmetric matrix.
+    """A factored symmetric matrix."""
 
-    Attributes
-    ----------
-    lower_upper : object
-        Of scipy, of the matrix in another order.
-    order : (q,) array of int
-        Place of each row in that order.
-    """
-
-    lower_upper: Any
-    order: NDArray[np.int64]
+    lower_upper: Any  # of scipy, of the matrix in another order
+    order: NDArray[np.int64]  # (q,): place of each row in that order
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution of a system."""
@@ -107,26 +79,13 @@ class Factors:
 
 @dataclass(frozen=True)
 class LinearisedPart:
-    """A linearised problem.
+    """A linearised problem."""
 
-    Attributes
-    ----------
-    matrix : csc_array
-        The tangent (q, q), unknowns in the order of `order`.
-    order : (q,) array of int
-    slope : (q,) array
-        Derivative of the residual with respect to the travel.
-    residual : (q,) array
-        What is out of balance [N or N m].
-    forces : (n, 2) array
-        On the nodes [N].
-    """
-
-    matrix: csc_array
-    order: NDArray[np.int64]
-    slope: FloatArray
-    residual: FloatArray
-    forces: FloatArray
+    matrix: csc_array  # the tangent (q, q), unknowns in the order of `order`
+    order: NDArray[np.int64]  # (q,)
+    slope: FloatArray  # (q,): derivative of the residual with respect to the travel
+    residual: FloatArray  # (q,): what is out of balance [N or N m]
+    forces: FloatArray  # (n, 2): on the nodes [N]
 
     @cached_property
     def factors(self) -> Factors:
@@ -139,17 +98,10 @@ class LinearisedPart:
 
 @dataclass(frozen=True)
 class Selection:
-    """Where the stiffnesses of loose nodes by each other stand among all, in an order in which factors stay sparse.
+    """Where the stiffnesses of loose nodes by each other stand among all, in an order in which factors stay sparse."""
 
-    Attributes
-    ----------
-    order : (l,) array of int
-        Of the loose displacements: minimum degree.
-    entries, indices, starts : arrays of int
-        Which entries of the whole matrix, and the pattern of what they make.
-    """
-
-    order: NDArray[np.int64]
+    order: NDArray[np.int64]  # (l,): of the loose displacements: minimum degree
+    # entries, indices, starts: which entries of the whole matrix, and the pattern of what they make
     entries: NDArray[np.int64]
     indices: NDArray[np.int32]
     starts: NDArray[np.int32]
@@ -174,19 +126,11 @@ class Selection:
 
 @dataclass(frozen=True)
 class SolidProblem:
-    """A part, its supports, and how to solve for it.
-
-    Attributes
-    ----------
-    elements : Elements
-    supports : Supports
-    obstacles : tuple of (n, 2) arrays
-        Polygons that stand and that the part must not enter [m].
-    """
+    """A part, its supports, and how to solve for it."""
 
     elements: Elements
     supports: Supports
-    obstacles: tuple[FloatArray, ...] = ()
+    obstacles: tuple[FloatArray, ...] = ()  # polygons that stand and that the part must not enter [m]
 
     @cached_property
     def size(self) -> float:
@@ -263,7 +207,7 @@ class SolidProblem:
         return bool(np.abs(step[:-1]).max(initial=0.0) <= part * self.size)
 
     def _believed(self, forces: FloatArray, step: FloatArray) -> bool:
-        """Tell whether a correction is small enough to be believed."""
+        """Return True if a correction is small enough to be believed."""
         finite = np.isfinite(np.abs(forces).max())
         return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self.size)
 

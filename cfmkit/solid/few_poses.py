@@ -190,7 +190,7 @@ def solve_some(guide: PoseGuide, travels: Sequence[float]) -> tuple[Balance, ...
 def follow_some(
     guide: PoseGuide, poses: Sequence[Balance], stops: Sequence[float], allowed: float, report: Callable[[float], None]
 ) -> MeshSolution | None:
-    """Return the path on a fine mesh at all travels of the coarse one; None where it has not the same course.
+    """Return the path on a fine mesh at all travels of the coarse one; None if it has not the same course.
 
     Parameters
     ----------

@@ -49,27 +49,13 @@ MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """A part in six-node triangles.
+    """A part in six-node triangles."""
 
-    Attributes
-    ----------
-    nodes : (n, 2) array
-        [m]; corners of triangles first.
-    triangles : (m, 6) array of int
-        Corners counter-clockwise, then the nodes on the sides 0-1, 1-2, 2-0.
-    edges : (k, 3) array of int
-        Boundary: first corner, last corner, node between; the material is on the left.
-    rings : (k,) array of int
-        Ring of each boundary edge.
-    arcs : (k, 2) array
-        Arc lengths of its ends on that ring, increasing [m].
-    """
-
-    nodes: FloatArray
-    triangles: IntArray
-    edges: IntArray
-    rings: IntArray
-    arcs: FloatArray
+    nodes: FloatArray  # (n, 2) [m]; corners of triangles first
+    triangles: IntArray  # (m, 6): corners counter-clockwise, then the nodes on the sides 0-1, 1-2, 2-0
+    edges: IntArray  # (k, 3): boundary: first corner, last corner, node between; the material is on the left
+    rings: IntArray  # (k,): ring of each boundary edge
+    arcs: FloatArray  # (k, 2): arc lengths of its ends on that ring, increasing [m]
 
     @property
     def area(self) -> float:
@@ -347,17 +333,10 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Spacing:
-    """Keeps points away from the boundary and from seams.
-
-    Attributes
-    ----------
-    field : Sizes
-    sewn : (k, 2) array
-        Points on seams [m].
-    """
+    """Keeps points away from the boundary and from seams."""
 
     field: Sizes
-    sewn: FloatArray
+    sewn: FloatArray  # (k, 2): points on seams [m]
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return those of the points (k, 2) [m] that are far enough."""

@@ -170,7 +170,7 @@ class Lines:
 
 
 def _turns(group: Group) -> bool:
-    """Tell whether a group turns, freely or by the drive: then it is joined by a hub."""
+    """Return True if a group turns, freely or by the drive: then it is joined by a hub."""
     return bool(np.any(np.abs(group.free[2]) > 0.5) or group.driven[2] != 0)
 
 
@@ -179,26 +179,13 @@ class Hub:
     """Stiff triangles that join nodes to a centre, about which they turn.
 
     CalculiX does not converge where a rigid body turns freely; with a stiff one it does, in four rounds.
-
-    Attributes
-    ----------
-    center : int
-        Number of the node in the centre.
-    arm : (int, (2,) array)
-        Number of the node farthest from it, and from where to there [m].
-    added : dict of (2,) arrays
-        Nodes that are not of the part [m].
-    spare : int
-        The next number that is free.
-    triangles : (m, 3) array of int
-        Numbers of nodes, counter-clockwise.
     """
 
-    center: int
-    arm: tuple[int, FloatArray]
-    added: dict[int, FloatArray]
-    spare: int
-    triangles: NDArray[np.int64]
+    center: int  # number of the node in the centre
+    arm: tuple[int, FloatArray]  # (int, (2,): number of the node farthest from it, and from where to there [m]
+    added: dict[int, FloatArray]  # nodes that are not of the part [m]
+    spare: int  # the next number that is free
+    triangles: NDArray[np.int64]  # (m, 3): numbers of nodes, counter-clockwise
 
     @classmethod
     def on(cls, places: dict[int, FloatArray], center: FloatArray, spare: int) -> Hub:

@@ -73,66 +73,32 @@ RING = 2e-5
 
 @dataclass(frozen=True)
 class HeldOrDriven:
-    """Where a part is held or driven, and moves as one rigid piece.
+    """Where a part is held or driven, and moves as one rigid piece."""
 
-    Attributes
-    ----------
-    name : str
-        For messages and decks; several places of one name are one support.
-    shapes : tuple of (n, 2) arrays
-        Polygons that it covers, or lines of two points [m].
-    at : (2,) array
-        About which it turns [m].
-    driven, free : (3,) array, (3, f) array
-        As of `Group`.
-    seams : tuple of (2, 2) arrays
-        Lines at which it begins [m].
-    load : (3,) array
-        Constant, as of `Group`.
-    """
-
-    name: str
-    shapes: tuple[FloatArray, ...]
-    at: FloatArray
+    name: str  # for messages and decks; several places of one name are one support
+    shapes: tuple[FloatArray, ...]  # polygons that it covers, or lines of two points [m]
+    at: FloatArray  # (2,): about which it turns [m]
+    # driven, free, (3,), (3, f): as of `Group`
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
-    seams: tuple[FloatArray, ...] = ()
-    load: FloatArray = field(default_factory=lambda: np.zeros(3))
+    seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]
+    load: FloatArray = field(default_factory=lambda: np.zeros(3))  # (3,): constant, as of `Group`
 
 
 @dataclass(frozen=True)
 class Part:
-    """What is solved.
+    """What is solved."""
 
-    Attributes
-    ----------
-    rings : tuple of Ring
-        The boundary.
-    thinnest : float
-        Of what bends, in the plane [m].
-    width : float
-        Out of the plane, where no region says otherwise [m].
-    law : Law
-    places : tuple of HeldOrDriven
-    regions : tuple of ((n, 2) array, float)
-        Polygons of another width [m].
-    largest : float
-        Side of an element where the part is thick, in those of its thinnest place.
-    obstacles : tuple of (n, 2) arrays
-        Polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one.
-    sections : tuple of BeamSection
-        Of its beams: meshes must have their thickness.
-    """
-
-    rings: tuple[Ring, ...]
-    thinnest: float
-    width: float
+    rings: tuple[Ring, ...]  # the boundary
+    thinnest: float  # of what bends, in the plane [m]
+    width: float  # out of the plane, where no region says otherwise [m]
     law: Law
     places: tuple[HeldOrDriven, ...]
-    regions: tuple[tuple[FloatArray, float], ...] = ()
-    largest: float = 1.0
+    regions: tuple[tuple[FloatArray, float], ...] = ()  # polygons of another width [m]
+    largest: float = 1.0  # side of an element where the part is thick, in those of its thinnest place
+    # polygons of what stands and is not meshed, a frame [m]: the part ends its path where it comes to one
     obstacles: tuple[FloatArray, ...] = ()
-    sections: tuple[BeamSection, ...] = ()
+    sections: tuple[BeamSection, ...] = ()  # of its beams: meshes must have their thickness
 
     @property
     def near(self) -> float:
@@ -240,27 +206,14 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Meshed:
-    """A meshed part, ready to be solved.
-
-    Attributes
-    ----------
-    part : Part
-    grid : TriangleMesh
-    held : (n,) array of bool
-        Nodes that are held or driven.
-    moving : (m,) array of bool
-        Triangles that can strain: not all of their nodes move as one.
-    problem : SolidProblem
-        Of these triangles.
-    unjudged : (n,) array of bool
-        Nodes whose stress is not read: they are held or driven, or at the end of a rigid piece.
-    """
+    """A meshed part, ready to be solved."""
 
     part: Part
     grid: TriangleMesh
-    held: NDArray[np.bool_]
-    moving: NDArray[np.bool_]
-    problem: SolidProblem
+    held: NDArray[np.bool_]  # (n,): nodes that are held or driven
+    moving: NDArray[np.bool_]  # (m,): triangles that can strain: not all of their nodes move as one
+    problem: SolidProblem  # of these triangles
+    # (n,): nodes whose stress is not read: they are held or driven, or at the end of a rigid piece
     unjudged: NDArray[np.bool_]
 
     def refined(self, marked: NDArray[np.bool_] | None = None) -> tuple[Meshed, RefinedMesh]:
@@ -310,23 +263,13 @@ class Meshed:
 
 @dataclass(frozen=True, eq=False)
 class MeshSolution:
-    """One mesh of the part, followed over the travel.
-
-    Attributes
-    ----------
-    part : Part
-    problem : SolidProblem
-    course : PosePath
-    unjudged : (n,) array of bool
-        Nodes whose stress is not read.
-    between : float
-        What the curve is off between poses, in parts of the largest effort; NaN where that was not looked at.
-    """
+    """One mesh of the part, followed over the travel."""
 
     part: Part
     problem: SolidProblem
     course: PosePath
-    unjudged: NDArray[np.bool_]
+    unjudged: NDArray[np.bool_]  # (n,): nodes whose stress is not read
+    # what the curve is off between poses, in parts of the largest effort; NaN where that was not looked at
     between: float = float("nan")
 
     @cached_property

@@ -64,22 +64,13 @@ PATH_ENDS = {
 
 @dataclass(frozen=True)
 class PosePath:
-    """Poses of a part in order of travel.
+    """Poses of a part in order of travel."""
 
-    Attributes
-    ----------
-    poses : tuple of Balance
-        The requested ones as far as they were reached, and those on the way where steps were cut; without factors.
-    ending : PathEnd
-    bifurcations : tuple of float
-        Travels at which another branch was taken [m or rad].
-    touching : (2,) array or None
-        Where the part touches itself just beyond the last pose, on the part as it is then [m].
-    """
-
+    # the requested ones as far as they were reached, and those on the way where steps were cut; without factors
     poses: tuple[Balance, ...]
     ending: PathEnd
-    bifurcations: tuple[float, ...] = ()
+    bifurcations: tuple[float, ...] = ()  # travels at which another branch was taken [m or rad]
+    # (2,): where the part touches itself just beyond the last pose, on the part as it is then [m]
     touching: FloatArray | None = None
 
     @property
@@ -300,7 +291,7 @@ def _curve_beside(pose: Balance, other: Balance, place: float) -> Polynomial:
 
 
 def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
-    """Return where the boundary crosses itself or a frame at a pose (2,) [m]; None where it does not.
+    """Return where the boundary crosses itself or a frame at a pose (2,) [m]; None if it does not.
 
     What moves as one rigid piece cannot cross itself. Edges are lines between nodes: two that touch overlap by their
     sagitta at most.

@@ -47,19 +47,10 @@ class LoadEnd(enum.Enum):
 
 @dataclass(frozen=True)
 class LoadPath:
-    """What a path says of a load.
+    """What a path says of a load."""
 
-    Attributes
-    ----------
-    end : float
-        Travel at the load, at its first maximum, or at the end of the path [m or rad].
-    effort : float
-        The effort there [N or N m].
-    how : LoadEnd
-    """
-
-    end: float
-    effort: float
+    end: float  # travel at the load, at its first maximum, or at the end of the path [m or rad]
+    effort: float  # the effort there [N or N m]
     how: LoadEnd
 
     @classmethod

@@ -50,16 +50,9 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class SaintVenantKirchhoff:
-    """Stress linear in Green's strain: Hooke's law where strains are small, whatever the rotation.
+    """Stress linear in Green's strain: Hooke's law where strains are small, whatever the rotation."""
 
-    Attributes
-    ----------
-    youngs_modulus : float
-        [Pa]
-    poisson_ratio : float
-    """
-
-    youngs_modulus: float
+    youngs_modulus: float  # [Pa]
     poisson_ratio: float
 
     def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -74,18 +67,10 @@ class SaintVenantKirchhoff:
 
 @dataclass(frozen=True)
 class NeoHookean:
-    """Energy mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2: softer than Hooke in tension, stiffer in compression.
+    """Energy mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2: softer than Hooke in tension, stiffer in compression."""
 
-    Attributes
-    ----------
-    youngs_modulus : float
-        At no strain [Pa].
-    poisson_ratio : float
-        At no strain; below 0.5.
-    """
-
-    youngs_modulus: float
-    poisson_ratio: float
+    youngs_modulus: float  # at no strain [Pa]
+    poisson_ratio: float  # at no strain; below 0.5
 
     def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return stress, tangent and stretch across the plane: see `Law`."""

@@ -99,23 +99,15 @@ def _between(
 
 @dataclass(frozen=True, eq=False)
 class MaterialPoint:
-    """A point of the material: its element's nodes (6,), and their shares in its displacement and its slopes.
+    """A point of the material: its element's nodes (6,), and their shares in its displacement and its slopes."""
 
-    Attributes
-    ----------
-    nodes : (6,) array of int
-    shares : (6,) array
-    gradient : (6, 2) array
-        Slopes of the shares in the plane [1/m].
-    """
-
-    nodes: NDArray[np.int64]
-    shares: FloatArray
-    gradient: FloatArray
+    nodes: NDArray[np.int64]  # (6,)
+    shares: FloatArray  # (6,)
+    gradient: FloatArray  # (6, 2): slopes of the shares in the plane [1/m]
 
     @classmethod
     def at(cls, elements: Elements, place: FloatArray) -> MaterialPoint | None:
-        """Return the point at a place (2,) [m]; None where no element is."""
+        """Return the point at a place (2,) [m]; None if no element is."""
         triangles = elements.mesh.triangles
         corners = elements.mesh.nodes[triangles]  # (m, 6, 2)
         near = np.hypot(*(corners[:, :3].mean(axis=1) - place).T).argsort()[:20]

@@ -24,28 +24,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Group:
-    """Nodes that move as one.
+    """Nodes that move as one."""
 
-    Attributes
-    ----------
-    name : str
-        For messages and results.
-    nodes : (k,) array of int
-    center : (2,) array
-        About which it turns [m].
-    driven : (3,) array
-        Motion per unit of travel: x, y [m], turn [rad].
-    free : (3, f) array
-        Orthonormal columns: motions that are left to equilibrium.
-    load : (3,) array
-        Constant force x, y [N], which keeps its direction, and moment [N m] on it about its centre.
-    """
-
-    name: str
-    nodes: NDArray[np.int64]
-    center: FloatArray
+    name: str  # for messages and results
+    nodes: NDArray[np.int64]  # (k,)
+    center: FloatArray  # (2,): about which it turns [m]
+    # (3,): motion per unit of travel: x, y [m], turn [rad]
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
+    # (3, f): orthonormal columns: motions that are left to equilibrium
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
+    # (3,): constant force x, y [N], which keeps its direction, and moment [N m] on it about its centre
     load: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
@@ -65,18 +53,10 @@ def turned(angle: float, derivative: int = 0) -> FloatArray:
 
 @dataclass(frozen=True)
 class Supports:
-    """The unknowns of a held part: displacements of the nodes in no group, then the free motions of the groups.
+    """The unknowns of a held part: displacements of the nodes in no group, then the free motions of the groups."""
 
-    Attributes
-    ----------
-    places : (n, 2) array
-        Nodes [m].
-    groups : tuple of Group
-        No node is in two of them.
-    """
-
-    places: FloatArray
-    groups: tuple[Group, ...]
+    places: FloatArray  # (n, 2): nodes [m]
+    groups: tuple[Group, ...]  # no node is in two of them
 
     @cached_property
     def loose(self) -> NDArray[np.int64]:
@@ -165,21 +145,12 @@ class Supports:
 
 @dataclass(frozen=True)
 class Carried:
-    """What free motions of groups, and the travel behind them, do to the nodes.
+    """What free motions of groups, and the travel behind them, do to the nodes."""
 
-    Attributes
-    ----------
-    loose : (l,) array of int
-        As of `Supports`.
-    ways : (2n, f + 1) array
-        Derivatives of the nodes' displacements with respect to f free motions and the travel.
-    curved : (f + 1, f + 1) array
-        What the forces on the nodes add to the stiffness as groups turn [N m].
-    """
-
-    loose: NDArray[np.int64]
+    loose: NDArray[np.int64]  # (l,): as of `Supports`
+    # (2n, f + 1): derivatives of the nodes' displacements with respect to f free motions and the travel
     ways: FloatArray
-    curved: FloatArray
+    curved: FloatArray  # (f + 1, f + 1): what the forces on the nodes add to the stiffness as groups turn [N m]
 
     def borders(self, stiffness: csc_array) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """Return the derivatives of the residual that are not those of loose nodes by each other, and the effort's.

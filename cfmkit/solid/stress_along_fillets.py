@@ -38,24 +38,12 @@ in radii."""
 
 @dataclass(frozen=True, eq=False)
 class FilletArc:
-    """Where a fillet is.
+    """Where a fillet is."""
 
-    Attributes
-    ----------
-    ring : int
-        Number of the ring that it is on.
-    center : (2,) array
-        Of its circle, in the waste [m].
-    radius : float
-        [m]
-    ends : (2, 2) array
-        Its first and last vertex, the material on the left [m].
-    """
-
-    ring: int
-    center: FloatArray
-    radius: float
-    ends: FloatArray
+    ring: int  # number of the ring that it is on
+    center: FloatArray  # (2,): of its circle, in the waste [m]
+    radius: float  # [m]
+    ends: FloatArray  # (2, 2): its first and last vertex, the material on the left [m]
 
     @property
     def turn(self) -> float:
@@ -92,26 +80,17 @@ class FilletArc:
 
 @dataclass(frozen=True, eq=False)
 class FilletStress:
-    """A fillet with its largest stress at every pose.
-
-    Attributes
-    ----------
-    arc : FilletArc
-    travel : (k,) array
-        Of the poses, rising [m or rad].
-    stress : (k,) array
-        Along the edge, that of largest size, tension positive [Pa].
-    """
+    """A fillet with its largest stress at every pose."""
 
     arc: FilletArc
-    travel: FloatArray
-    stress: FloatArray
+    travel: FloatArray  # (k,): of the poses, rising [m or rad]
+    stress: FloatArray  # (k,): along the edge, that of largest size, tension positive [Pa]
 
     def largest(self, low: float, high: float) -> tuple[float, float] | None:
         """Return the largest stress of the poses from one travel to another [Pa], and the travel of it [m or rad].
 
         Largest in size; tension is positive. At ends that are no pose the size is interpolated, and the sign is that of
-        the nearest pose. None where the part does not come to any.
+        the nearest pose. None if the part does not come to any.
         """
         from scipy.interpolate import PchipInterpolator
 

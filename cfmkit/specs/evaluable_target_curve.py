@@ -12,21 +12,15 @@ from cfmkit.numerics.monotone_interpolation import ThroughPoints
 class TargetCurve:
     """A force over displacements, or a torque over angles, that a mechanism is to have.
 
-    Attributes
-    ----------
-    function : ThroughPoints or (float, float)
-        Through points [m or rad, N or N m]; or a line, its value at zero and its slope.
-    kind : {"force", "torque"} or None
-        What it is; None where nothing but zeros says so.
-
     Examples
     --------
     >>> TargetCurve((10.0, -500.0)).at(0.01)
     5.0
     """
 
+    # through points [m or rad, N or N m]; or a line, its value at zero and its slope
     function: ThroughPoints | tuple[float, float]
-    kind: str | None = None
+    kind: str | None = None  # what it is; None if nothing but zeros says so
 
     def at(self, places: Any) -> Any:
         """Return the effort that is wanted at places [N or N m]."""

@@ -33,33 +33,15 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Key:
-    """One key.
+    """One key."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted; ``[]`` stands for the items of a list, ``.NAME`` for those of a block whose names are free.
-    kind : str
-        What is written there: ``length``, ``text``, ``block``, or the words of a closed choice.
-    example : str
-        Of a quantity, with its unit; else empty.
-    allowed : str
-        Bounds, with units; empty where there are none.
-    default : str
-        As it would be written; empty where there is none.
-    required : bool
-        Whether the block needs it.
-    description : str
-        What it means.
-    """
-
-    path: str
-    kind: str
-    example: str
-    allowed: str
-    default: str
-    required: bool
-    description: str
+    path: str  # dotted; ``[]`` stands for the items of a list, ``.NAME`` for those of a block whose names are free
+    kind: str  # what is written there: ``length``, ``text``, ``block``, or the words of a closed choice
+    example: str  # of a quantity, with its unit; else empty
+    allowed: str  # bounds, with units; empty where there are none
+    default: str  # as it would be written; empty where there is none
+    required: bool  # whether the block needs it
+    description: str  # what it means
 
 
 def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:

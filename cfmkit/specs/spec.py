@@ -292,7 +292,7 @@ class Spec(Model):
 
     @property
     def fidelity(self) -> str | None:
-        """The model that the analysis uses; None where its family has one only."""
+        """The model that the analysis uses; None if its family has one only."""
         found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
         return found
 
@@ -328,7 +328,7 @@ class Spec(Model):
 
     @property
     def target_curve(self) -> TargetCurve | None:
-        """The curve that the analysis or else the design names; None where the force is to be constant."""
+        """The curve that the analysis or else the design names; None if the force is to be constant."""
         design = getattr(self, "design", None)
         level = getattr(design, "force", None) or getattr(design, "torque", None)
         return next((target.curve(level) for _, target in self._targets()), None)

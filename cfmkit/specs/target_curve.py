@@ -125,7 +125,7 @@ class Target(Model):
 
     @property
     def kind(self) -> str | None:
-        """Force or torque; None where all numbers are zero."""
+        """Force or torque; None if all numbers are zero."""
         if (points := self.all_points) is not None:
             said = {_dim(effort) for _, effort in points if effort}
             said |= {"torque" for place, _ in points if place and _dim(place) == "angle"}

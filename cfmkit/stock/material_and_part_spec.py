@@ -189,7 +189,7 @@ class MaterialSpec(Model):
         return f"{self.name}: {values}" if self.name else values
 
     def allowable(self, safety_factor: float) -> float | None:
-        """Return the yield strength over a safety factor [Pa]; None where no strength is known.
+        """Return the yield strength over a safety factor [Pa]; None if no strength is known.
 
         Where a part is to last some cycles, it is at most what lasts them, over the same factor.
         """
@@ -200,7 +200,7 @@ class MaterialSpec(Model):
 
     @property
     def durability(self) -> Durability | None:
-        """Fatigue and relaxation as metrics need them; None where neither is known."""
+        """Fatigue and relaxation as metrics need them; None if neither is known."""
         if self.fatigue is None and self.relaxation is None:
             return None
         return Durability(
@@ -290,14 +290,14 @@ class PartProcess(Model):
 
     @property
     def smallest(self) -> float | None:
-        """Smallest inside radius [m]; None where neither a name nor a value says it."""
+        """Smallest inside radius [m]; None if neither a name nor a value says it."""
         if self.least_radius is not None:
             return self.least_radius
         return PROCESSES[self.name].least_radius if self.name else None
 
     @property
     def thinnest(self) -> float | None:
-        """Thinnest wall [m]; None where neither a name nor a value says it."""
+        """Thinnest wall [m]; None if neither a name nor a value says it."""
         if self.least_feature is not None:
             return self.least_feature
         return PROCESSES[self.name].least_feature if self.name else None
@@ -410,7 +410,7 @@ def usual_fillet(thinnest: float) -> str:
 
 
 def sheet_of(part: CutPart | None) -> float | None:
-    """Return the thickness of the sheet that everything is cut from [m]; None where none is stated."""
+    """Return the thickness of the sheet that everything is cut from [m]; None if none is stated."""
     return None if part is None else part.sheet
 
 

@@ -44,57 +44,28 @@ class UnknownMaterial(InputError, ValueError):
 
 @dataclass(frozen=True)
 class Scatter:
-    """From where to where a property is found in practice, low to high.
+    """From where to where a property is found in practice, low to high."""
 
-    Attributes
-    ----------
-    youngs_modulus : (float, float)
-        [Pa].
-    yield_strength : (float, float) or None
-        [Pa]; None where there is no strength.
-    poisson_ratio, density : (float, float) or None
-        [1] and [kg/m^3], from the lowest to the highest of the texts that the source names; None where these state
-        one value, or none.
-    """
-
-    youngs_modulus: Range
-    yield_strength: Range | None = None
+    youngs_modulus: Range  # [Pa]
+    yield_strength: Range | None = None  # [Pa]; None if there is no strength
+    # poisson_ratio, density: [1] and [kg/m^3], from the lowest to the highest of the texts that the source names; None
+    # where these state one value, or none
     poisson_ratio: Range | None = None
     density: Range | None = None
 
 
 @dataclass(frozen=True)
 class Material:
-    """One material.
+    """One material."""
 
-    Attributes
-    ----------
-    name : str
-        How a specification calls it.
-    youngs_modulus : float
-        Nominal elastic modulus [Pa].
-    poisson_ratio : float
-        Nominal Poisson ratio.
-    yield_strength : float or None
-        Nominal yield strength [Pa]; None where the source gives none.
-    density : float
-        [kg/m^3].
-    source : str
-        Where the numbers come from.
-    scatter : Scatter
-        Range of modulus and strength to expect.
-    aliases : tuple of str
-        Other words for it; a name that is not found is compared with these too.
-    """
-
-    name: str
-    youngs_modulus: float
-    poisson_ratio: float
-    yield_strength: float | None
-    density: float
-    source: str
-    scatter: Scatter
-    aliases: tuple[str, ...] = ()
+    name: str  # how a specification calls it
+    youngs_modulus: float  # nominal elastic modulus [Pa]
+    poisson_ratio: float  # nominal Poisson ratio
+    yield_strength: float | None  # nominal yield strength [Pa]; None if the source gives none
+    density: float  # [kg/m^3]
+    source: str  # where the numbers come from
+    scatter: Scatter  # range of modulus and strength to expect
+    aliases: tuple[str, ...] = ()  # other words for it; a name that is not found is compared with these too
 
 
 _METALS = (

@@ -13,24 +13,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BoughtPart:
-    """A part that is bought.
+    """A part that is bought."""
 
-    Attributes
-    ----------
-    place : str
-        What it does in the mechanism.
-    name : str
-        By which it is ordered; empty where none is stated.
-    count : int
-        How many of it.
-    data : str
-        What decides whether another one would do.
-    """
-
-    place: str
-    name: str
-    count: int
-    data: str = ""
+    place: str  # what it does in the mechanism
+    name: str  # by which it is ordered; empty where none is stated
+    count: int  # how many of it
+    data: str = ""  # what decides whether another one would do
 
 
 def parts_table(parts: Sequence[BoughtPart]) -> Table:

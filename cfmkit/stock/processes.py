@@ -20,31 +20,17 @@ ProcessName = Literal["laser", "wire-edm", "fdm", "sls", "mill"]
 
 @dataclass(frozen=True)
 class ProcessAccuracy:
-    """What a process is assumed to hold.
+    """What a process is assumed to hold."""
 
-    Attributes
-    ----------
-    name : str
-        How a specification calls it.
-    kerf : float
-        Width of the cut; 0 where nothing is cut [m].
-    thickness : float
-        Standard deviation of the thickness of a leaf between its two sides, the same all over a part [m].
-    position : float
-        Standard deviation of where a joint or an end lies [m].
-    least_feature, least_radius : float
-        Thinnest wall, and smallest inside radius [m].
-    reason : str
-        Why these.
-    """
-
-    name: ProcessName
-    kerf: float
+    name: ProcessName  # how a specification calls it
+    kerf: float  # width of the cut; 0 where nothing is cut [m]
+    # standard deviation of the thickness of a leaf between its two sides, the same all over a part [m]
     thickness: float
-    position: float
+    position: float  # standard deviation of where a joint or an end lies [m]
+    # least_feature, least_radius: thinnest wall, and smallest inside radius [m]
     least_feature: float
     least_radius: float
-    reason: str
+    reason: str  # why these
 
 
 _ALL = (

@@ -41,18 +41,11 @@ _OWN = ("cfmkit", "duration_s", "files", "finished", "started", "versions")
 
 @dataclass(frozen=True)
 class Manifest:
-    """The list of a run's files and the circumstances of the run.
+    """The list of a run's files and the circumstances of the run."""
 
-    Attributes
-    ----------
-    files : mapping of str to FileRecord
-        Every file of the run but the manifest itself, by its name below the folder.
-    data : mapping
-        Everything in the file: ``cfmkit`` (version), ``versions``, ``started``,
-        ``finished``, ``duration_s``, ``files``, and what the run said about itself.
-    """
-
-    files: Mapping[str, FileRecord]
+    files: Mapping[str, FileRecord]  # every file of the run but the manifest itself, by its name below the folder
+    # everything in the file: ``cfmkit`` (version), ``versions``, ``started``, ``finished``, ``duration_s``, ``files``,
+    # and what the run said about itself
     data: Mapping[str, Any]
 
     @classmethod

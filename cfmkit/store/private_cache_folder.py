@@ -35,7 +35,7 @@ def _is_safe(step: Path, is_last: bool) -> bool:
 
 
 def private_folder(name: str, make: bool = True) -> Path | None:
-    """Return a folder for files that this user's later runs may use again; None where there is no room for any.
+    """Return a folder for files that this user's later runs may use again; None if there is no room for any.
 
     It has a fixed name, so that it serves every process of the user. What stands there and belongs to somebody
     else, or can be written by others, is not trusted (code and settings are loaded from it): then the folder is a new

@@ -45,7 +45,7 @@ NEW, OLD, PLAN, UNDO = "new", "old", "plan.json", "undo.json"
 
 @dataclass(frozen=True)
 class Change:
-    """One file of a plan: the hash of its content after and before, None where there is no file."""
+    """One file of a plan: the hash of its content after and before, None if there is no file."""
 
     name: str
     new: str | None

@@ -31,52 +31,26 @@ SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"
 
 @dataclass(frozen=True)
 class Entry:
-    """What became of one specification.
+    """What became of one specification."""
 
-    Attributes
-    ----------
-    spec : str
-        The file, as it was named or found.
-    folder : str
-        Where its files are, below the output folder.
-    verb : str
-        ``design`` or ``analyze``; empty if it came to neither.
-    family, name : str
-        As the specification says.
-    status : str
-        As in metrics.json; ``skipped`` if it was not run.
-    code : ExitCode
-        What a run of it alone would have returned.
-    message : str
-        What is wrong, in one line; empty if nothing is.
-    requirements, warnings : tuple of mapping
-        As in metrics.json.
-    errors : tuple of str
-        Every fault, with its place in the file.
-    seconds : float
-        How long it took.
-    bug : str
-        The traceback, if a bug ended it.
-    data : tuple of (str, str)
-        The data files that the specification names, and the hashes of their content.
-    written, reused : bool
-        Whether its folder holds its run, and whether that was done by an earlier batch.
-    """
-
-    spec: str
-    folder: str
-    verb: str = ""
+    spec: str  # the file, as it was named or found
+    folder: str  # where its files are, below the output folder
+    verb: str = ""  # ``design`` or ``analyze``; empty if it came to neither
+    # family, name: as the specification says
     family: str = ""
     name: str = ""
-    status: str = SKIPPED
-    code: ExitCode = ExitCode.OK
-    message: str = ""
+    status: str = SKIPPED  # as in metrics.json; ``skipped`` if it was not run
+    code: ExitCode = ExitCode.OK  # what a run of it alone would have returned
+    message: str = ""  # what is wrong, in one line; empty if nothing is
+    # requirements, warnings: as in metrics.json
     requirements: tuple[Mapping[str, Any], ...] = ()
     warnings: tuple[Mapping[str, Any], ...] = ()
-    errors: tuple[str, ...] = ()
-    seconds: float = field(default=0.0, compare=False)
-    bug: str = field(default="", compare=False)
+    errors: tuple[str, ...] = ()  # every fault, with its place in the file
+    seconds: float = field(default=0.0, compare=False)  # how long it took
+    bug: str = field(default="", compare=False)  # the traceback, if a bug ended it
+    # the data files that the specification names, and the hashes of their content
     data: tuple[tuple[str, str | None], ...] = field(default=(), compare=False)
+    # written, reused: whether its folder holds its run, and whether that was done by an earlier batch
     written: bool = field(default=False, compare=False)
     reused: bool = field(default=False, compare=False)
 

@@ -40,21 +40,11 @@ PLACES = 1001
 
 @dataclass(frozen=True)
 class Choices:
-    """The models that a specification can be run by.
+    """The models that a specification can be run by."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        All of the family, the finest last.
-    specs : mapping of str to Spec
-        The specification for each of those that can run.
-    obstacles : mapping of str to str
-        Why each of the others cannot.
-    """
-
-    names: tuple[str, ...]
-    specs: Mapping[str, Spec]
-    obstacles: Mapping[str, str]
+    names: tuple[str, ...]  # all of the family, the finest last
+    specs: Mapping[str, Spec]  # the specification for each of those that can run
+    obstacles: Mapping[str, str]  # why each of the others cannot
 
 
 @dataclass(frozen=True)
@@ -73,21 +63,11 @@ class Variant:
 
 @dataclass(frozen=True)
 class FidelityComparison:
-    """The outcomes of several models of one mechanism.
+    """The outcomes of several models of one mechanism."""
 
-    Attributes
-    ----------
-    variants : tuple of Variant
-        The nominal one first, then the others from coarse to fine.
-    finest : str
-        What the others are compared with.
-    left_out : mapping of str to str
-        Fidelities that the specification has no data for, and why.
-    """
-
-    variants: tuple[Variant, ...]
-    finest: str
-    left_out: Mapping[str, str]
+    variants: tuple[Variant, ...]  # the nominal one first, then the others from coarse to fine
+    finest: str  # what the others are compared with
+    left_out: Mapping[str, str]  # fidelities that the specification has no data for, and why
 
     @property
     def reference(self) -> Variant:

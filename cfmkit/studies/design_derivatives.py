@@ -53,7 +53,7 @@ def slopes(
     Parameters
     ----------
     numbers : callable
-        Specification -> its numbers; None where a part has none.
+        Specification -> its numbers; None if a part has none.
     spec : Spec
         Of the design.
     steps : mapping of str to (float, float)

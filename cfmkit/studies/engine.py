@@ -44,21 +44,13 @@ MISSING, HELD = -1, -2
 
 @dataclass(frozen=True)
 class Job:
-    """The points from `start` up to `stop`, and what the journal calls them.
+    """The points from `start` up to `stop`, and what the journal calls them."""
 
-    Attributes
-    ----------
-    start, stop : int
-        Points.
-    key : str
-        Name by content.
-    blocks : tuple of Job
-        Neighbours that are computed together and noted one by one; empty: the job itself.
-    """
-
+    # start, stop: points
     start: int
     stop: int
-    key: str = field(compare=False)
+    key: str = field(compare=False)  # name by content
+    # neighbours that are computed together and noted one by one; empty: the job itself
     blocks: tuple[Job, ...] = field(default=(), compare=False)
 
 

@@ -86,7 +86,7 @@ class KeptRuns:
         self._notes.add(key, {"entry": entry.as_json(), "data": list(entry.data), "manifest": manifest})
 
     def _key(self, spec: str, folder: str) -> str | None:
-        """Return the name of a run by content; None where the specification cannot be read."""
+        """Return the name of a run by content; None if the specification cannot be read."""
         try:
             text = Path(spec).read_bytes()
         except (OSError, ValueError):

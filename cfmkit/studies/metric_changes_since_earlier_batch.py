@@ -37,29 +37,18 @@ class Earlier:
 
 @dataclass(frozen=True)
 class MetricChange:
-    """One value that is not what it was.
+    """One value that is not what it was."""
 
-    Attributes
-    ----------
-    spec, name : str
-        The specification, and the metric; ``status`` for how it ended.
-    before, after : float, str or None
-        In border units; None where there was no value.
-    unit : str
-        Of both.
-    relative : float or None
-        The difference over what it was: 1 where it doubled; None where they are not numbers, or it was zero.
-    beyond : bool
-        Whether it is more than the tolerance.
-    """
-
+    # spec, name: the specification, and the metric; ``status`` for how it ended
     spec: str
     name: str
+    # before, after: in border units; None if there was no value
     before: float | str | None
     after: float | str | None
-    unit: str
+    unit: str  # of both
+    # the difference over what it was: 1 where it doubled; None if they are not numbers, or it was zero
     relative: float | None
-    beyond: bool
+    beyond: bool  # whether it is more than the tolerance
 
     @property
     def sentence(self) -> str:
@@ -71,24 +60,12 @@ class MetricChange:
 
 @dataclass(frozen=True)
 class BatchComparison:
-    """A batch beside an earlier one.
+    """A batch beside an earlier one."""
 
-    Attributes
-    ----------
-    folder : str
-        Of the earlier batch.
-    tolerance : float
-        Relative change up to which a metric counts as the same.
-    changes : tuple of MetricChange
-        Everything that is not as it was.
-    gone : tuple of str
-        Folders of specifications that are not there any more.
-    """
-
-    folder: str
-    tolerance: float
-    changes: tuple[MetricChange, ...]
-    gone: tuple[str, ...]
+    folder: str  # of the earlier batch
+    tolerance: float  # relative change up to which a metric counts as the same
+    changes: tuple[MetricChange, ...]  # everything that is not as it was
+    gone: tuple[str, ...]  # folders of specifications that are not there any more
 
     @property
     def beyond(self) -> tuple[MetricChange, ...]:

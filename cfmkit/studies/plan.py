@@ -35,27 +35,13 @@ MOST_POINTS = 1_000_000
 
 @dataclass(frozen=True)
 class Variable:
-    """One thing that varies, with every value it takes.
+    """One thing that varies, with every value it takes."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted.
-    dimension : str
-        Of `cfmkit.specs.units`; "count" for whole numbers, "text" for words and switches.
-    values : sequence
-        SI floats, whole numbers or words, as `Spec.replace` takes them.
-    shown : sequence
-        The same in border units, for tables.
-    place : bool
-        Whether a value is a place that knows if it is a length or an angle.
-    """
-
-    path: str
-    dimension: str
-    values: Levels
-    shown: Levels
-    place: bool = False
+    path: str  # dotted
+    dimension: str  # of `cfmkit.specs.units`; "count" for whole numbers, "text" for words and switches
+    values: Levels  # SI floats, whole numbers or words, as `Spec.replace` takes them
+    shown: Levels  # the same in border units, for tables
+    place: bool = False  # whether a value is a place that knows if it is a length or an angle
 
     def value(self, index: int) -> Any:
         """Return one value as `Spec.replace` takes it."""
@@ -66,21 +52,11 @@ class Variable:
 
 @dataclass(frozen=True)
 class Plan:
-    """All points of a study.
+    """All points of a study."""
 
-    Attributes
-    ----------
-    variables : tuple of Variable
-        In order; in a grid the first varies slowest.
-    size : int
-        Number of points.
-    joint : bool
-        Whether the variables go through their values together (zip and samples)
-        rather than in every combination (grid).
-    """
-
-    variables: tuple[Variable, ...]
-    size: int
+    variables: tuple[Variable, ...]  # in order; in a grid the first varies slowest
+    size: int  # number of points
+    # whether the variables go through their values together (zip and samples) rather than in every combination (grid)
     joint: bool = False
 
     def __len__(self) -> int:

@@ -48,30 +48,15 @@ _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
 
 @dataclass(frozen=True)
 class Metric:
-    """A column of results.
+    """A column of results."""
 
-    Attributes
-    ----------
-    name : str
-        With ``[branch]`` where wanted.
-    dimension : str
-        Of `cfmkit.specs.units`.
-    definition : str
-        What it is.
-    over : tuple of WindowEnd, optional
-        Where it is measured: places [m or rad], or shares of the travel; default: the window of the analysis.
-    words : tuple of str
-        Those that a metric of the dimension ``text`` is an index into.
-    label : str
-        Heads the column; default: the name, ``force_mean_load`` for ``force_mean[load]``.
-    """
-
-    name: str
-    dimension: str
-    definition: str = ""
+    name: str  # with ``[branch]`` where wanted
+    dimension: str  # of `cfmkit.specs.units`
+    definition: str = ""  # what it is
+    # where it is measured: places [m or rad], or shares of the travel; default: the window of the analysis
     over: Ends | None = None
-    label: str = ""
-    words: tuple[str, ...] = ()
+    label: str = ""  # heads the column; default: the name, ``force_mean_load`` for ``force_mean[load]``
+    words: tuple[str, ...] = ()  # those that a metric of the dimension ``text`` is an index into
 
     def __post_init__(self) -> None:
         """Fall back to the name."""
@@ -81,33 +66,15 @@ class Metric:
 
 @dataclass(frozen=True)
 class Row:
-    """What became of one point.
+    """What became of one point."""
 
-    Attributes
-    ----------
-    status : Status
-        How its analysis ended.
-    values : tuple of float or None
-        One for each metric of the study [SI]; all None where nothing was solved.
-    met : tuple of bool
-        One for each requirement; empty where nothing was solved.
-    message : str
-        What went wrong; empty for a complete point.
-    curve : bytes
-        The point's curves as CSV, if the study keeps them.
-    bug : str
-        The traceback, if a bug ended it.
-    warnings : tuple of str
-        Names of what the user must know, sorted.
-    """
-
-    status: Status
-    values: tuple[float | None, ...] = ()
-    met: tuple[bool, ...] = ()
-    message: str = ""
-    curve: bytes = b""
-    bug: str = ""
-    warnings: tuple[str, ...] = ()
+    status: Status  # how its analysis ended
+    values: tuple[float | None, ...] = ()  # one for each metric of the study [SI]; all None if nothing was solved
+    met: tuple[bool, ...] = ()  # one for each requirement; empty where nothing was solved
+    message: str = ""  # what went wrong; empty for a complete point
+    curve: bytes = b""  # the point's curves as CSV, if the study keeps them
+    bug: str = ""  # the traceback, if a bug ended it
+    warnings: tuple[str, ...] = ()  # names of what the user must know, sorted
 
 
 def of_perfect_parts(spec: Spec, designer: Designer, run: Run) -> Design:
@@ -117,39 +84,19 @@ def of_perfect_parts(spec: Spec, designer: Designer, run: Run) -> Design:
 
 @dataclass(frozen=True)
 class Study:
-    """Everything that decides the row of a point, but the varied values.
+    """Everything that decides the row of a point, but the varied values."""
 
-    Attributes
-    ----------
-    spec : Spec
-        What is varied.
-    paths : tuple of str
-        What varies, in order.
-    metrics : tuple of Metric
-        What is noted.
-    design : bool
-        Whether the mechanism is designed anew at each point.
-    curves : bool
-        Whether curves are kept.
-    seed : int
-        Of everything random inside an analysis.
-    lean : bool
-        Whether metrics and requirements alone are looked at: models then leave out what those do not need.
-    deliver : callable
-        What makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes.
-    made : bool
-        Whether points are manufactured parts, whose values need not agree as stated ones do.
-    """
-
-    spec: Spec
-    paths: tuple[str, ...]
-    metrics: tuple[Metric, ...]
-    design: bool = False
-    curves: bool = False
-    seed: int = 0
+    spec: Spec  # what is varied
+    paths: tuple[str, ...]  # what varies, in order
+    metrics: tuple[Metric, ...]  # what is noted
+    design: bool = False  # whether the mechanism is designed anew at each point
+    curves: bool = False  # whether curves are kept
+    seed: int = 0  # of everything random inside an analysis
+    # whether metrics and requirements alone are looked at: models then leave out what those do not need
     lean: bool = False
+    # what makes the design of a point, ``deliver(spec, designer, run)``; default: what the family's designer makes
     deliver: Deliver = of_perfect_parts
-    made: bool = False
+    made: bool = False  # whether points are manufactured parts, whose values need not agree as stated ones do
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -165,7 +112,7 @@ class Study:
         return frozenset({*names, *map(other_name, names)})
 
     def reported(self, column: int, value: float) -> float | str | None:
-        """Return a metric's value as files say it: in the border unit, or a word; None where there is none."""
+        """Return a metric's value as files say it: in the border unit, or a word; None if there is none."""
         one = self.metrics[column]
         if not isfinite(value):
             return None

@@ -103,21 +103,11 @@ class _Worker:
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor that works in several processes.
+    """An executor that works in several processes."""
 
-    Attributes
-    ----------
-    processes : int
-        How many.
-    timeout : float or None
-        Seconds that one job may take.
-    deadline : float or None
-        When the time of all jobs is up, in `time.time` [s].
-    """
-
-    processes: int
-    timeout: float | None = None
-    deadline: float | None = None
+    processes: int  # how many
+    timeout: float | None = None  # seconds that one job may take
+    deadline: float | None = None  # when the time of all jobs is up, in `time.time` [s]
 
     def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
         """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.

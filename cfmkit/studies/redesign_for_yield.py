@@ -85,27 +85,13 @@ DIGITS = 6
 
 @dataclass
 class Sight:
-    """What is seen of a part: `cfmkit.designing.robust_design.SeenPart`.
+    """What is seen of a part: `cfmkit.designing.robust_design.SeenPart`."""
 
-    Attributes
-    ----------
-    spec : Spec
-        The design that the search began with.
-    free : tuple of str
-        Paths of the values that may move.
-    made : DesignTolerances
-        What errors there are.
-    rows : RequirementRows
-        What is looked at.
-    run : Run
-        Seed.
-    """
-
-    spec: Spec
-    free: tuple[str, ...]
-    made: DesignTolerances
-    rows: RequirementRows
-    run: Run
+    spec: Spec  # the design that the search began with
+    free: tuple[str, ...]  # paths of the values that may move
+    made: DesignTolerances  # what errors there are
+    rows: RequirementRows  # what is looked at
+    run: Run  # seed
 
     def variant(self, x: FloatArray, errors: FloatArray) -> Spec:
         """Return the specification of a part."""
@@ -116,7 +102,7 @@ class Sight:
         return self.spec.replace(changes, as_made=bool(errors.any()))
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
-        """Return the numbers of a part; None where it has none."""
+        """Return the numbers of a part; None if it has none."""
         try:
             return numbers_of(self.variant(x, errors), self.rows, self.run)
         except CfmError:

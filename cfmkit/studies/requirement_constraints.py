@@ -42,31 +42,16 @@ NARROW = 0.02
 
 @dataclass(frozen=True)
 class RequirementRows:
-    """Requirements as rows of what is seen of a part.
+    """Requirements as rows of what is seen of a part."""
 
-    Attributes
-    ----------
-    places : (p,) array
-        Poses at which effort and stress are looked at [m or rad].
-    branches : tuple of str
-        Of the curve.
-    stresses : int
-        Rows of stress.
-    matrix, constant : (m, q) and (m,) array
-        ``matrix @ numbers + constant`` is at least zero where all requirements hold.
-    metrics : tuple of Metric
-        Those that are numbers of their own: the last ones.
-    about : tuple of int
-        To which requirement each row belongs.
-    """
-
-    places: FloatArray
-    branches: tuple[str, ...]
-    stresses: int
+    places: FloatArray  # (p,): poses at which effort and stress are looked at [m or rad]
+    branches: tuple[str, ...]  # of the curve
+    stresses: int  # rows of stress
+    # matrix, constant, (m, q), (m,): ``matrix @ numbers + constant`` is at least zero where all requirements hold
     matrix: FloatArray
     constant: FloatArray
-    metrics: tuple[Metric, ...]
-    about: tuple[int, ...]
+    metrics: tuple[Metric, ...]  # those that are numbers of their own: the last ones
+    about: tuple[int, ...]  # to which requirement each row belongs
 
 
 class _RowsOfMargins:
@@ -115,7 +100,7 @@ class _RowsOfMargins:
             self.rows.append(({column: -1.0}, limits.max, number))
 
     def _contradicted(self, rows: list[tuple[dict[int, float], float, int]], one: Requirement) -> bool:
-        """Tell whether rows say that a requirement is missed which the analysis finds met: its points are too few."""
+        """Return True if rows say that a requirement is missed which the analysis finds met: its points are too few."""
         values = np.concatenate([*self.first.effort.values(), *self.first.stress])
         for row, constant, _ in rows:
             terms = [constant, *(weight * values[column] for column, weight in row.items())]
@@ -141,7 +126,7 @@ class _RowsOfMargins:
         return True
 
     def _effort(self, name: str, limits: Bounds, over: Any, k: int) -> list[tuple[dict[int, float], float]] | None:
-        """Return rows of the effort on one branch; None where they would not say it."""
+        """Return rows of the effort on one branch; None if they would not say it."""
         at, first = self.at(over), k * len(self.places)
         values = self.first.effort[self.branches[k]][at]
         if not len(at) or not np.isfinite(values).all():
@@ -291,7 +276,7 @@ def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementR
 def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, ...] = ()) -> Sampled | None:
     """Return effort and stress of a part at places: by the family's quick way, else from its analysis.
 
-    Where its curve ends a little earlier they are those at its end; None where it does not get to what must be reached.
+    Where its curve ends a little earlier they are those at its end; None if it does not get to what must be reached.
     """
     found = quickly_sampled(spec, places)
     if found is not None:
@@ -300,7 +285,7 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run, reached: tuple[float, .
 
 
 def quickly_sampled(spec: Spec, places: FloatArray) -> Sampled | None:
-    """Return effort and stress of a part at places by the family's quick way; None where it has none."""
+    """Return effort and stress of a part at places by the family's quick way; None if it has none."""
     quick = family(spec.family).sampled
     return None if quick is None else function_named(quick)(spec, places)
 
@@ -335,7 +320,7 @@ def numbers_in(seen: Sampled) -> FloatArray:
 
 
 def numbers_of(spec: Spec, rows: RequirementRows, run: Run, reached: tuple[float, ...] = ()) -> FloatArray | None:
-    """Return what rows look at of a part, (q,); None where it has no such numbers; `reached`: see `sampled_of`."""
+    """Return what rows look at of a part, (q,); None if it has no such numbers; `reached`: see `sampled_of`."""
     found, result = quickly_sampled(spec, rows.places), None
     if found is None:
         result = _looked_at(spec, rows, run)

@@ -29,30 +29,15 @@ _STATUS = {status.key: status for status in Status}
 
 @dataclass(frozen=True)
 class ResultRows:
-    """Consecutive rows of a study.
+    """Consecutive rows of a study."""
 
-    Attributes
-    ----------
-    values : (n, m) array
-        Metrics [SI]; NaN where there is no value.
-    met : (n, r) array of bool
-        Requirements; False where nothing was solved.
-    odd : mapping of int to (Status, str)
-        Status and message of the rows that are not complete, or that have something to say.
-    curves : mapping of int to bytes
-        Curves as CSV, where they are kept.
-    bugs : mapping of int to str
-        Tracebacks.
-    warned : mapping of str to (n,) array of bool
-        Name of a warning -> the rows that have it.
-    """
-
-    values: FloatArray
-    met: NDArray[np.bool_]
+    values: FloatArray  # (n, m): metrics [SI]; NaN where there is no value
+    met: NDArray[np.bool_]  # (n, r): requirements; False where nothing was solved
+    # status and message of the rows that are not complete, or that have something to say
     odd: Mapping[int, tuple[Status, str]] = field(default_factory=dict)
-    curves: Mapping[int, bytes] = field(default_factory=dict)
-    bugs: Mapping[int, str] = field(default_factory=dict)
-    warned: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    curves: Mapping[int, bytes] = field(default_factory=dict)  # curves as CSV, where they are kept
+    bugs: Mapping[int, str] = field(default_factory=dict)  # tracebacks
+    warned: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)  # name of a warning -> the rows that have it
 
     def __len__(self) -> int:
         """Return the number of rows."""

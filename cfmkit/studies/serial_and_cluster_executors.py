@@ -142,18 +142,10 @@ PATIENCE = 0.2
 
 @dataclass(frozen=True)
 class Cluster:
-    """An executor that works on a Dask cluster.
+    """An executor that works on a Dask cluster."""
 
-    Attributes
-    ----------
-    address : str
-        Of the scheduler, ``tcp://host:8786``; ``local`` starts one here, with its workers.
-    workers : int
-        How many a local cluster has.
-    """
-
-    address: str
-    workers: int = 1
+    address: str  # of the scheduler, ``tcp://host:8786``; ``local`` starts one here, with its workers
+    workers: int = 1  # how many a local cluster has
 
     def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
         """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.

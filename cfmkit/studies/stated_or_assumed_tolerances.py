@@ -38,23 +38,12 @@ NO_TOLERANCE = "no value of this part is known to err by its process: state 'des
 
 @dataclass(frozen=True)
 class DesignTolerances:
-    """The tolerances of a `design` block on one specification.
+    """The tolerances of a `design` block on one specification."""
 
-    Attributes
-    ----------
-    spec : Spec
-        What is made.
-    block : Sensitivity
-        The tolerances in the block that studies know.
-    parameters : tuple of Parameter
-        What varies, lists taken apart.
-    samples, seed : int
-        How many parts are drawn, and from where.
-    """
-
-    spec: Spec
-    block: Sensitivity
-    parameters: tuple[Parameter, ...]
+    spec: Spec  # what is made
+    block: Sensitivity  # the tolerances in the block that studies know
+    parameters: tuple[Parameter, ...]  # what varies, lists taken apart
+    # samples, seed: how many parts are drawn, and from where
     samples: int
     seed: int
 
@@ -82,7 +71,7 @@ class DesignTolerances:
 
 
 def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> DesignTolerances | None:
-    """Return the tolerances of a `design` block on a specification, or those of its process; None where it has none.
+    """Return the tolerances of a `design` block on a specification, or those of its process; None if it has none.
 
     Raises
     ------
@@ -111,7 +100,7 @@ def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
 
 
 def is_made(spec: Spec, design: DesignBlock) -> bool:
-    """Tell whether it is said how parts are made: by a block `design`, or of a part whose yield is requested."""
+    """Return True if it is said how parts are made: by a block `design`, or of a part whose yield is requested."""
     if design.tolerances_of(spec)[0] or design.process is not None:
         return True
 
@@ -120,7 +109,7 @@ def is_made(spec: Spec, design: DesignBlock) -> bool:
 
 
 def errs_nowhere(spec: Spec, design: DesignBlock) -> bool:
-    """Tell whether no value of a part that `is_made` errs; of a solid that is seen only once it is drawn."""
+    """Return True if no value of a part that `is_made` errs; of a solid that is seen only once it is drawn."""
     return spec.fidelity != "solid" and not stated_tolerances(spec, design)
 
 
@@ -169,26 +158,15 @@ MODULUS = "mechanism.material.youngs_modulus"
 
 @dataclass(frozen=True)
 class Assumed:
-    """Tolerances that are assumed of a part.
+    """Tolerances that are assumed of a part."""
 
-    Attributes
-    ----------
-    process : ProcessAccuracy
-        How it is made.
-    kinds : mapping of str to str
-        Path -> in what it errs, "thickness" or "position".
-    rates : mapping of str to float
-        Path of a spring's rate -> its nominal value [N/m or N m/rad]: found within `SPRING_RATE` of it.
-    modulus : (float, float) or None
-        From where to where the modulus at `MODULUS` is found [Pa]; None where no source says it.
-    as_stated : bool
-        Whether beams have materials of their own whose moduli are found in a range, too: they are taken as stated.
-    """
-
-    process: ProcessAccuracy
-    kinds: Mapping[str, str]
+    process: ProcessAccuracy  # how it is made
+    kinds: Mapping[str, str]  # path -> in what it errs, "thickness" or "position"
+    # from where to where the modulus at `MODULUS` is found [Pa]; None if no source says it
     modulus: tuple[float, float] | None
+    # whether beams have materials of their own whose moduli are found in a range, too: they are taken as stated
     as_stated: bool = False
+    # path of a spring's rate -> its nominal value [N/m or N m/rad]: found within `SPRING_RATE` of it
     rates: Mapping[str, float] = field(default_factory=dict)
 
     @property

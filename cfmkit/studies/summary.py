@@ -41,21 +41,11 @@ TIE = 1e-9
 
 @dataclass(frozen=True)
 class Objective:
-    """What makes a point better than another: the column of a metric, and which of its values are better.
+    """What makes a point better than another: the column of a metric, and which of its values are better."""
 
-    Attributes
-    ----------
-    column : int
-        Of the study.
-    largest : bool
-        Whether more is better.
-    middle : float or None
-        Of two bounds [SI]: the nearer, the better, whatever `largest` says.
-    """
-
-    column: int
-    largest: bool
-    middle: float | None = None
+    column: int  # of the study
+    largest: bool  # whether more is better
+    middle: float | None = None  # of two bounds [SI]: the nearer, the better, whatever `largest` says
 
     @property
     def sense(self) -> str:
@@ -74,7 +64,7 @@ class Objective:
 
 
 def objective(study: Study) -> Objective | None:
-    """Return by what the best point is chosen; None where the study notes nothing of the kind."""
+    """Return by what the best point is chosen; None if the study notes nothing of the kind."""
     for one in study.spec.part_requirements:
         names = one.metric, other_name(one.metric)
         noted = [column for column, item in enumerate(study.metrics) if item.name in names]
@@ -106,42 +96,24 @@ def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
 
 @dataclass
 class Summary:
-    """Sums up rows as they pass by.
+    """Sums up rows as they pass by."""
 
-    Attributes
-    ----------
-    study : Study
-        Whose rows they are.
-    shown : tuple of int
-        Columns whose values are kept for pictures.
-    counts : Counter
-        Points by status.
-    met : (r,) int array
-        How many points meet each requirement.
-    all_met : int
-        How many solved ones meet them all.
-    ties : int
-        Points that are as good as the best, it included: to 1e-9 of its value, which is what rounding leaves.
-    gapped, first_gap : int, str
-        Complete points without a value over some window, and what the first of them says.
-    best, best_values, best_meets : int or None, (m,) array or None, bool
-        The best point so far, its metrics, and whether it meets every requirement.
-    kept : list of arrays
-        Of each block of rows for pictures: their indices, their values in the columns `shown`, and whether they meet
-        every requirement.
-    """
-
-    study: Study
-    shown: tuple[int, ...] = ()
-    counts: Counter[Status] = field(default_factory=Counter)
-    met: NDArray[np.int64] = field(init=False)
-    all_met: int = 0
+    study: Study  # whose rows they are
+    shown: tuple[int, ...] = ()  # columns whose values are kept for pictures
+    counts: Counter[Status] = field(default_factory=Counter)  # points by status
+    met: NDArray[np.int64] = field(init=False)  # (r,): how many points meet each requirement
+    all_met: int = 0  # how many solved ones meet them all
+    # gapped, first_gap: complete points without a value over some window, and what the first of them says
     gapped: int = 0
     first_gap: str = ""
+    # best, best_values, best_meets: the best point so far, its metrics, and whether it meets every requirement
     best: int | None = None
+    # points that are as good as the best, it included: to 1e-9 of its value, which is what rounding leaves
     ties: int = 0
     best_values: FloatArray | None = None
     best_meets: bool = False
+    # of each block of rows for pictures: their indices, their values in the columns `shown`, and whether they meet
+    # every requirement
     kept: list[tuple[NDArray[np.int64], FloatArray, NDArray[np.bool_]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:

@@ -102,7 +102,7 @@ def in_words(values: Any, spec: Spec, path: str) -> Any:
 
 
 def _dimension(spec: Spec, path: str) -> str | None:
-    """Return the dimension of a value; None where it has none, or the path is wrong, which others tell better."""
+    """Return the dimension of a value; None if it has none, or the path is wrong, which others tell better."""
     try:
         quantity = leaf(type(spec), path).quantity
     except CannotVary:

@@ -33,37 +33,19 @@ NOTHING = "nothing to vary: give --vary '{example}', or add a block 'sweep: {var
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What a sweep is asked to do; what is left out follows the specification's block `sweep`.
+    """What a sweep is asked to do; what is left out follows the specification's block `sweep`."""
 
-    Attributes
-    ----------
-    vary : tuple of WantedVariation
-        What varies; none: as in the specification. What is given replaces all of that.
-    combine : {"grid", "zip", "lhs", "sobol"}, optional
-        How values are combined.
-    samples : int, optional
-        Points of a Latin hypercube or a Sobol sequence.
-    design, curves : bool, optional
-        Whether to design anew at each point, and to keep every curve.
-    metrics : tuple of str
-        Columns; none: as in the specification, else all.
-    seed : int
-        Of everything random.
-    most : int
-        Points that are allowed.
-    pictures : bool
-        Whether pictures will be drawn: those of one parameter show curves.
-    """
-
+    # what varies; none: as in the specification. What is given replaces all of that
     vary: tuple[WantedVariation, ...] = ()
-    combine: Combine | None = None
-    samples: int | None = None
+    combine: Combine | None = None  # how values are combined
+    samples: int | None = None  # points of a Latin hypercube or a Sobol sequence
+    # design, curves: whether to design anew at each point, and to keep every curve
     design: bool | None = None
     curves: bool | None = None
-    metrics: tuple[str, ...] = ()
-    seed: int = 0
-    most: int = MOST_POINTS
-    pictures: bool = False
+    metrics: tuple[str, ...] = ()  # columns; none: as in the specification, else all
+    seed: int = 0  # of everything random
+    most: int = MOST_POINTS  # points that are allowed
+    pictures: bool = False  # whether pictures will be drawn: those of one parameter show curves
 
 
 def prepare(spec: Spec, request: SweepRequest) -> Work:

@@ -37,24 +37,12 @@ class CannotVary(ValueError):
 
 @dataclass(frozen=True)
 class Leaf:
-    """One value of a specification.
+    """One value of a specification."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted, with indices for the items of lists.
-    kind : str
-        "quantity" (a number with a unit), "number", "whole" number, "word" or "switch".
-    quantity : UnitField or None
-        How a quantity is read.
-    choices : tuple
-        The words of a closed choice.
-    """
-
-    path: str
-    kind: Kind
-    quantity: UnitField | None = None
-    choices: tuple[Any, ...] = ()
+    path: str  # dotted, with indices for the items of lists
+    kind: Kind  # "quantity" (a number with a unit), "number", "whole" number, "word" or "switch"
+    quantity: UnitField | None = None  # how a quantity is read
+    choices: tuple[Any, ...] = ()  # the words of a closed choice
 
     def read(self, given: Any) -> tuple[Value, str]:
         """Return (value as `Spec.replace` takes it, dimension) of what a user wrote.

@@ -26,46 +26,22 @@ LARGEST = 10**18
 
 @dataclass(frozen=True)
 class WantedVariation:
-    """What a user wants to vary, as it was written.
+    """What a user wants to vary, as it was written."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted.
-    content : str or tuple
-        ``start:stop:n`` or a list of values.
-    source : str
-        What messages call it: ``--vary mechanism.roller_radius``.
-    """
-
-    path: str
-    content: str | tuple[Any, ...]
-    source: str = field(default="", compare=False)
+    path: str  # dotted
+    content: str | tuple[Any, ...]  # ``start:stop:n`` or a list of values
+    source: str = field(default="", compare=False)  # what messages call it: ``--vary mechanism.roller_radius``
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One thing that varies: listed values, or a range with or without a number of steps.
+    """One thing that varies: listed values, or a range with or without a number of steps."""
 
-    Attributes
-    ----------
-    leaf : Leaf
-        What varies.
-    dimension : str
-        Of `cfmkit.specs.units`; "text" for words and switches.
-    listed : tuple
-        Values as `Spec.replace` takes them; empty for a range.
-    ends : tuple of (float, float), optional
-        Start and stop of a range [SI].
-    count : int or None
-        Number of values; None for a range to draw from.
-    """
-
-    leaf: Leaf
-    dimension: str
-    listed: tuple[Value, ...] = ()
-    ends: tuple[float, float] | None = None
-    count: int | None = None
+    leaf: Leaf  # what varies
+    dimension: str  # of `cfmkit.specs.units`; "text" for words and switches
+    listed: tuple[Value, ...] = ()  # values as `Spec.replace` takes them; empty for a range
+    ends: tuple[float, float] | None = None  # start and stop of a range [SI]
+    count: int | None = None  # number of values; None for a range to draw from
 
 
 def wish(option: str) -> WantedVariation:

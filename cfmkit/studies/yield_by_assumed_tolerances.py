@@ -83,23 +83,12 @@ class YieldUnknown(Exception):
 
 @dataclass(frozen=True)
 class FirstOrderShares:
-    """Which share of parts is good, to first order.
+    """Which share of parts is good, to first order."""
 
-    Attributes
-    ----------
-    good : float
-        Of parts as they are made.
-    measured : float
-        Of parts whose modulus is as it should be.
-    trimmed : float
-        Of parts whose mean force is brought to that of the design.
-    proportional : bool
-        Whether the force goes with the modulus, as that of a part of one material without bought springs does.
-    """
-
-    good: float
-    measured: float
-    trimmed: float
+    good: float  # of parts as they are made
+    measured: float  # of parts whose modulus is as it should be
+    trimmed: float  # of parts whose mean force is brought to that of the design
+    # whether the force goes with the modulus, as that of a part of one material without bought springs does
     proportional: bool
 
 
@@ -228,7 +217,7 @@ def _slopes(
 
 
 def _thinned(result: Result) -> Spec | None:
-    """Return a design whose curve has fewer points; None where metrics are taken from points, or are few already.
+    """Return a design whose curve has fewer points; None if metrics are taken from points, or are few already.
 
     Where the model knows the curve between its points, metrics are those of the whole curve.
     """

@@ -53,20 +53,13 @@ TRIED = 3
 
 @dataclass(frozen=True)
 class YieldShare:
-    """How many of some parts are good.
+    """How many of some parts are good."""
 
-    Attributes
-    ----------
-    good, failed, count : int
-        Parts that meet everything, that have no complete result, and all.
-    why : str
-        What became of the first without a complete result.
-    """
-
+    # good, failed, count: parts that meet everything, that have no complete result, and all
     good: int
     failed: int
     count: int
-    why: str = ""
+    why: str = ""  # what became of the first without a complete result
 
     @property
     def value(self) -> float:
@@ -88,30 +81,14 @@ class YieldShare:
 
 @dataclass(frozen=True)
 class JudgedParts:
-    """Parts with what their analyses say.
+    """Parts with what their analyses say."""
 
-    Attributes
-    ----------
-    met : (n, r) array of bool
-        Which requirement each part meets; false where it has no result.
-    trimmed : (n, r) array of bool
-        The same after the trim.
-    failed : (n,) array of bool
-        Which parts have no result, or one that ends early.
-    why : str
-        What became of the first of those.
-    lacking : tuple of int and str
-        How many others have no value for a requirement, and why the first has none.
-    values : (n, m) array
-        Of the metrics that `_noted` says; nan where there is none.
-    """
-
-    met: NDArray[np.bool_]
-    trimmed: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
-    why: str
-    lacking: tuple[int, str]
-    values: FloatArray
+    met: NDArray[np.bool_]  # (n, r): which requirement each part meets; false where it has no result
+    trimmed: NDArray[np.bool_]  # (n, r): the same after the trim
+    failed: NDArray[np.bool_]  # (n,): which parts have no result, or one that ends early
+    why: str  # what became of the first of those
+    lacking: tuple[int, str]  # how many others have no value for a requirement, and why the first has none
+    values: FloatArray  # (n, m): of the metrics that `_noted` says; nan where there is none
 
     def share(self, met: NDArray[np.bool_] | None = None) -> YieldShare:
         """Return the share of parts that meet every requirement."""
@@ -211,7 +188,7 @@ def _without(
 ) -> JudgedParts | None:
     """Return what becomes of parts without some common errors, from what became of them with these.
 
-    None where force and stress do not go exactly with each of them, or a requirement is on something else.
+    None if force and stress do not go exactly with each of them, or a requirement is on something else.
     """
     spec, metrics = made.spec, _noted(made.spec, nominal)
     departs = np.array([split_name(one.name)[0] == "deviation_from_target" for one in metrics])
@@ -245,7 +222,7 @@ def common(made: DesignTolerances, nominal: Result, run: Run) -> tuple[int, ...]
 
 
 def _force_share(made: DesignTolerances, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:
-    """Return by which share a standard deviation of some parameters changes the force; None where it cannot be said."""
+    """Return by which share a standard deviation of some parameters changes the force; None if it cannot be said."""
     changes = {made.paths[k]: one_sigma(made.parameters[k]) for k in members}
     try:
         moved = family(made.spec.family).analyze(made.spec.replace(changes), run)
@@ -273,36 +250,18 @@ def _window(result: Result) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Yields:
-    """What is known of many parts of a design.
+    """What is known of many parts of a design."""
 
-    Attributes
-    ----------
-    made : DesignTolerances
-        On the design.
-    after, trimmed : YieldShare
-        Of its parts, as they are and after the trim.
-    frozen : YieldShare or None
-        Without common errors; None where there are none.
-    common : tuple of str
-        The paths of those.
-    each : tuple of YieldShare
-        Of parts that meet one requirement.
-    before : YieldShare or None
-        Of the specification that the design began with.
-    why : str
-        Why there is no yield of that.
-    lacking : tuple of int and str
-        How many of the parts have a curve, but no value for a requirement, and why the first has none.
-    """
-
-    made: DesignTolerances
+    made: DesignTolerances  # on the design
+    # after, trimmed: of its parts, as they are and after the trim
     after: YieldShare
     trimmed: YieldShare
-    frozen: YieldShare | None
-    common: tuple[str, ...]
-    each: tuple[YieldShare, ...]
-    before: YieldShare | None
-    why: str = ""
+    frozen: YieldShare | None  # without common errors; None if there are none
+    common: tuple[str, ...]  # the paths of those
+    each: tuple[YieldShare, ...]  # of parts that meet one requirement
+    before: YieldShare | None  # of the specification that the design began with
+    why: str = ""  # why there is no yield of that
+    # how many of the parts have a curve, but no value for a requirement, and why the first has none
     lacking: tuple[int, str] = (0, "")
 
     def quantities(self) -> dict[str, Quantity]:

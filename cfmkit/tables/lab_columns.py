@@ -190,7 +190,7 @@ def _described(index: int, text: str, below: str, file: str) -> ColumnInfo:
 
 
 def split_header(text: str) -> tuple[str, str | None]:
-    """Return name and unit of a header's cell; the unit is None where there is none.
+    """Return name and unit of a header's cell; the unit is None if there is none.
 
     Examples
     --------

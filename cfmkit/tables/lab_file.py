@@ -169,7 +169,7 @@ class LabTable:
         return np.array([self._value(number, column) for number in range(len(cells))])
 
     def _plain_numbers(self, cells: list[str]) -> FloatArray | None:
-        """Return all cells as numbers at once; None where one of them is more or less than a number."""
+        """Return all cells as numbers at once; None if one of them is more or less than a number."""
         text = "\n".join(cells)
         if self.shape.dialect.decimal == ",":
             if "." in text:

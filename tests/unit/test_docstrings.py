@@ -125,6 +125,17 @@ def test_sections_of_docstrings_are_about_all_that_there_is_and_nothing_else():
     assert wrong == []
 
 
+def test_fields_are_described_where_they_are_declared_but_in_public_types():
+    public_types = {name for name in cfmkit.__all__ if isinstance(getattr(cfmkit, name), type)}
+    wrong = []
+    for name in MODULES:
+        for item in ast.walk(ast.parse(source_of(name))):
+            if isinstance(item, ast.ClassDef) and item.name not in public_types:
+                listed = named_in(ast.get_docstring(item) or "", "Attributes")
+                wrong += [f"{name}: {item.name}.{field}" for field in sorted(listed & fields_of(item))]
+    assert wrong == []
+
+
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
 def test_examples_in_docstrings_are_true(name, monkeypatch):
     monkeypatch.chdir(ROOT)

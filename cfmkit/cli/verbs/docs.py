@@ -48,21 +48,11 @@ FIRST = ("index", "tutorial", "howto", "reference")
 
 @dataclass(frozen=True)
 class GuidePage:
-    """One page.
+    """One page."""
 
-    Attributes
-    ----------
-    name : str
-        Of its file, without the ending.
-    title : str
-        Its first heading.
-    path : Path
-        The file, in Markdown; what it links to stands beside it.
-    """
-
-    name: str
-    title: str
-    path: Path
+    name: str  # of its file, without the ending
+    title: str  # its first heading
+    path: Path  # the file, in Markdown; what it links to stands beside it
 
     @property
     def text(self) -> str:

@@ -57,7 +57,7 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
 
 
 def _packages() -> Iterator[Record]:
-    """Yield what cfmkit uses, with the version that is there, None where it is missing, and the versions allowed."""
+    """Yield what cfmkit uses, with the version that is there, None if it is missing, and the versions allowed."""
     from importlib.metadata import PackageNotFoundError, requires, version
 
     from packaging.requirements import Requirement

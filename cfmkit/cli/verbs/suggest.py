@@ -210,7 +210,7 @@ def keys(options: SuggestOptions) -> dict[str, str]:
 
 
 def _are_two(text: str) -> bool:
-    """Tell whether a text has two values with units, so that its comma is no decimal one."""
+    """Return True if a text has two values with units, so that its comma is no decimal one."""
     parts = text.split(",")
     return len(parts) == 2 and all(re.search(r"[a-zA-Z]", part) for part in parts)
 

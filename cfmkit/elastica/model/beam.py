@@ -84,27 +84,13 @@ class Beam:
 
 @dataclass(frozen=True)
 class Fit:
-    """How a shape was fitted between its ends.
+    """How a shape was fitted between its ends."""
 
-    Attributes
-    ----------
-    rotation : float
-        Turn of the shape [rad]; as given plus this is as used.
-    scale : float
-        Factor on the shape's size [1].
-    gap : float
-        Distance between the far end of the shape as given and its node [m].
-    length : float
-        Arc length as used [m].
-    course : FittedShape
-        The shape before it is turned and scaled.
-    """
-
-    rotation: Any
-    scale: Any
-    gap: float
-    length: Any
-    course: FittedShape
+    rotation: Any  # turn of the shape [rad]; as given plus this is as used
+    scale: Any  # factor on the shape's size [1]
+    gap: float  # distance between the far end of the shape as given and its node [m]
+    length: Any  # arc length as used [m]
+    course: FittedShape  # the shape before it is turned and scaled
 
     def angle(self, t: Any, inside: float) -> Any:
         """Return the reference angle [rad] as used."""
@@ -233,7 +219,7 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
 
 
 def _has_corner(course: FittedShape, t: float) -> bool:
-    """Tell whether the angle jumps at the break at t; the ends count as corners."""
+    """Return True if the angle jumps at the break at t; the ends count as corners."""
     k = int(np.abs(course.breaks - t).argmin())
     if k in (0, len(course.breaks) - 1):
         return True
@@ -242,7 +228,7 @@ def _has_corner(course: FittedShape, t: float) -> bool:
 
 
 def _has_step(section: Section, station: float) -> bool:
-    """Tell whether the thickness jumps at a station."""
+    """Return True if the thickness jumps at a station."""
     given = section.thickness
     return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations.real == station].real) > 0)
 

@@ -209,7 +209,7 @@ class Network(ShortRepr):
         return node
 
     def moved(self, node: str) -> bool:
-        """Tell whether a link moves a node."""
+        """Return True if a link moves a node."""
         return any(link.node == node for link in self.links)
 
     def body_of(self, node: str) -> str:
@@ -252,7 +252,7 @@ def _ends(spring: Spring) -> list[str]:
 
 
 def same_direction(one: float, other: float) -> bool:
-    """Tell whether two directions [rad] are parallel, in either sense."""
+    """Return True if two directions [rad] are parallel, in either sense."""
     between = one.real - other.real
     return math.isfinite(between) and abs(math.sin(between)) < 1e-12
 

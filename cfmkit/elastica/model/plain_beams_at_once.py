@@ -119,14 +119,14 @@ def check_fits(beams: Sequence[Beam], distance: Any, own: Any) -> None:
 
 
 def is_plain(beam: Beam) -> bool:
-    """Tell whether a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
+    """Return True if a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
     if beam.section.wide or isinstance(beam.section.thickness, Taper):
         return False
     return isinstance(beam.shape, Polynomial) and not coils(beam)
 
 
 def coils(beam: Beam) -> bool:
-    """Tell whether the angle of a beam, a polynomial, may turn by more than COILED."""
+    """Return True if the angle of a beam, a polynomial, may turn by more than COILED."""
     return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > COILED
 
 

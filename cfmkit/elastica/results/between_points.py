@@ -427,7 +427,7 @@ def between_loads(
 ) -> BetweenLoads | None:
     """Return a path under loads at every place of a node's motion.
 
-    None where the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
+    None if the motion turns back, where a link with an arm moves the node, where points are too few, or miss the
     tolerance.
 
     Parameters

@@ -28,18 +28,10 @@ _STEP = 1e-30
 
 @dataclass(frozen=True)
 class HinderedCurling:
-    """What beams that are wide, but solved as narrow ones, are too soft by.
+    """What beams that are wide, but solved as narrow ones, are too soft by."""
 
-    Attributes
-    ----------
-    share : (n,) array
-        Of the strain energy of bending of all beams, at every point [1].
-    beam : (n,) array of str
-        The beam that is too soft by most of that.
-    """
-
-    share: FloatArray
-    beam: Any
+    share: FloatArray  # (n,): of the strain energy of bending of all beams, at every point [1]
+    beam: Any  # (n,): the beam that is too soft by most of that
 
 
 def hindered_curling(path: EquilibriumPath) -> HinderedCurling:

@@ -49,18 +49,10 @@ class Observed(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class AlongTheWay:
-    """Motion, effort and stress at every place of the way (a `cfmkit.results.WindingPath`).
+    """Motion, effort and stress at every place of the way (a `cfmkit.results.WindingPath`)."""
 
-    Attributes
-    ----------
-    path : EquilibriumPath
-        Of at least four accurate points.
-    observe : callable
-        Returns what is looked at on equilibria of this network.
-    """
-
-    path: EquilibriumPath
-    observe: Callable[[EquilibriumPath], Observed]
+    path: EquilibriumPath  # of at least four accurate points
+    observe: Callable[[EquilibriumPath], Observed]  # returns what is looked at on equilibria of this network
 
     @cached_property
     def _seen(self) -> Observed:

@@ -17,20 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """A bifurcation between two points of a path.
+    """A bifurcation between two points of a path."""
 
-    Attributes
-    ----------
-    drive : float
-        Where, dimensionless.
-    y : (unknowns,) array
-        The equilibrium there.
-    below, above : bool
-        Whether a branch that parts from the other one is at smaller, and at larger values of the drive.
-    """
-
-    drive: float
-    y: FloatArray
+    drive: float  # where, dimensionless
+    y: FloatArray  # (unknowns,): the equilibrium there
+    # below, above: whether a branch that parts from the other one is at smaller, and at larger values of the drive
     below: bool
     above: bool
 

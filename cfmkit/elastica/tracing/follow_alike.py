@@ -84,7 +84,7 @@ def _kept(beam: Beam) -> Any:
 
 
 def _goes_straight_on(path: Path, control: Control) -> bool:
-    """Tell whether a network rests before its drive, is set up without cuts, and nothing happens on its path."""
+    """Return True if a network rests before its drive, is set up without cuts, and nothing happens on its path."""
     arrays = path.network
     springs = [spring.item for spring in arrays.springs]
     rests = not (path.net.loads or arrays.base.any() or any(getattr(s, name, None) for s in springs for name in FREE))

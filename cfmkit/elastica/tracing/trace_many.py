@@ -30,19 +30,12 @@ _CHUNK, _AHEAD = 128, 2  # networks set up at once; chunks for each process that
 
 @dataclass(frozen=True)
 class NetworkOutcome:
-    """What came of one network.
+    """What came of one network."""
 
-    Attributes
-    ----------
-    status, message : str
-        Name and sentence of the path's status; ``INVALID`` and the reason where the network cannot exist.
-    value : Any
-        What was collected from the path; None where there is no path.
-    """
-
+    # status, message: name and sentence of the path's status; ``INVALID`` and the reason where the network cannot exist
     status: str
     message: str
-    value: Any
+    value: Any  # what was collected from the path; None if there is no path
 
 
 @dataclass(frozen=True)

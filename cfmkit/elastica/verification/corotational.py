@@ -48,24 +48,13 @@ _GAUSS = np.polynomial.legendre.leggauss(8)
 
 @dataclass(frozen=True)
 class Recheck:
-    """What the elements say at points of a path.
+    """What the elements say at points of a path."""
 
-    Attributes
-    ----------
-    effort : (p,) array
-        Force or moment of the drive [N or N m], extrapolated; NaN where no equilibrium was found.
-    stress : (p,) array
-        Largest stress at the ends of the elements [Pa], extrapolated.
-    stable : (p,) array of bool
-        Whether the energy is at a minimum there while the drive is held.
-    elements : int
-        Of the finer mesh.
-    """
-
+    # (p,): force or moment of the drive [N or N m], extrapolated; NaN where no equilibrium was found
     effort: FloatArray
-    stress: FloatArray
-    stable: Any
-    elements: int
+    stress: FloatArray  # (p,): largest stress at the ends of the elements [Pa], extrapolated
+    stable: Any  # (p,): whether the energy is at a minimum there while the drive is held
+    elements: int  # of the finer mesh
 
 
 def recheck(path: Path, points: Any = None, elements: int = 48) -> Recheck:

@@ -35,15 +35,9 @@ def window_of(solution: OnCurve) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class AlongMotion:
-    """A curve of at least one point, turned round if it leads to the negative side.
+    """A curve of at least one point, turned round if it leads to the negative side."""
 
-    Attributes
-    ----------
-    solution : OnCurve
-        The solved mechanism.
-    """
-
-    solution: OnCurve
+    solution: OnCurve  # the solved mechanism
 
     @cached_property
     def sense(self) -> float:
@@ -82,7 +76,7 @@ class AlongMotion:
 
     @cached_property
     def corners(self) -> FloatArray | None:
-        """Where the effort has kinks [m or rad]; None where the model between the points is not known."""
+        """Where the effort has kinks [m or rad]; None if the model between the points is not known."""
         law = self.solution.everywhere
         return None if law is None else np.asarray(self.sense * law.corners)
 

@@ -52,20 +52,11 @@ _CORNERS = 64
 
 @dataclass(frozen=True, eq=False)
 class BeamEnd:
-    """Where a beam begins or ends, seen from there.
-
-    Attributes
-    ----------
-    beam : str
-    strip : BeamStrip
-        Its outermost piece.
-    last : bool
-        Whether it is the end of the piece, not its start.
-    """
+    """Where a beam begins or ends, seen from there."""
 
     beam: str
-    strip: BeamStrip
-    last: bool
+    strip: BeamStrip  # its outermost piece
+    last: bool  # whether it is the end of the piece, not its start
 
     @property
     def at(self) -> FloatArray:
@@ -96,19 +87,12 @@ class BeamEnd:
 
 @dataclass(frozen=True, eq=False)
 class DrawnParts:
-    """What a part is united from.
+    """What a part is united from."""
 
-    Attributes
-    ----------
-    pieces, holes : list of OutlinePiece
-        All that is united, and what is then cut out of eyes.
-    blocks : list of DrawnBlock
-        Pads, eyes and bars among the pieces: of the described half, and between both.
-    """
-
+    # pieces, holes: all that is united, and what is then cut out of eyes
     pieces: list[OutlinePiece]
     holes: list[OutlinePiece]
-    blocks: list[DrawnBlock]
+    blocks: list[DrawnBlock]  # pads, eyes and bars among the pieces: of the described half, and between both
 
 
 def both_halves(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> dict[str, list[BeamStrip]]:
@@ -153,7 +137,7 @@ def _round(end: BeamEnd, size: float) -> OutlinePiece:
 
 
 def _pinned(assembly: Assembly, node: str) -> bool:
-    """Tell whether the beams at a node of either half end in eyes."""
+    """Return True if the beams at a node of either half end in eyes."""
     support = assembly.network.nodes[node.rstrip("'")].support
     return support.across and not support.rotation and not is_padded(assembly, node.rstrip("'"))
 
@@ -208,7 +192,7 @@ def _blocks(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Iterator[D
 
 
 def is_padded(assembly: Assembly, node: str) -> bool:
-    """Tell whether the beams at a node end in a pad: at a clamp, at a guide, at what moves as one with another node.
+    """Return True if the beams at a node end in a pad: at a clamp, at a guide, at what moves as one with another node.
 
     Not on the mirror axis: there the beams of the two halves meet.
     """
@@ -220,7 +204,7 @@ def is_padded(assembly: Assembly, node: str) -> bool:
 
 
 def moves(assembly: Assembly, node: str) -> bool:
-    """Tell whether a pad at a node moves: it is driven, guided or linked."""
+    """Return True if a pad at a node moves: it is driven, guided or linked."""
     about = assembly.network.nodes[node].support
     return node in moving_nodes(assembly) or not (about.along and about.across and about.rotation)
 

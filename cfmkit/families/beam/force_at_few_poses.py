@@ -36,7 +36,7 @@ _SMOOTH = re.compile(
 
 
 def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
-    """Return force and stress at places, each beam's own stress; None where the path does not reach them all.
+    """Return force and stress at places, each beam's own stress; None if the path does not reach them all.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
     Returns
     -------
     SampledSlopes or None
-        None where `sampled` is None, and where the tangent is singular at a place.
+        None if `sampled` is None, and where the tangent is singular at a place.
     """
     # other nodes of a chain follow from its beams, and other stages from the first, through numbers that stay real
     copies = spec.mechanism.copies
@@ -105,7 +105,7 @@ def sampled_slopes(spec: BeamSpec, places: FloatArray, paths: Sequence[str]) -> 
 
 
 def _followed(spec: BeamSpec, places: FloatArray) -> tuple[Assembly, Path, NDArray[np.int64]] | None:
-    """Return a mechanism, its path from rest, and the path's points at places; None where it does not get there."""
+    """Return a mechanism, its path from rest, and the path's points at places; None if it does not get there."""
     if spec.mechanism.drive.kind != "displacement" or spec.fidelity == "solid" or spec.analysis.through_folds:
         return None
     if places[0] < 0 < places[-1]:

@@ -41,7 +41,7 @@ SLACK = 1e-9
 
 
 def largest(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> float | None:
-    """Return the largest of some values along a path, where its motion is in a window; None where there is none.
+    """Return the largest of some values along a path, where its motion is in a window; None if there is none.
 
     Parameters
     ----------

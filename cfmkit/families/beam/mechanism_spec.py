@@ -129,7 +129,7 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
 
 
 def _returns(coefficients: Sequence[float]) -> bool:
-    """Tell whether a shape whose angle is a polynomial [rad] ends where it starts."""
+    """Return True if a shape whose angle is a polynomial [rad] ends where it starts."""
     panels = 8 + math.ceil(sum(map(abs, coefficients[1:])))
     u = (np.arange(panels)[:, None] + 0.5 * (_PLACES + 1)) / panels
     chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * _WEIGHTS).sum() / (2 * panels)
@@ -192,13 +192,13 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
 
 
 def _acts(load: LoadSpec) -> bool:
-    """Tell whether a load is not zero."""
+    """Return True if a load is not zero."""
     values = (load.fx, load.fy, load.moment) if load.kind == "point" else (load.wx, load.wy)
     return any(value != 0 for value in values)
 
 
 def parallel(one: float, other: float) -> bool:
-    """Tell whether two directions [rad] are parallel, in either sense."""
+    """Return True if two directions [rad] are parallel, in either sense."""
     return abs(math.sin(one - other)) < _SAME_DIRECTION
 
 

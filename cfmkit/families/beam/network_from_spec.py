@@ -57,27 +57,14 @@ _SMOOTH = 0.07  # the same where every step is a point of the curve
 
 @dataclass(frozen=True, repr=False)
 class Assembly(ShortRepr):
-    """A mechanism as the engine takes it.
+    """A mechanism as the engine takes it."""
 
-    Attributes
-    ----------
-    spec : BeamSpec
-        What it was built from.
-    network : Network
-        One half, or one leg; all stages in series.
-    driven : str
-        The node that is driven, in the last stage.
-    parallel : int
-        How many of the network act side by side: forces of the mechanism are so many times those of the network.
-    allowable_stress : float or None
-        Yield strength over safety factor, the smallest of all beams [Pa].
-    """
-
-    spec: BeamSpec
-    network: engine.Network
-    driven: str
+    spec: BeamSpec  # what it was built from
+    network: engine.Network  # one half, or one leg; all stages in series
+    driven: str  # the node that is driven, in the last stage
+    # how many of the network act side by side: forces of the mechanism are so many times those of the network
     parallel: int
-    allowable_stress: float | None
+    allowable_stress: float | None  # yield strength over safety factor, the smallest of all beams [Pa]
 
     @property
     def direction(self) -> float:
@@ -135,7 +122,7 @@ class Assembly(ShortRepr):
         return drive.reference if drive.kind == "loads" else float(self.parallel)
 
     def masses(self) -> NetworkMasses | None:
-        """Return what the parts weigh; None where a density is not known."""
+        """Return what the parts weigh; None if a density is not known."""
         mechanism = self.spec.mechanism
         # stages in series have the names of the first, with a number behind a dot
         own = mechanism.of_beams("material")
@@ -197,7 +184,7 @@ def parallel_parts(spec: BeamSpec) -> int:
 
 
 def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
-    """Return a point [m] and the direction [rad] of the mirror axis; None where nothing is mirrored."""
+    """Return a point [m] and the direction [rad] of the mirror axis; None if nothing is mirrored."""
     copies = assembly.spec.mechanism.copies
     if copies is None or copies.mirror is None:
         return None
@@ -205,7 +192,7 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
 
 
 def on_axis(assembly: Assembly, node: str) -> bool:
-    """Tell whether a node is on the mirror axis, by the thickness of the beams that meet there."""
+    """Return True if a node is on the mirror axis, by the thickness of the beams that meet there."""
     found, axis = assembly.network.nodes[node], mirror_axis(assembly)
     if axis is None:
         return False
@@ -229,7 +216,7 @@ def moving_nodes(assembly: Assembly) -> set[str]:
 
 
 def allowable_stress(spec: BeamSpec) -> float | None:
-    """Return yield strength over safety factor [Pa], of the weakest beam; None where that of a beam is not known."""
+    """Return yield strength over safety factor [Pa], of the weakest beam; None if that of a beam is not known."""
     known = known_allowable_stresses(spec)
     return min(known.values()) if len(known) == len(spec.mechanism.beams) else None
 

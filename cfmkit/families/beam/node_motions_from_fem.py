@@ -25,16 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SolidNodes:
-    """Nodes of a solved part.
+    """Nodes of a solved part."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The network that the part is drawn from.
-    solved : MeshSolution
-    """
-
-    assembly: Assembly
+    assembly: Assembly  # the network that the part is drawn from
     solved: MeshSolution
 
     def motion(self, name: str) -> Callable[[FloatArray], FloatArray]:

@@ -80,29 +80,15 @@ which are nearer by the square of that again."""
 
 @dataclass(frozen=True)
 class HeldPlace:
-    """A place of the part that is held or driven and moves as one rigid piece.
+    """A place of the part that is held or driven and moves as one rigid piece."""
 
-    Attributes
-    ----------
-    name : str
-        Of its node; of the mirrored half with a prime.
-    node : str
-    at : (2,) array
-        Where the node is [m].
-    shapes : tuple of (n, 2) arrays
-        Polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye.
-    seams : tuple of (2, 2) arrays
-        Lines at which it begins [m].
-    padded : bool
-        Whether its shapes are pads.
-    """
-
-    name: str
+    name: str  # of its node; of the mirrored half with a prime
     node: str
-    at: FloatArray
+    at: FloatArray  # (2,): where the node is [m]
+    # polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye
     shapes: tuple[FloatArray, ...]
-    seams: tuple[FloatArray, ...] = ()
-    padded: bool = False
+    seams: tuple[FloatArray, ...] = ()  # lines at which it begins [m]
+    padded: bool = False  # whether its shapes are pads
 
 
 def regions(spec: BeamSpec, tolerance: float | None = None) -> tuple[HeldPlace, ...]:

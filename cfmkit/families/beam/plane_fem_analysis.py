@@ -54,23 +54,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolidSolution(ShortRepr):
-    """A part that was solved.
+    """A part that was solved."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The network that the part is drawn from.
-    solved : AdaptiveSolution
-    motion : (n,) array
-        Travel of the points of the curve [m or rad].
-    reached : LoadPath or None
-        How far a load leads that drives the part; None where its motion is given.
-    """
-
-    assembly: Assembly
+    assembly: Assembly  # the network that the part is drawn from
     solved: AdaptiveSolution
+    # (n,): travel of the points of the curve [m or rad]
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
-    reached: LoadPath | None = None
+    reached: LoadPath | None = None  # how far a load leads that drives the part; None if its motion is given
 
     @property
     def spec(self) -> BeamSpec:
@@ -425,7 +415,7 @@ def _fillet_table(solution: SolidSolution) -> Table:
 
 
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where the model does not know a value."""
+    """Return the scalar results by name; None if the model does not know a value."""
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         **solution.error.values(),

@@ -68,19 +68,11 @@ SAYS_LESS = 1e3
 
 @dataclass(frozen=True)
 class Kept:
-    """A shape with its curve, as it was followed once.
-
-    Attributes
-    ----------
-    name : str
-    spec : BeamSpec
-    motion, force, stress : (n,) array
-        [m], [N], [Pa].
-    room : Room
-    """
+    """A shape with its curve, as it was followed once."""
 
     name: str
     spec: BeamSpec
+    # motion, force, stress, (n,): [m], [N], [Pa]
     motion: FloatArray
     force: FloatArray
     stress: FloatArray
@@ -250,7 +242,7 @@ def _refitted(spec: BeamSpec, wish: Wish, model: Callable[[BeamSpec, Run], Resul
     """Return a shape over its flattest window by a model, its force as wished, and by what its beams became thinner.
 
     The force is linear in the width. Where the stress is above the allowable one, the beams get thinner and wider: it
-    falls nearly as the thickness. None where the curve is shorter than the travel.
+    falls nearly as the thickness. None if the curve is shorter than the travel.
     """
     longer = 1.12 * float(spec.analysis.travel or 0.0)
     free = {"analysis.travel": longer, "analysis.window": None, "requirements": (), "sensitivity": None}

@@ -81,7 +81,7 @@ DEFINITIONS = {
 
 
 def values_of(solution: Solution, run: Run) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where a value does not exist, or takes long and is not looked at."""
+    """Return the scalar results by name; None if a value does not exist, or takes long and is not looked at."""
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         "error_estimate": solution.path.error,
@@ -258,7 +258,7 @@ def _across(solution: Solution) -> dict[str, float | None]:
 
 
 def _passes_pole(solution: Solution, direction: float, window: tuple[float, float]) -> bool:
-    """Tell whether the stiffness across the drive has a pole between two points of a path in a window.
+    """Return True if the stiffness across the drive has a pole between two points of a path in a window.
 
     Such is that of a node without a guide, on a part of the path where even a guide would not make it stable.
     """
@@ -277,7 +277,7 @@ BESIDE = np.array([-1e-5, -1e-6, 1e-6, 1e-5])
 
 
 def _has_pole(solution: Solution, observe: Callable[[Path], FloatArray], window: tuple[float, float]) -> bool:
-    """Tell whether a value has a pole at a bifurcation in a window: nearer by ten times it is ten times as large.
+    """Return True if a value has a pole at a bifurcation in a window: nearer by ten times it is ten times as large.
 
     Such is the stiffness across the drive of a node that is guided, where the part buckles under its guide.
     """

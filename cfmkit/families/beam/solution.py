@@ -39,24 +39,13 @@ _FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(ShortRepr):
-    """A solved mechanism, as checks, scalar values and pictures need it.
+    """A solved mechanism, as checks, scalar values and pictures need it."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The network and what is done to it.
-    path : Path
-        Its equilibria.
-    keep : (n,) int array
-        Which points of the path make the curve: those requested, or all where the path is followed through folds.
-    ends : (m,) int array
-        Points of the path at which windows end between two points of the curve.
-    """
-
-    assembly: Assembly
-    path: Path
+    assembly: Assembly  # the network and what is done to it
+    path: Path  # its equilibria
+    # (n,): which points of the path make the curve: those requested, or all where the path is followed through folds
     keep: Any
-    ends: Any = ()
+    ends: Any = ()  # (m,): points of the path at which windows end between two points of the curve
 
     @property
     def spec(self) -> BeamSpec:
@@ -194,7 +183,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def frequencies(self) -> Frequencies | None:
-        """Natural frequencies about every point of the curve; None where none are requested and nothing can flutter."""
+        """Natural frequencies about every point of the curve; None if none are requested and nothing can flutter."""
         masses = self.assembly.masses()
         count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
         if masses is None or not count or not len(self.keep):

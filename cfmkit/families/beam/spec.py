@@ -254,7 +254,7 @@ class BeamSpec(Spec):
 
     @property
     def out_of_plane_widths(self) -> Mapping[str, float | None]:
-        """Of all beams, and of those that have their own; None where one has none."""
+        """Of all beams, and of those that have their own; None if one has none."""
         own = {f"beams.{name}.width": one.width for name, one in self.mechanism.beams.items()}
         return {"width": self.mechanism.width} | own
 
@@ -315,7 +315,7 @@ class BeamSpec(Spec):
 
     @property
     def durability(self) -> Durability | None:
-        """Of all beams; None where they are not of one material."""
+        """Of all beams; None if they are not of one material."""
         kinds = {*self.mechanism.of_beams("material").values()}
         return kinds.pop().durability if len(kinds) == 1 else None
 
@@ -425,7 +425,7 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
 
 
 def _several(spec: BeamSpec, key: Literal["material", "width"]) -> bool:
-    """Tell whether beams differ in a value that they may take from the mechanism."""
+    """Return True if beams differ in a value that they may take from the mechanism."""
     return len({*spec.mechanism.of_beams(key).values()}) > 1
 
 
@@ -446,7 +446,7 @@ def _no_density(spec: BeamSpec) -> str:
 
 
 def _has_strength(spec: BeamSpec, other: BeamMaterial | None) -> bool:
-    """Tell whether the allowable stress is known of all beams, or of another material if there is one."""
+    """Return True if the allowable stress is known of all beams, or of another material if there is one."""
     of = [other] if other else spec.mechanism.of_beams("material").values()
     return all(one.allowable(spec.mechanism.safety_factor) is not None for one in of)
 

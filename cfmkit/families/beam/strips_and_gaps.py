@@ -33,21 +33,13 @@ TOGETHER = 0.25  # of the thickness: ends closer than this are one
 
 @dataclass(frozen=True)
 class BeamStrip:
-    """A smooth piece of a beam.
+    """A smooth piece of a beam."""
 
-    Attributes
-    ----------
-    points : (n, 2) array
-        Of its centre line [m].
-    angle, thickness : (n,) array
-        There [rad], [m].
-    curvature, slope : (n,) array
-        How fast these change along the line [1/m], [1].
-    """
-
-    points: FloatArray
+    points: FloatArray  # (n, 2): of its centre line [m]
+    # angle, thickness, (n,): there [rad], [m]
     angle: FloatArray
     thickness: FloatArray
+    # curvature, slope, (n,): how fast these change along the line [1/m], [1]
     curvature: FloatArray
     slope: FloatArray
 
@@ -236,7 +228,7 @@ def _pairs(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 
 def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str, other: str) -> BeamGap | None:
-    """Return the gap of two beams; None where nothing is left of one beside their common ends."""
+    """Return the gap of two beams; None if nothing is left of one beside their common ends."""
     a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
         if np.hypot(*(lines[one][i] - lines[other][j])) < TOGETHER * (halves[one] + half):
@@ -274,7 +266,7 @@ def _to_chords(points: FloatArray, line: FloatArray) -> float:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> bool:
-    """Tell whether two chains of points cross."""
+    """Return True if two chains of points cross."""
     p, r = a[:-1, None], np.diff(a, axis=0)[:, None]
     q, s = b[None, :-1], np.diff(b, axis=0)[None]
     cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]

@@ -47,25 +47,14 @@ _BESIDE = 1e-9  # of the length: both sides of a corner are looked at
 
 @dataclass(frozen=True, repr=False)
 class SurfaceCourse(ShortRepr):
-    """A surface between its ends.
+    """A surface between its ends."""
 
-    Attributes
-    ----------
-    height, slope : callable
-        Height [m] and its derivative [1] at places [m]; at a corner the slope is that of one side.
-    rows : (n,) array
-        The places that the curve along it is written at [m].
-    corners : (k,) array
-        Where the slope jumps [m].
-    holes : tuple of (float, float)
-        Between which places it was not measured [m].
-    """
-
+    # height, slope: height [m] and its derivative [1] at places [m]; at a corner the slope is that of one side
     height: Callable[[FloatArray], FloatArray]
     slope: Callable[[FloatArray], FloatArray]
-    rows: FloatArray
-    corners: FloatArray
-    holes: tuple[tuple[float, float], ...] = ()
+    rows: FloatArray  # (n,): the places that the curve along it is written at [m]
+    corners: FloatArray  # (k,): where the slope jumps [m]
+    holes: tuple[tuple[float, float], ...] = ()  # between which places it was not measured [m]
 
     def places(self, end: float) -> FloatArray:
         """Return many places up to one [m], the rows and both sides of every corner among them."""
@@ -160,42 +149,23 @@ _NO_FORCE = 1e-9  # of the largest force: less is none
 
 @dataclass(frozen=True)
 class Ride:
-    """What happens along a surface, as far as the mechanism can follow it.
+    """What happens along a surface, as far as the mechanism can follow it."""
 
-    Attributes
-    ----------
-    place, height, displacement : (n,) array
-        Along the surface, of it, and of the mechanism [m].
-    force : (n,) array
-        Axial force of the tip [N].
-    contact, lateral : (2, n) arrays
-        Normal force on the surface and force against the motion [N], on the way along x and on the way back; not
-        finite where the tip jams.
-    stress : (n,) array
-        Largest stress in the mechanism [Pa].
-    stable : (n,) array of bool
-        Whether the mechanism is stable there.
-    values : mapping
-        The scalar results; extremes are those between the points, too.
-    ending : Finding or None
-        Why it ends before the surface does.
-    findings : tuple of Finding
-        What else is wrong with it.
-    hole : Finding or None
-        Where the surface was not measured: nothing is known there, nor what holds over the whole surface.
-    """
-
+    # place, height, displacement, (n,): along the surface, of it, and of the mechanism [m]
     place: FloatArray
     height: FloatArray
     displacement: FloatArray
-    force: FloatArray
+    force: FloatArray  # (n,): axial force of the tip [N]
+    # contact, lateral, (2, n): normal force on the surface and force against the motion [N], on the way along x and on
+    # the way back; not finite where the tip jams
     contact: FloatArray
     lateral: FloatArray
-    stress: FloatArray
-    stable: Any
-    values: Mapping[str, float | None]
-    ending: Finding | None = None
-    findings: tuple[Finding, ...] = ()
+    stress: FloatArray  # (n,): largest stress in the mechanism [Pa]
+    stable: Any  # (n,): whether the mechanism is stable there
+    values: Mapping[str, float | None]  # the scalar results; extremes are those between the points, too
+    ending: Finding | None = None  # why it ends before the surface does
+    findings: tuple[Finding, ...] = ()  # what else is wrong with it
+    # where the surface was not measured: nothing is known there, nor what holds over the whole surface
     hole: Finding | None = None
 
     @property
@@ -207,27 +177,16 @@ class Ride:
 
 @dataclass(frozen=True)
 class Tip:
-    """The mechanism as the tip feels it: over displacements that increase [m], from rest to where it turns back.
+    """The mechanism as the tip feels it: over displacements that increase [m], from rest to where it turns back."""
 
-    Attributes
-    ----------
-    surface : Surface
-        What the tip follows.
-    course : SurfaceCourse
-        Its height and slope.
-    x, effort, stress, stable : (n,) arrays
-        Displacements [m], forces [N], largest stresses [Pa], and 1 where stable.
-    between : BetweenPoints or None
-        The model between these displacements.
-    """
-
-    surface: Surface
-    course: SurfaceCourse
+    surface: Surface  # what the tip follows
+    course: SurfaceCourse  # its height and slope
+    # x, effort, stress, stable, (n,): displacements [m], forces [N], largest stresses [Pa], and 1 where stable
     x: FloatArray
     effort: FloatArray
     stress: FloatArray
     stable: FloatArray
-    between: BetweenPoints | None = None
+    between: BetweenPoints | None = None  # the model between these displacements
 
     def stress_at(self, displacement: FloatArray) -> FloatArray:
         """Return the largest stress in the mechanism at displacements [Pa]."""
@@ -289,7 +248,7 @@ class Tip:
 
 
 def ride(solution: OnCurve) -> Ride | None:
-    """Return what happens along the surface of the analysis; None where there is no surface."""
+    """Return what happens along the surface of the analysis; None if there is no surface."""
     surface = solution.spec.analysis.surface
     if surface is None:
         return None

@@ -22,7 +22,7 @@ UNBENT = 1e-3
 
 
 def driven_by_load(spec: BeamSpec) -> bool:
-    """Tell whether a force or a moment drives a mechanism."""
+    """Return True if a force or a moment drives a mechanism."""
     return spec.mechanism.drive.kind in ("force", "moment")
 
 

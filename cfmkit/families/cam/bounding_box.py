@@ -50,7 +50,7 @@ BRACE = 0.010
 
 
 def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
-    """Return the depth with springs of a known wire, else wound of steel wire [m]; None where no such spring fits.
+    """Return the depth with springs of a known wire, else wound of steel wire [m]; None if no such spring fits.
 
     Parameters
     ----------

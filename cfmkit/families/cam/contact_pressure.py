@@ -80,7 +80,7 @@ def flank_pressure(assembly: Assembly, states: TrackStates, force: FloatArray) -
 
 
 def worst(pressures: FloatArray) -> int | None:
-    """Return where the largest pressure is; None where there is none."""
+    """Return where the largest pressure is; None if there is none."""
     known = np.isfinite(pressures)
     return int(np.argmax(np.where(known, pressures, -np.inf))) if known.any() else None
 

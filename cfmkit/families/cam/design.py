@@ -188,7 +188,7 @@ def _check_room(spec: CamSpec) -> None:
 
 
 def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float | None:
-    """Return the smallest force constant without undercut [m]; None where undercut is accepted."""
+    """Return the smallest force constant without undercut [m]; None if undercut is accepted."""
     if not target.avoid_undercut:
         return None
     mechanism = spec.mechanism

@@ -415,7 +415,7 @@ def manufacturing(result: Result) -> Figure:
 
 
 def moving(result: Result) -> Moving | None:
-    """Return the mechanism on its way up, for a film; None where its motion is one of time or the cam is as built."""
+    """Return the mechanism on its way up, for a film; None if its motion is one of time or the cam is as built."""
     solution = result.state
     if solution is None or not hasattr(solution, "states"):
         return None

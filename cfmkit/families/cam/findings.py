@@ -107,7 +107,7 @@ def overstretched(longest: FloatArray | float, limit: float) -> Any:
 
 
 def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
-    """Return what to say where the contact yields; None where it does not.
+    """Return what to say where the contact yields; None if it does not.
 
     Parameters
     ----------

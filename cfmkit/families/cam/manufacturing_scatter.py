@@ -32,31 +32,16 @@ PLACES = 1600
 
 @dataclass(frozen=True)
 class DrawnError:
-    """The error of one flank that was drawn, with its derivatives over the arc length of the design.
+    """The error of one flank that was drawn, with its derivatives over the arc length of the design."""
 
-    Attributes
-    ----------
-    amplitude : float
-        Of each wave [m].
-    number, phase : (k,) array
-        Wave numbers [rad/m] and phases.
-    offset : float
-        [m].
-    angle : float
-        About the origin, positive where the cam grows wider towards the top [rad].
-    nominal : CurveFrame
-        The design at `arc`.
-    arc : (n,) array
-        [m].
-    """
-
-    amplitude: float
+    amplitude: float  # of each wave [m]
+    # number, phase, (k,): wave numbers [rad/m] and phases
     number: FloatArray
     phase: FloatArray
-    offset: float
-    angle: float
-    nominal: CurveFrame
-    arc: FloatArray
+    offset: float  # [m]
+    angle: float  # about the origin, positive where the cam grows wider towards the top [rad]
+    nominal: CurveFrame  # the design at `arc`
+    arc: FloatArray  # (n,) [m]
 
     @property
     def low(self) -> float:

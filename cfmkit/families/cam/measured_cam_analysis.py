@@ -392,27 +392,15 @@ REACH = 2e-3
 
 @dataclass(frozen=True)
 class BuiltTrack:
-    """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position.
+    """The track of a roller's centre on a built flank, mirrored to the right, over the slider's position."""
 
-    Attributes
-    ----------
-    slider : (n,) array
-        Increasing: height of the slider above the path's first point [m].
-    x, y : (n,) array
-        Roller centre [m].
-    slope : (n,) array
-        dy/dx of the track.
-    contact : (n,) array
-        Arc length of the flank at which the roller touches it [m].
-    holes : tuple of (float, float)
-        Slider positions between which the contact is where nothing was measured [m].
-    """
-
-    slider: FloatArray
+    slider: FloatArray  # (n,): increasing: height of the slider above the path's first point [m]
+    # x, y, (n,): roller centre [m]
     x: FloatArray
     y: FloatArray
-    slope: FloatArray
-    contact: FloatArray
+    slope: FloatArray  # (n,): dy/dx of the track
+    contact: FloatArray  # (n,): arc length of the flank at which the roller touches it [m]
+    # slider positions between which the contact is where nothing was measured [m]
     holes: tuple[tuple[float, float], ...] = ()
 
     def at(self, slider: FloatArray) -> tuple[FloatArray, FloatArray]:

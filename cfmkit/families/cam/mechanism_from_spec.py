@@ -145,7 +145,7 @@ def weights_of(mechanism: Mechanism) -> Weights:
 
 
 def losses_of(mechanism: Mechanism) -> Losses | None:
-    """Return the friction of bearings, pins and guide; None where nothing rubs but the rollers."""
+    """Return the friction of bearings, pins and guide; None if nothing rubs but the rollers."""
     bearings, pins, guide = mechanism.bearings, mechanism.pins, GuideFriction.of(mechanism.guide)
     bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
     pin = 0.5 * pins.diameter * pins.friction if pins else 0.0

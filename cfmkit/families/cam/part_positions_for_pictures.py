@@ -25,20 +25,13 @@ SLENDER = 0.2
 
 @dataclass(frozen=True)
 class PartsPose:
-    """Positions of the parts, of two equal ones the right one, each (x, y) [m].
+    """Positions of the parts, of two equal ones the right one, each (x, y) [m]."""
 
-    Attributes
-    ----------
-    roller, slider, contact : (float, float)
-        Axis of the roller, pin of the slider, point where the roller touches the cam.
-    on_corner : bool
-        Whether the roller pivots on the cam's corner.
-    """
-
+    # roller, slider, contact: axis of the roller, pin of the slider, point where the roller touches the cam
     roller: Point
     slider: Point
     contact: Point
-    on_corner: bool
+    on_corner: bool  # whether the roller pivots on the cam's corner
 
     def mirrored(self) -> PartsPose:
         """Return the positions of the left parts."""

@@ -164,7 +164,7 @@ DEFINITIONS = {
 
 
 def values_of(solution: Solution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where a value does not exist."""
+    """Return the scalar results by name; None if a value does not exist."""
     assembly = solution.assembly
     law = assembly.profile.path.law
     flank = FlankSamples.of(solution)
@@ -210,7 +210,7 @@ def _wire(solution: Solution) -> dict[str, Quantity]:
 
 
 def largest_roller(assembly: Assembly) -> float | None:
-    """Return the smallest radius of curvature of the roller path [m]; None where no roller is too large for it."""
+    """Return the smallest radius of curvature of the roller path [m]; None if no roller is too large for it."""
     radius = assembly.profile.path.law.tightest(assembly.profile.end)[1]
     return radius if isfinite(radius) else None
 
@@ -231,7 +231,7 @@ def constant_force(assembly: Assembly) -> float:
 
 
 def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
-    """Return the constant force that is wanted or that the profile is cut for [N]; None where it follows a curve."""
+    """Return the constant force that is wanted or that the profile is cut for [N]; None if it follows a curve."""
     if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
         return None
     return spec.design.force if spec.design else constant_force(assembly)
@@ -321,23 +321,12 @@ def _bearing_turns(solution: Solution) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class FlankSamples:
-    """What rolls on the flank: the samples there, and before them the place at which the roller leaves the corner.
+    """What rolls on the flank: the samples there, and before them the place at which the roller leaves the corner."""
 
-    Attributes
-    ----------
-    solution : Solution
-        The mechanism.
-    travel : (n,) array
-        Increasing [m].
-    states : TrackStates
-        Where the rollers are, (n,).
-    up, down : Forces
-        On the way up and on the way down, (n,) each.
-    """
-
-    solution: Solution
-    travel: FloatArray
-    states: TrackStates
+    solution: Solution  # the mechanism
+    travel: FloatArray  # (n,): increasing [m]
+    states: TrackStates  # where the rollers are, (n,)
+    # up, down: on the way up and on the way down, (n,) each
     up: Forces
     down: Forces
 

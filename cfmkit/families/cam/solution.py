@@ -41,50 +41,25 @@ def pressure_angle(states: TrackStates, brace_length: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Assembly:
-    """A mechanism put together.
+    """A mechanism put together."""
 
-    Attributes
-    ----------
-    spec : CamSpec
-        With every derived value written out.
-    profile : CamProfile
-        The cam as cut.
-    track : Track
-        Where the roller runs.
-    loads : Loads
-        Springs and weights.
-    stroke : float
-        Travel that the cut profile offers with its own brace [m]; short of the
-        specified stroke where the geometry ends first.
-    shortfall : Finding or None
-        Why `stroke` is short, if it is.
-    """
-
-    spec: CamSpec
-    profile: CamProfile
-    track: Track
-    loads: Loads
+    spec: CamSpec  # with every derived value written out
+    profile: CamProfile  # the cam as cut
+    track: Track  # where the roller runs
+    loads: Loads  # springs and weights
+    # travel that the cut profile offers with its own brace [m]; short of the specified stroke where the geometry ends
+    # first
     stroke: float
-    shortfall: Finding | None = None
+    shortfall: Finding | None = None  # why `stroke` is short, if it is
 
 
 @dataclass(frozen=True)
 class ForceBand:
-    """Forces of all drawn cams over the travel.
+    """Forces of all drawn cams over the travel."""
 
-    Attributes
-    ----------
-    travel : (n,) array
-        [m].
-    forces : (samples, n) array
-        Without friction [N].
-    design : (n,) array
-        Force of the design [N].
-    """
-
-    travel: FloatArray
-    forces: FloatArray
-    design: FloatArray
+    travel: FloatArray  # (n,) [m]
+    forces: FloatArray  # (samples, n): without friction [N]
+    design: FloatArray  # (n,): force of the design [N]
 
     def quantile(self, share: float) -> FloatArray:
         """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
@@ -101,31 +76,16 @@ class ForceBand:
 
 @dataclass(frozen=True, repr=False)
 class Solution(ShortRepr):
-    """A solved mechanism, as the checks, the scalar values and the pictures need it.
+    """A solved mechanism, as the checks, the scalar values and the pictures need it."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The parts.
-    travel : (n,) array
-        Slider travel from the start of the roller path, increasing [m].
-    states : TrackStates
-        Where the rollers are at those travels.
-    up, down : Forces
-        On the way up and on the way down, both ordered by increasing travel.
-    origin : float
-        What is added to the travel to give the displacement [m].
-    band : ForceBand or None
-        Forces of cams that are cut with errors.
-    """
-
-    assembly: Assembly
-    travel: FloatArray
-    states: TrackStates
+    assembly: Assembly  # the parts
+    travel: FloatArray  # (n,): slider travel from the start of the roller path, increasing [m]
+    states: TrackStates  # where the rollers are at those travels
+    # up, down: on the way up and on the way down, both ordered by increasing travel
     up: Forces
     down: Forces
-    origin: float
-    band: ForceBand | None = None
+    origin: float  # what is added to the travel to give the displacement [m]
+    band: ForceBand | None = None  # forces of cams that are cut with errors
 
     @cached_property
     def pressure_angle(self) -> FloatArray:
@@ -202,35 +162,17 @@ class Sides:
 
 @dataclass(frozen=True, repr=False)
 class Built(ShortRepr):
-    """A solved mechanism with a measured cam.
+    """A solved mechanism with a measured cam."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        The design and the loads.
-    registration : Registration
-        Of the right and the left flank.
-    across : tuple of (n,) array
-        Errors in x at the same y, positive outside [m].
-    travel : (n,) array
-        From the start of the design's roller path [m].
-    sides : Sides
-        Where the rollers are.
-    shares : mapping
-        Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
-    origin : float
-        What is added to the travel to give the displacement [m].
-    holes : tuple of (float, float)
-        Travels between which a contact is where nothing was measured, of either flank [m].
-    """
-
-    assembly: Assembly
-    registration: Registration
-    across: tuple[FloatArray, FloatArray]
-    travel: FloatArray
-    sides: Sides
+    assembly: Assembly  # the design and the loads
+    registration: Registration  # of the right and the left flank
+    across: tuple[FloatArray, FloatArray]  # errors in x at the same y, positive outside [m]
+    travel: FloatArray  # (n,): from the start of the design's roller path [m]
+    sides: Sides  # where the rollers are
+    # parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,)
     shares: dict[str, FloatArray]
-    origin: float
+    origin: float  # what is added to the travel to give the displacement [m]
+    # travels between which a contact is where nothing was measured, of either flank [m]
     holes: tuple[tuple[float, float], ...] = ()
 
     @property

@@ -52,57 +52,30 @@ JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - n
 
 @dataclass(frozen=True)
 class Losses:
-    """Friction beside that of rolling; couples are per newton of load, so lengths.
+    """Friction beside that of rolling; couples are per newton of load, so lengths."""
 
-    Attributes
-    ----------
-    rolling : float
-        Rolling friction mu, resistance over roller radius.
-    roller_radius : float
-        [m].
-    bearing, pin : float
-        Friction couple per load of a roller's bearing, and of a pin (slider pin, spring hook): mu d/2 [m].
-    guide : GuideFriction
-        Of the slider.
-    """
-
-    rolling: float = 0.0
-    roller_radius: float = 1.0
+    rolling: float = 0.0  # rolling friction mu, resistance over roller radius
+    roller_radius: float = 1.0  # [m]
+    # bearing, pin: friction couple per load of a roller's bearing, and of a pin (slider pin, spring hook): mu d/2 [m]
     bearing: float = 0.0
     pin: float = 0.0
-    guide: GuideFriction = FREE
+    guide: GuideFriction = FREE  # of the slider
 
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on the rollers and the slider.
+    """What acts on the rollers and the slider."""
 
-    Attributes
-    ----------
-    stiffness : float
-        K, the sum of all parallel springs [N/m].
-    rest_half_width : float
-        Half the distance of the roller axes at which the springs are at rest [m].
-    brace_length : float
-        [m].
-    roller_weight, slider_weight : float
-        Weight that hangs on one roller, and on the slider, against the slider's way out [N].
-    sideways : (float, float)
-        Weight on one roller and on the slider across that way in the plane of the cam, to the right [N].
-    off_plane : float
-        Weight of slider, braces and rollers out of that plane, which the guide carries [N].
-    losses : Losses or None
-        Friction of bearings, pins and guide; None: the rollers roll, nothing else rubs.
-    """
-
-    stiffness: float
-    rest_half_width: float
-    brace_length: float
+    stiffness: float  # K, the sum of all parallel springs [N/m]
+    rest_half_width: float  # half the distance of the roller axes at which the springs are at rest [m]
+    brace_length: float  # [m]
+    # roller_weight, slider_weight: weight that hangs on one roller, and on the slider, against the slider's way out [N]
     roller_weight: float = 0.0
     slider_weight: float = 0.0
+    # weight on one roller and on the slider across that way in the plane of the cam, to the right [N]
     sideways: tuple[float, float] = (0.0, 0.0)
-    off_plane: float = 0.0
-    losses: Losses | None = None
+    off_plane: float = 0.0  # weight of slider, braces and rollers out of that plane, which the guide carries [N]
+    losses: Losses | None = None  # friction of bearings, pins and guide; None: the rollers roll, nothing else rubs
 
     @property
     def plain(self) -> bool:

@@ -26,7 +26,7 @@ PLATES = 3
 
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism, along the slider's path and across it; None where nothing was solved.
+    """Return the box of a solved mechanism, along the slider's path and across it; None if nothing was solved.
 
     A part that was solved as a solid moves as its beams do, to a fraction of a thickness.
     """

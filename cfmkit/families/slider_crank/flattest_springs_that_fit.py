@@ -39,31 +39,16 @@ RESERVE = 0.999
 
 @dataclass(frozen=True)
 class SprungMotion:
-    """A linkage that is to hold a torque, or a force, with springs.
+    """A linkage that is to hold a torque, or a force, with springs."""
 
-    Attributes
-    ----------
-    assembly : Assembly
-        Its motion is the crank's angle [rad] or the slider's travel [m]; its rates do not matter.
-    low, high : float
-        Motions between which the effort may be held.
-    length : float
-        Of the motion, over which it is held.
-    widest : float
-        Largest outer diameter of a torsion spring [m].
-    deep : float
-        Room for springs out of the plane, on both sides of the links together [m].
-    shared : bool
-        Whether the pivot's spring and the others have to share that room.
-    """
-
-    assembly: Assembly
+    assembly: Assembly  # its motion is the crank's angle [rad] or the slider's travel [m]; its rates do not matter
+    # low, high: motions between which the effort may be held
     low: float
     high: float
-    length: float
-    widest: float
-    deep: float
-    shared: bool = False
+    length: float  # of the motion, over which it is held
+    widest: float  # largest outer diameter of a torsion spring [m]
+    deep: float  # room for springs out of the plane, on both sides of the links together [m]
+    shared: bool = False  # whether the pivot's spring and the others have to share that room
 
     @property
     def goes_so_far(self) -> bool:
@@ -109,22 +94,13 @@ class SprungMotion:
 
 @dataclass(frozen=True)
 class HeldEffort:
-    """Springs that hold a torque or a force over a window.
+    """Springs that hold a torque or a force over a window."""
 
-    Attributes
-    ----------
-    begin : float
-        Motion at which the window begins.
-    rates, upper : (4,) array
-        Rates at the joints, and the largest that fit [N m/rad, the last N/m].
-    deviation : float
-        Largest one from the effort, as a share.
-    """
-
-    begin: float
+    begin: float  # motion at which the window begins
+    # rates, upper, (4,): rates at the joints, and the largest that fit [N m/rad, the last N/m]
     rates: FloatArray
     upper: FloatArray
-    deviation: float
+    deviation: float  # largest one from the effort, as a share
 
 
 def largest_effort(motion: SprungMotion) -> float:
@@ -147,7 +123,7 @@ def largest_effort(motion: SprungMotion) -> float:
 def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEffort | None:
     """Return the springs and the window with the smallest largest deviation from a torque or force [N m or N].
 
-    Springs without which the deviation is no larger than `flat` are left out. None where the motion is shorter than the
+    Springs without which the deviation is no larger than `flat` are left out. None if the motion is shorter than the
     window, or no spring can be wound.
     """
     if not motion.goes_so_far:
@@ -163,7 +139,7 @@ def flattest_springs(motion: SprungMotion, effort: float, flat: float) -> HeldEf
 
 
 def _best_of(motion: SprungMotion, effort: float, begins: FloatArray) -> HeldEffort | None:
-    """Return the best springs of the best of some windows, by where they begin; None where there are none."""
+    """Return the best springs of the best of some windows, by where they begin; None if there are none."""
     ends = begins + motion.length
     places = np.unique([*np.linspace(motion.assembly.start, ends[-1], PLACES), *ends])
     largest = RESERVE * motion.largest_rates(places)[:, :, np.searchsorted(places, ends)]
@@ -192,7 +168,7 @@ def _window(motion: SprungMotion, begin: float) -> FloatArray:
 
 
 def _fitted(motion: SprungMotion, effort: float, begin: float, upper: FloatArray) -> HeldEffort | None:
-    """Return the best springs below the largest rates for a window; None where there are none."""
+    """Return the best springs below the largest rates for a window; None if there are none."""
     units = motion.assembly.forces(_window(motion, begin))
     if not np.isfinite(units).all() or not upper.any():
         return None

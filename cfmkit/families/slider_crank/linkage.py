@@ -25,22 +25,13 @@ STRETCHED = 1e-12
 
 @dataclass(frozen=True)
 class Linkage:
-    """The four lengths and the way it is put together.
+    """The four lengths and the way it is put together."""
 
-    Attributes
-    ----------
-    crank, coupler : float
-        r1 and r2 [m].
-    offset : float
-        e, height of the slider's path above the pivot; either sign [m].
-    branch : int
-        1: the slider is to the right of the crank pin, x = r1 cos t + a; -1: to its left.
-    """
-
+    # crank, coupler: r1 and r2 [m]
     crank: float
     coupler: float
-    offset: float
-    branch: int = 1
+    offset: float  # e, height of the slider's path above the pivot; either sign [m]
+    branch: int = 1  # 1: the slider is to the right of the crank pin, x = r1 cos t + a; -1: to its left
 
     @property
     def assemblable(self) -> bool:

@@ -167,7 +167,7 @@ def _parts(
 
 
 def _can_be_cut(wish: Wish, thickest: float) -> bool:
-    """Tell whether strips up to a thickness, and as wide as there is room for, can be as thin as they are made."""
+    """Return True if strips up to a thickness, and as wide as there is room for, can be as thin as they are made."""
     return wish.thinnest <= min(thickest, wish.depth or math.inf)
 
 

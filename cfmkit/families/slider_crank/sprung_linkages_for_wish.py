@@ -42,22 +42,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Proportions:
-    """A linkage over its crank's length, and what of its room is known.
+    """A linkage over its crank's length, and what of its room is known."""
 
-    Attributes
-    ----------
-    stretched, offset : float
-        Position of the stretched slider, and height of its way, over the crank's length.
-    unloaded : float
-        Crank angle with all springs relaxed [rad].
-    reach : float
-        Largest travel that is of use, over the crank's length.
-    """
-
+    # stretched, offset: position of the stretched slider, and height of its way, over the crank's length
     stretched: float
     offset: float
-    unloaded: float
-    reach: float
+    unloaded: float  # crank angle with all springs relaxed [rad]
+    reach: float  # largest travel that is of use, over the crank's length
 
 
 TURNED = (

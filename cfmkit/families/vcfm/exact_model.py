@@ -117,21 +117,16 @@ class ExactSampler:
         How far the shuttle goes [m].
     back : float
         How far it is pulled back at most, positive [m].
-
-    Attributes
-    ----------
-    pushed, pulled : path
-        Of a leaf: of beams, or of a solid (`plane_fem_analysis.SolidPath`), which answers the same questions.
-    sides : list of such paths
-        Of the spring, pushed and pulled.
     """
 
+    # pushed, pulled: of a leaf: of beams, or of a solid (`plane_fem_analysis.SolidPath`), which answers the same
+    # questions
     pushed: Any
     pulled: Any
-    sides: list[Any]
+    sides: list[Any]  # of the spring, pushed and pulled
     accuracy = RESOLVED
     coils: Coils | None
-    """The law of bought springs, which have no path; None where the spring is a structure of leaves."""
+    """The law of bought springs, which have no path; None if the spring is a structure of leaves."""
 
     def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
         """Trace leaf and spring."""

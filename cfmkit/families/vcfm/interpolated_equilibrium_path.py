@@ -89,24 +89,12 @@ class PathPoints:
 
 @dataclass(frozen=True)
 class Traced:
-    """A path as a function of the travel, from zero on.
+    """A path as a function of the travel, from zero on."""
 
-    Attributes
-    ----------
-    points : PathPoints
-        Travels all of one sign.
-    panels : ChebyshevPanels
-        Force [N] over the size of the travel [m].
-    edges : tuple of float
-        Zero, the bifurcations and the end [m].
-    problem : str
-        Why the path ends early; empty if it does not.
-    """
-
-    points: PathPoints
-    panels: ChebyshevPanels | None
-    edges: tuple[float, ...]
-    problem: str = ""
+    points: PathPoints  # travels all of one sign
+    panels: ChebyshevPanels | None  # force [N] over the size of the travel [m]
+    edges: tuple[float, ...]  # zero, the bifurcations and the end [m]
+    problem: str = ""  # why the path ends early; empty if it does not
 
     @property
     def sense(self) -> float:
@@ -343,7 +331,7 @@ def _resolved(route: Route, first: First, number: int) -> tuple[ChebyshevPanels,
 
 
 def _alike(first: First, points: PathPoints) -> bool:
-    """Tell whether points are on the branch that a first path took in each piece, where it has points there."""
+    """Return True if points are on the branch that a first path took in each piece, where it has points there."""
     one, two = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
     both = np.isin(np.arange(len(first.edges) - 1), one.piece(first.points.places))
     return bool(((one.stable == two.stable) & (one.buckled == two.buckled))[both].all())

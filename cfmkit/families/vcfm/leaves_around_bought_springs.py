@@ -62,30 +62,14 @@ NOTED = 0.01
 
 @dataclass(frozen=True)
 class LeavesAroundSprings:
-    """Leaves around bought springs.
+    """Leaves around bought springs."""
 
-    Attributes
-    ----------
-    springs : BoughtSprings
-        As a specification has them.
-    target : VcfmDesign
-        With the rise and the preload that follow from their rate, and the force that is left to it.
-    leaf : LeafStrip
-        One leaf.
-    linear : (float, float)
-        Where the leaves' stiffness is constant [m].
-    half_beams : int
-        Number of leaves.
-    listed : bool
-        Whether the springs are from a catalogue, and not those of the mechanism.
-    """
-
-    springs: BoughtSprings
-    target: VcfmDesign
-    leaf: LeafStrip
-    linear: tuple[float, float]
-    half_beams: int
-    listed: bool = False
+    springs: BoughtSprings  # as a specification has them
+    target: VcfmDesign  # with the rise and the preload that follow from their rate, and the force that is left to it
+    leaf: LeafStrip  # one leaf
+    linear: tuple[float, float]  # where the leaves' stiffness is constant [m]
+    half_beams: int  # number of leaves
+    listed: bool = False  # whether the springs are from a catalogue, and not those of the mechanism
 
     @property
     def deflection(self) -> float:
@@ -264,7 +248,7 @@ def _wide_enough(spec: VcfmSpec, own: VcfmDesign, thickness: float, length: floa
 
 
 def _missed(spec: VcfmSpec, target: VcfmDesign, found: LeavesAroundSprings, offer: Offer | None) -> Miss | None:
-    """Return what springs miss with the leaves around them; None where they fit."""
+    """Return what springs miss with the leaves around them; None if they fit."""
     springs, leaf = found.springs, found.leaf
     most, held = found.deflection, found.held_springs
     limits = (

@@ -278,7 +278,7 @@ def _polished(sampler: PartSampler, preload: FloatArray, place: FloatArray, step
 
 
 def rest_of(sampler: PartSampler, preload: float, grid: FloatArray) -> float | None:
-    """Return `rests_of` for one preload [m]; None where the shuttle does not rest."""
+    """Return `rests_of` for one preload [m]; None if the shuttle does not rest."""
     rest = float(rests_of(sampler, [preload], grid)[0])
     return None if np.isnan(rest) else rest
 

@@ -263,24 +263,14 @@ def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
 
 @dataclass(frozen=True)
 class SolvedPiece:
-    """As much of a part as symmetry leaves: a closed contour with its fillets, and what of it is rigid.
-
-    Attributes
-    ----------
-    contour : Contour
-    moved, held : (n, 2) array
-        Polygon, or line of two points, that moves down, and the one that stands [m].
-    of_leaf : bool
-        Whether it is of the leaves, not of the spring.
-    glides : bool
-        Whether what is held moves across as it likes: the middle of a corner.
-    """
+    """As much of a part as symmetry leaves: a closed contour with its fillets, and what of it is rigid."""
 
     contour: Contour
+    # moved, held, (n, 2): polygon, or line of two points, that moves down, and the one that stands [m]
     moved: FloatArray
     held: tuple[FloatArray, ...]
-    of_leaf: bool
-    glides: bool = False
+    of_leaf: bool  # whether it is of the leaves, not of the spring
+    glides: bool = False  # whether what is held moves across as it likes: the middle of a corner
 
 
 def solved_leaf(spec: VcfmSpec) -> SolvedPiece:

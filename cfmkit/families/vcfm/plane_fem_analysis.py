@@ -51,10 +51,6 @@ class SolidPath:
     """A part that is followed from rest in one direction.
 
     It answers as a path of beams does (`interpolated_equilibrium_path.Traced`).
-
-    Attributes
-    ----------
-    solved : MeshSolution
     """
 
     solved: MeshSolution

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def fit_in_window(
     sampler: ExactSampler, at: float, force: float, travel: float
 ) -> tuple[float, float, float, float] | None:
-    """Return what is left of the force around a place, the place and both factors; None where one is not above zero."""
+    """Return what is left of the force around a place, the place and both factors; None if one is not above zero."""
     places: FloatArray = np.linspace(at - 0.5 * travel, at + 0.5 * travel, 61)
     columns = np.column_stack([sampler.leaves(places).force, sampler.spring(places)[0]])
     if not np.isfinite(columns).all():

@@ -232,7 +232,7 @@ def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, floa
 
 
 def _coiled(wish: Wish, block: MaterialBlock, spec: VcfmSpec, sizes: DesignSizes) -> Candidate | None:
-    """Return two Vs with helical springs in place of the diamond; None where none of the series fits beside them."""
+    """Return two Vs with helical springs in place of the diamond; None if none of the series fits beside them."""
     frame, parts, leaf = spec.mechanism.frame, spec.mechanism, sizes.leaf
     if parts.bistable.half_beams != 4 or parts.flexures.thickness > parts.bistable.thickness:
         return None  # other numbers of Vs, and the same leaves with a thicker diamond

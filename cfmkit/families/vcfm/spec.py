@@ -123,7 +123,7 @@ class Mechanism(CutLeaves, Model):
 
     @property
     def allowable_stress(self) -> float | None:
-        """Yield strength over safety factor [Pa]; None where no strength is known."""
+        """Yield strength over safety factor [Pa]; None if no strength is known."""
         return self.material.allowable(self.safety_factor)
 
 

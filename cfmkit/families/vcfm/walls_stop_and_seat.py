@@ -20,35 +20,21 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class FrameSizes:
-    """Where walls, stop and ground are [m]; the as-made apex of the lowest leaves is the origin.
+    """Where walls, stop and ground are [m]; the as-made apex of the lowest leaves is the origin."""
 
-    Attributes
-    ----------
-    wall, out : float
-        Faces of the right wall at the leaves and outside.
-    wall_top, wall_bottom : float
-        Heights at which the walls end; without a ground for the latter.
-    shuttle, ground : float
-        Thicknesses of the bar across the shuttle's top, and of the ground.
-    under : float
-        Lower face of that bar.
-    stopped : bool
-        Whether there is one.
-    floor : float, optional
-        Upper face of the ground; None without one.
-    ledge : tuple of points
-        Corners of raised seats on the right half of the ground, from the wall on, and its middle.
-    """
-
+    # wall, out: faces of the right wall at the leaves and outside
     wall: float
     out: float
+    # wall_top, wall_bottom: heights at which the walls end; without a ground for the latter
     wall_top: float
     wall_bottom: float
+    # shuttle, ground: thicknesses of the bar across the shuttle's top, and of the ground
     shuttle: float
     ground: float
-    under: float
-    stopped: bool
-    floor: float | None
+    under: float  # lower face of that bar
+    stopped: bool  # whether there is one
+    floor: float | None  # upper face of the ground; None without one
+    # corners of raised seats on the right half of the ground, from the wall on, and its middle
     ledge: tuple[Point, ...] = ()
 
 

@@ -42,7 +42,7 @@ def hermite(a: PathEquilibrium, b: PathEquilibrium, drive: float) -> FloatArray:
 def predict(walk: Walk, goal: float) -> FloatArray:
     """Return the predicted unknowns at a drive: by the last two equilibria, or by the last one's slope.
 
-    A problem may have a method `predict(here, goal)` that knows better, and returns None where it does not.
+    A problem may have a method `predict(here, goal)` that knows better, and returns None if it does not.
     """
     here, before = walk.here, walk.before
     own = getattr(walk.problem, "predict", None)

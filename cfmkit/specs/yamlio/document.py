@@ -34,24 +34,12 @@ MOST_PROBLEMS = 100
 
 @dataclass(frozen=True)
 class Document:
-    """What a file and the options after it say, before any type is known.
+    """What a file and the options after it say, before any type is known."""
 
-    Attributes
-    ----------
-    tree : Any
-        Nested dicts, tuples, text, numbers, bools and None.
-    source : str
-        The file's name for messages.
-    folder : pathlib.Path or None
-        What file names in the specification are relative to.
-    problems : tuple of cfmkit.errors.Problem
-        Every fault found while reading.
-    """
-
-    tree: Any
-    source: str
-    folder: FilePath | None = None
-    problems: tuple[Problem, ...] = ()
+    tree: Any  # nested dicts, tuples, text, numbers, bools and None
+    source: str  # the file's name for messages
+    folder: FilePath | None = None  # what file names in the specification are relative to
+    problems: tuple[Problem, ...] = ()  # every fault found while reading
     _reading: Reading = field(default_factory=Reading, repr=False, compare=False)
     _spoilt: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     _options: tuple[tuple[Path, str], ...] = field(default=(), repr=False, compare=False)

@@ -216,19 +216,19 @@ class _Builder:
 
 
 def _goes_on(value: Event, key: Event) -> bool:
-    """Tell whether what stands where a key should be is the rest of the number before it."""
+    """Return True if what stands where a key should be is the rest of the number before it."""
     if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
         return False
     return bool(_WHOLE.fullmatch(value.value) and _DIGITS.match(key.value))
 
 
 def _split_at_comma(value: Event, item: Event) -> bool:
-    """Tell whether two items of a list are the halves of one quantity: 2 and 5 mm, with no space after the comma."""
+    """Return True if two items of a list are the halves of one quantity: 2 and 5 mm, with no space after the comma."""
     return _goes_on(value, item) and _adjacent(value, item) and bool(_WITH_UNIT.fullmatch(getattr(item, "value", "")))
 
 
 def _adjacent(value: Event, item: Event) -> bool:
-    """Tell whether nothing but a comma is between two items."""
+    """Return True if nothing but a comma is between two items."""
     end: Any = value.end_mark
     start: Any = item.start_mark
     return bool((end.line, end.column + 1) == (start.line, start.column))

@@ -75,7 +75,7 @@ class Offer:
         return unguided_deflection(self.kind, self.free_length, self.wound, self.outer_diameter, self.seats)
 
     def stress(self, deflection: float) -> float | None:
-        """Return the stress in the wire at a deflection [Pa]; None where the wire is not known."""
+        """Return the stress in the wire at a deflection [Pa]; None if the wire is not known."""
         return None if self.wound is None else self.wound.stress(self.initial_tension + self.rate * deflection)
 
 

@@ -289,7 +289,7 @@ class CatalogueSpring(WireLimits, SpringSupport):
 
     @property
     def wound(self) -> Wound | None:
-        """Its wire, coil and turns; None where they are not stated."""
+        """Its wire, coil and turns; None if they are not stated."""
         if self.wire is None or self.coil is None or self.turns is None:
             return None
         return self.wound_of(self.kind, self.wire, self.coil, self.turns)
@@ -351,7 +351,7 @@ def _named(value: Any, handler: Any, info: ValidationInfo) -> Any:
 
 
 def wire_of(offer: Offer) -> SpringWire | None:
-    """Return the wire of a spring on offer as a specification has it; None where it is not known."""
+    """Return the wire of a spring on offer as a specification has it; None if it is not known."""
     wound = offer.wound
     if wound is None:
         return None

@@ -45,26 +45,15 @@ WIRE_DEFINITIONS = {
 
 @dataclass(frozen=True)
 class SpringInUse:
-    """A spring between two loads.
+    """A spring between two loads."""
 
-    Attributes
-    ----------
-    wound : Wound or None
-        Its wire, coil and turns; None where they are not known.
-    least, largest : float
-        Load of one spring, over the travel [N or N m], in the sense of the larger one: the least is negative where the
-        load reverses.
-    fatigue : FatigueLaw or None
-        Of the wire.
-    stated_life : float or None
-        Cycles that its maker states.
-    """
-
-    wound: Wound | None
+    wound: Wound | None  # its wire, coil and turns; None if they are not known
+    # least, largest: load of one spring, over the travel [N or N m], in the sense of the larger one: the least is
+    # negative where the load reverses
     least: float
     largest: float
-    fatigue: FatigueLaw | None = None
-    stated_life: float | None = None
+    fatigue: FatigueLaw | None = None  # of the wire
+    stated_life: float | None = None  # cycles that its maker states
 
     @classmethod
     def of(cls, offer: Offer, least: float, largest: float) -> SpringInUse:
@@ -73,7 +62,7 @@ class SpringInUse:
         return cls(offer.wound, low, high, offer.fatigue, offer.life)
 
     def misses_life(self, wanted: float) -> tuple[float, str] | None:
-        """Return by what share of it the spring misses a life in cycles, and why; None where it lasts."""
+        """Return by what share of it the spring misses a life in cycles, and why; None if it lasts."""
         try:
             life = self.life()
         except Undefined as error:
@@ -97,7 +86,7 @@ class SpringInUse:
         return self.wound.loop_stress(self.largest)
 
     def life(self) -> float | None:
-        """Return the cycles that it lasts; None where nothing is known of it.
+        """Return the cycles that it lasts; None if nothing is known of it.
 
         Raises
         ------

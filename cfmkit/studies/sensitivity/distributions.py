@@ -27,25 +27,14 @@ class Incompatible(ValueError):
 
 @dataclass(frozen=True)
 class ParameterSpread:
-    """The distribution of one parameter.
+    """The distribution of one parameter."""
 
-    Attributes
-    ----------
-    kind : {"uniform", "normal"}
-        Its shape.
-    nominal : float
-        Where a perfect part would be.
-    low, high : float
-        Ends of a uniform distribution; truncation of a normal one, infinite for none.
-    deviation : float
-        Standard deviation of the normal distribution before truncation.
-    """
-
-    kind: Literal["uniform", "normal"]
-    nominal: float
+    kind: Literal["uniform", "normal"]  # its shape
+    nominal: float  # where a perfect part would be
+    # low, high: ends of a uniform distribution; truncation of a normal one, infinite for none
     low: float
     high: float
-    deviation: float = 0.0
+    deviation: float = 0.0  # standard deviation of the normal distribution before truncation
 
     @property
     def standard_deviation(self) -> float:

@@ -31,52 +31,24 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True)
 class Piece:
-    """Points that were evaluated together.
+    """Points that were evaluated together."""
 
-    Attributes
-    ----------
-    records : Records
-        Their rows.
-    blocks : (n,) array of int
-        To which block each belongs, from 1.
-    roles : (n,) array of str
-        What each is for.
-    """
-
-    records: Records
-    blocks: NDArray[np.int64]
-    roles: NDArray[np.str_]
+    records: Records  # their rows
+    blocks: NDArray[np.int64]  # (n,): to which block each belongs, from 1
+    roles: NDArray[np.str_]  # (n,): what each is for
 
 
 @dataclass
 class Evaluator:
-    """Evaluates points of a study.
+    """Evaluates points of a study."""
 
-    Attributes
-    ----------
-    study : Study
-        What is noted.
-    parameters : tuple of Parameter
-        What varies.
-    compute : callable
-        From `Work` to `Records`.
-    by_role : bool
-        Whether all points of a role come before those of the next.
-    pieces : list of Piece
-        All that was evaluated so far.
-    ends : Counter
-        Samples by status.
-    first_failure : str
-        What the first sample without a result says.
-    """
-
-    study: Study
-    parameters: tuple[Parameter, ...]
-    compute: Callable[[Work], Records]
-    by_role: bool = False
-    pieces: list[Piece] = field(default_factory=list)
-    ends: Counter[Status] = field(default_factory=Counter)
-    first_failure: str = ""
+    study: Study  # what is noted
+    parameters: tuple[Parameter, ...]  # what varies
+    compute: Callable[[Work], Records]  # from `Work` to `Records`
+    by_role: bool = False  # whether all points of a role come before those of the next
+    pieces: list[Piece] = field(default_factory=list)  # all that was evaluated so far
+    ends: Counter[Status] = field(default_factory=Counter)  # samples by status
+    first_failure: str = ""  # what the first sample without a result says
 
     def outputs(self, points: FloatArray, roles: Sequence[str] | Sequence[Sequence[str]]) -> FloatArray:
         """Return what comes of blocks of points: the metrics, then 0 or 1 for each requirement.

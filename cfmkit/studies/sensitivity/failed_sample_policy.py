@@ -81,24 +81,12 @@ def envelope(one: Analysis, other: Analysis) -> Analysis:
 
 @dataclass(frozen=True)
 class Blocks:
-    """What was evaluated.
+    """What was evaluated."""
 
-    Attributes
-    ----------
-    points : (b, s, d) array
-        Blocks of points.
-    outputs : (b, s, m) array
-        NaN where there is no value.
-    failed : int
-        Samples that failed, those that were drawn again included.
-    replaced : int
-        Blocks that were drawn again.
-    """
-
-    points: FloatArray
-    outputs: FloatArray
-    failed: int = 0
-    replaced: int = 0
+    points: FloatArray  # (b, s, d): blocks of points
+    outputs: FloatArray  # (b, s, m): NaN where there is no value
+    failed: int = 0  # samples that failed, those that were drawn again included
+    replaced: int = 0  # blocks that were drawn again
 
 
 def evaluated(

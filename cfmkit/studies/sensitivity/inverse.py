@@ -38,18 +38,10 @@ CLOSE = 1e-3
 
 @dataclass(frozen=True)
 class LimitsAlong:
-    """How limits move with the error of one parameter.
+    """How limits move with the error of one parameter."""
 
-    Attributes
-    ----------
-    offsets : (p,) array
-        Errors at which that is known, increasing, 0 among them.
-    changes : (p, m) array
-        Of the limits there.
-    """
-
-    offsets: FloatArray
-    changes: FloatArray
+    offsets: FloatArray  # (p,): errors at which that is known, increasing, 0 among them
+    changes: FloatArray  # (p, m): of the limits there
 
     def __call__(self, errors: FloatArray) -> FloatArray:
         """Return the changes of the limits for errors (k,), linear between the offsets and beyond, (k, m)."""
@@ -73,23 +65,14 @@ def in_proportion(by_error: FloatArray) -> tuple[LimitsAlong, ...]:
 
 @dataclass(frozen=True)
 class ToleranceFactors:
-    """Factors on the stated tolerances; NaN where even none of that error leaves the yield too low.
+    """Factors on the stated tolerances; NaN where even none of that error leaves the yield too low."""
 
-    Attributes
-    ----------
-    alone, together, allocated : (d,) array
-        For each parameter.
-    share : float
-        Yield as stated, as estimated.
-    perfect : float
-        Yield without errors, 0 or 1.
-    """
-
+    # alone, together, allocated, (d,): for each parameter
     alone: FloatArray
     together: FloatArray
     allocated: FloatArray
-    share: float
-    perfect: float
+    share: float  # yield as stated, as estimated
+    perfect: float  # yield without errors, 0 or 1
 
 
 def answered(

@@ -68,21 +68,13 @@ def _values(unit: FloatArray, spreads: Sequence[ParameterSpread]) -> FloatArray:
 
 @dataclass(frozen=True)
 class Yield:
-    """The share of good parts among those made.
+    """The share of good parts among those made."""
 
-    Attributes
-    ----------
-    value : float
-        Between the extremes if failed samples may be either; NaN if it cannot be stated.
-    wilson, clopper_pearson : tuple of (float, float)
-        Its confidence intervals; under ``bound`` they hold every fate of the failed samples.
-    good, failed, count : int
-        Samples that meet everything, that failed, and all.
-    """
-
-    value: float
+    value: float  # between the extremes if failed samples may be either; NaN if it cannot be stated
+    # wilson, clopper_pearson: its confidence intervals; under ``bound`` they hold every fate of the failed samples
     wilson: Interval
     clopper_pearson: Interval
+    # good, failed, count: samples that meet everything, that failed, and all
     good: int
     failed: int
     count: int

@@ -27,24 +27,12 @@ EVERY = "*"
 
 @dataclass(frozen=True)
 class Parameter:
-    """One uncertain value.
+    """One uncertain value."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted.
-    dimension : str
-        Of `cfmkit.specs.units`.
-    spread : ParameterSpread
-        How it is distributed [SI].
-    place : bool
-        Whether it is a place that knows if it is a length or an angle.
-    """
-
-    path: str
-    dimension: str
-    spread: ParameterSpread
-    place: bool = False
+    path: str  # dotted
+    dimension: str  # of `cfmkit.specs.units`
+    spread: ParameterSpread  # how it is distributed [SI]
+    place: bool = False  # whether it is a place that knows if it is a length or an angle
 
 
 def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:

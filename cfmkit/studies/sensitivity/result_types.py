@@ -26,73 +26,35 @@ IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
 
 @dataclass(frozen=True)
 class IndexLine:
-    """One index of one parameter, in border units; None where it cannot be stated.
+    """One index of one parameter, in border units; None if it cannot be stated."""
 
-    Attributes
-    ----------
-    metric : str
-        The label of a column of results.csv; ``yield`` for the share of good parts.
-    parameter : str
-        Its path, or several with commas that are tightened together.
-    index : str
-        ``first_order``, ``mu_star``, ``swing``, ...
-    value, low, high : float or None
-        The index and its interval. A missing `high` beside a `low` is open: "at least".
-    unit : str
-        Of all three.
-    samples : int
-        Blocks that it was found from.
-    """
-
-    metric: str
-    parameter: str
-    index: str
+    metric: str  # the label of a column of results.csv; ``yield`` for the share of good parts
+    parameter: str  # its path, or several with commas that are tightened together
+    index: str  # ``first_order``, ``mu_star``, ``swing``, ..
+    # value, low, high: the index and its interval. A missing `high` beside a `low` is open: "at least"
     value: float | None
     low: float | None
     high: float | None
-    unit: str
-    samples: int
+    unit: str  # of all three
+    samples: int  # blocks that it was found from
 
 
 @dataclass(frozen=True)
 class Findings:
-    """The outcome of a study.
+    """The outcome of a study."""
 
-    Attributes
-    ----------
-    setup : Setup
-        What was to be done.
-    evaluator : Evaluator
-        What was evaluated.
-    lines : tuple of IndexLine
-        The indices.
-    convergence : tuple of IndexLine
-        The same from fewer samples.
-    points, outputs : array
-        Blocks of samples, (b, s, d) and (b, s, m + r).
-    replaced : int
-        Blocks that were drawn again.
-    all_met : Yield or None
-        Of parts that meet all requirements.
-    each_met : tuple of Yield
-        Of parts that meet one.
-    interrupted : bool
-        Whether the user stopped it: there are no indices.
-    fresh : bool
-        Whether it was to reuse nothing: then the same command would begin anew.
-    """
-
-    setup: Setup
-    evaluator: Evaluator
-    lines: tuple[IndexLine, ...] = ()
-    convergence: tuple[IndexLine, ...] = ()
+    setup: Setup  # what was to be done
+    evaluator: Evaluator  # what was evaluated
+    lines: tuple[IndexLine, ...] = ()  # the indices
+    convergence: tuple[IndexLine, ...] = ()  # the same from fewer samples
+    # points, outputs: blocks of samples, (b, s, d) and (b, s, m + r)
     points: FloatArray | None = None
     outputs: FloatArray | None = None
-    replaced: int = 0
-    all_met: Yield | None = None
-    each_met: tuple[Yield, ...] = ()
-    interrupted: bool = False
-    fresh: bool = False
+    replaced: int = 0  # blocks that were drawn again
+    all_met: Yield | None = None  # of parts that meet all requirements
+    each_met: tuple[Yield, ...] = ()  # of parts that meet one
+    interrupted: bool = False  # whether the user stopped it: there are no indices
+    fresh: bool = False  # whether it was to reuse nothing: then the same command would begin anew
 
     @property
     def unstated(self) -> int:

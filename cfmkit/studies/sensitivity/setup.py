@@ -58,37 +58,18 @@ class Nominal:
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that a sensitivity study needs.
+    """Everything that a sensitivity study needs."""
 
-    Attributes
-    ----------
-    block : Sensitivity
-        What was requested.
-    parameters : tuple of Parameter
-        What varies.
-    study : Study
-        What is noted at each sample.
-    nominal : Nominal
-        What comes out without any deviation.
-    samples, seed : int
-        How many, and from where.
-    correlation : (d, d) array
-        Of the normal scores.
-    together : tuple of tuple of int
-        Parameters whose tolerances are tightened together.
-    warnings : tuple of Finding
-        What the user must know.
-    """
-
-    block: Sensitivity
-    parameters: tuple[Parameter, ...]
-    study: Study
-    nominal: Nominal
+    block: Sensitivity  # what was requested
+    parameters: tuple[Parameter, ...]  # what varies
+    study: Study  # what is noted at each sample
+    nominal: Nominal  # what comes out without any deviation
+    # samples, seed: how many, and from where
     samples: int
     seed: int
-    correlation: FloatArray
-    together: tuple[tuple[int, ...], ...]
-    warnings: tuple[Finding, ...] = ()
+    correlation: FloatArray  # (d, d): of the normal scores
+    together: tuple[tuple[int, ...], ...]  # parameters whose tolerances are tightened together
+    warnings: tuple[Finding, ...] = ()  # what the user must know
 
     @property
     def method(self) -> Method:

@@ -78,7 +78,7 @@ def _offered(wish: Wish, name: str, seed: int) -> Sequence[Candidate]:
 
 
 def _first_offer(wish: Wish, asked: tuple[str, int], easing: Easing, clock: Clock) -> float | None:
-    """Return the smallest factor with which a family has candidates; None where it has none."""
+    """Return the smallest factor with which a family has candidates; None if it has none."""
 
     def offers(factor: float) -> bool:
         eased = easing(wish, factor)
@@ -100,7 +100,7 @@ def _first_offer(wish: Wish, asked: tuple[str, int], easing: Easing, clock: Cloc
 
 
 def _met(wish: Wish, name: str, eased_by: tuple[Easing, float], seed: int, clock: Clock) -> str | None:
-    """Return the value of a key with which one of a family's first candidates is good; None where none is."""
+    """Return the value of a key with which one of a family's first candidates is good; None if none is."""
     easing, first = eased_by
     for more in FURTHER:
         eased = easing(wish, first * more)

@@ -75,54 +75,27 @@ class ProposalJob:
 
 @dataclass(frozen=True)
 class Proposal:
-    """What became of a candidate: plain values, which a journal can keep.
+    """What became of a candidate: plain values, which a journal can keep."""
 
-    Attributes
-    ----------
-    family, variant : str
-        Whose it is.
-    text : str
-        The complete specification with the wish as its requirements; empty where nothing came of the candidate.
-    missed : tuple of str
-        One sentence for every hard wish that it misses when it is analysed from its file.
-    message : str
-        Why nothing came of it.
-    numbers : mapping of str to float or None
-        In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
-        ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished), ``stiffening``
-        (by what share wide beams raise the mean that a planar solid has).
-    notes : tuple of str
-        What a reader has to know: what was assumed, what no model here says.
-    movable : bool
-        Whether all that it misses is the yield, and a design with margins might have it.
-    unjudged : tuple of str
-        What is wished and could not be judged, each with the reason.
-    model : str
-        The model that judged it.
-    pending : str
-        The finest model of its family that can run it and did not yet; empty if it did.
-    warnings : tuple of str
-        Names of what its analysis warns of, with the number that counts.
-    seconds : float
-        That its analysis took.
-    own : str
-        The model that its family designs with, where another one judged it: its yield is by that one.
-    """
-
+    # family, variant: whose it is
     family: str
     variant: str
+    # the complete specification with the wish as its requirements; empty where nothing came of the candidate
     text: str = ""
-    missed: tuple[str, ...] = ()
-    message: str = ""
+    missed: tuple[str, ...] = ()  # one sentence for every hard wish that it misses when it is analysed from its file
+    message: str = ""  # why nothing came of it
+    # in SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
+    # ``life`` (cycles), ``yield`` (share of manufactured parts that are good, where one is wished), ``stiffening`` (by
+    # what share wide beams raise the mean that a planar solid has)
     numbers: Mapping[str, float | None] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    movable: bool = False
-    unjudged: tuple[str, ...] = ()
-    model: str = ""
-    pending: str = ""
-    warnings: tuple[str, ...] = ()
-    seconds: float = 0.0
-    own: str = ""
+    notes: tuple[str, ...] = ()  # what a reader has to know: what was assumed, what no model here says
+    movable: bool = False  # whether all that it misses is the yield, and a design with margins might have it
+    unjudged: tuple[str, ...] = ()  # what is wished and could not be judged, each with the reason
+    model: str = ""  # the model that judged it
+    pending: str = ""  # the finest model of its family that can run it and did not yet; empty if it did
+    warnings: tuple[str, ...] = ()  # names of what its analysis warns of, with the number that counts
+    seconds: float = 0.0  # that its analysis took
+    own: str = ""  # the model that its family designs with, where another one judged it: its yield is by that one
 
     @property
     def passes(self) -> bool:
@@ -460,7 +433,7 @@ def _least_factor(found: Mapping[str, Any]) -> float | None:
 
 
 def _life(found: Mapping[str, Any]) -> float | None:
-    """Return the life of what lasts shortest; None where that of the material, or of a bought spring, is not known."""
+    """Return the life of what lasts shortest; None if that of the material, or of a bought spring, is not known."""
     lives = [found[name].value for name in LIVES if name in found]
     known = [life for life in lives if life is not None]
     if len(known) < len(lives) or ("wire_stress_max" in found and "spring_life" not in found):

@@ -63,17 +63,11 @@ RESERVE_OF_FEW = 6.0
 
 @dataclass(frozen=True)
 class _Times:
-    """When what ends, in `time.time` [s]; None: never.
+    """When what ends, in `time.time` [s]; None: never."""
 
-    Attributes
-    ----------
-    asking : float or None
-        Families that have not answered by then, because the beam engine is compiled, are left out.
-    with_proposals, without : float or None
-        The search, with and without anything found; what runs at the second is given up.
-    """
-
+    # families that have not answered by then, because the beam engine is compiled, are left out
     asking: float | None = None
+    # with_proposals, without: the search, with and without anything found; what runs at the second is given up
     with_proposals: float | None = None
     without: float | None = None
 
@@ -103,38 +97,19 @@ class Answered:
 
 @dataclass(frozen=True)
 class Suggestions:
-    """What came of a wish.
-
-    Attributes
-    ----------
-    wish : Wish
-    proposals : tuple of Proposal
-        Those that do all that is wished, judged by the finest model of their family, the best first.
-    near : tuple of Proposal
-        Those that miss one wish, at most two a family.
-    answers : tuple of Answered
-        Of every family that was asked.
-    failed : mapping of str to tuple of str
-        Family -> why nothing came of candidates, each reason once.
-    late : bool
-        Whether the time budget ended the search.
-    reused : int
-        Candidates that were found in the journal.
-    bugs : tuple of str
-        The traceback of each family or candidate that a bug ended.
-    unjudged : tuple of Proposal
-        Those that miss nothing of what was judged, but not all was, the best first.
-    """
+    """What came of a wish."""
 
     wish: Wish
+    # those that do all that is wished, judged by the finest model of their family, the best first
     proposals: tuple[Proposal, ...]
-    near: tuple[Proposal, ...]
-    answers: tuple[Answered, ...]
+    near: tuple[Proposal, ...]  # those that miss one wish, at most two a family
+    answers: tuple[Answered, ...]  # of every family that was asked
+    # family -> why nothing came of candidates, each reason once
     failed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    late: bool = False
-    reused: int = 0
-    bugs: tuple[str, ...] = ()
-    unjudged: tuple[Proposal, ...] = ()
+    late: bool = False  # whether the time budget ended the search
+    reused: int = 0  # candidates that were found in the journal
+    bugs: tuple[str, ...] = ()  # the traceback of each family or candidate that a bug ended
+    unjudged: tuple[Proposal, ...] = ()  # those that miss nothing of what was judged, but not all was, the best first
 
     @property
     def listed(self) -> tuple[Proposal, ...]:

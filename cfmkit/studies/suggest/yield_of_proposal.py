@@ -57,44 +57,24 @@ OUT_OF_TIME = "the time budget ended before its manufactured parts were evaluate
 
 @dataclass(frozen=True)
 class GoodParts:
-    """What is known of a proposal's made parts.
+    """What is known of a proposal's made parts."""
 
-    Attributes
-    ----------
-    share : float or None
-        Of them that are good: of `PARTS`, or to first order where `missed` says so; None where nothing is known.
-    missed : str
-        Why that is not what is wished; empty where it is.
-    late : bool
-        Whether the time ended it before anything was known.
-    movable : bool
-        Whether a design with margins might have what is missing.
-    """
-
+    # of them that are good: of `PARTS`, or to first order where `missed` says so; None if nothing is known
     share: float | None
-    missed: str = ""
-    late: bool = False
-    movable: bool = False
+    missed: str = ""  # why that is not what is wished; empty where it is
+    late: bool = False  # whether the time ended it before anything was known
+    movable: bool = False  # whether a design with margins might have what is missing
 
 
 @dataclass(frozen=True)
 class MovedForYield:
-    """A mechanism whose values were moved for a yield.
+    """A mechanism whose values were moved for a yield."""
 
-    Attributes
-    ----------
-    spec : Spec
-        With the values moved.
-    began, share : float
-        Of good parts to first order, before and after.
-    costliest : str
-        The value whose tolerance costs most.
-    """
-
-    spec: Spec
+    spec: Spec  # with the values moved
+    # began, share: of good parts to first order, before and after
     began: float
     share: float
-    costliest: str
+    costliest: str  # the value whose tolerance costs most
 
 
 def with_made_parts(spec: Spec, wish: Wish, seed: int) -> Spec:
@@ -171,7 +151,7 @@ def _cures(first: FirstOrderShares, found: Assumed, most: float, wanted: float) 
 
 
 def _first_order(result: Result, found: Assumed) -> FirstOrderShares | None:
-    """Return the shares of good parts; None where only drawn parts can say them."""
+    """Return the shares of good parts; None if only drawn parts can say them."""
     try:
         return first_order_shares(result, found, Run())
     except YieldUnknown:
@@ -230,7 +210,7 @@ def moved_for_yield(candidate: Candidate, spec: Spec, wish: Wish, asked: float, 
     Returns
     -------
     MovedForYield or None
-        None where nothing may move, or the proposal cannot be followed at a few poses.
+        None if nothing may move, or the proposal cannot be followed at a few poses.
     """
     block = spec.sensitivity
     free = _free(candidate, spec, wish)

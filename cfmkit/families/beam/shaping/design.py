@@ -270,21 +270,12 @@ AT_BOUND = 1e-4
 
 @dataclass(frozen=True)
 class Blocked:
-    """Why there is no design.
+    """Why there is no design."""
 
-    Attributes
-    ----------
-    missed : mapping
-        Limit -> by how much the best design misses it, and where.
-    nearest : mapping of str to str
-        Path below `design.optimise` or `mechanism` -> value for which the other limits could be met.
-    freed : Found or None
-        A design that meets all limits after all.
-    """
-
-    missed: Mapping[str, str]
+    missed: Mapping[str, str]  # limit -> by how much the best design misses it, and where
+    # path below `design.optimise` or `mechanism` -> value for which the other limits could be met
     nearest: Mapping[str, str]
-    freed: Found | None
+    freed: Found | None  # a design that meets all limits after all
 
 
 def blocked(task: Task, found: Iterable[Found], plan: StartBudget) -> Blocked:

@@ -37,19 +37,12 @@ SIDES = {
 
 @dataclass(frozen=True)
 class PendingRows:
-    """Rows of one limit whose derivatives are computed when they are needed.
+    """Rows of one limit whose derivatives are computed when they are needed."""
 
-    Attributes
-    ----------
-    name, values, about
-        As of `LimitRows`.
-    slopes : callable
-        Returns the derivatives of the rows, (m, k).
-    """
-
+    # name, values, about: as of `LimitRows`
     name: str
     values: FloatArray
-    slopes: Callable[[], FloatArray]
+    slopes: Callable[[], FloatArray]  # returns the derivatives of the rows, (m, k)
     about: Callable[[], list[str]]
 
 

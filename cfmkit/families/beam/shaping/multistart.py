@@ -51,26 +51,13 @@ _LASTS = {
 
 @dataclass(frozen=True)
 class Explored:
-    """What the starts led to.
+    """What the starts led to."""
 
-    Attributes
-    ----------
-    found : mapping
-        Number of the start -> the design, None where nothing could be followed.
-    reused : int
-        Starts that were noted by a run before.
-    missing : int
-        Starts that led to nothing: the time did not suffice, or a process died.
-    lost : tuple of str
-        Why processes died.
-    audits : mapping
-        Number of the start -> the audit of its design, of those that meet all limits.
-    """
-
-    found: dict[int, Found | None]
-    reused: int
-    missing: int
-    lost: tuple[str, ...] = ()
+    found: dict[int, Found | None]  # number of the start -> the design, None if nothing could be followed
+    reused: int  # starts that were noted by a run before
+    missing: int  # starts that led to nothing: the time did not suffice, or a process died
+    lost: tuple[str, ...] = ()  # why processes died
+    # number of the start -> the audit of its design, of those that meet all limits
     audits: Mapping[int, Audit] = field(default_factory=dict)
 
 
@@ -159,13 +146,13 @@ def _refined(task: Task, designs: dict[int, Found], plan: StartBudget, index: in
 
 
 def _found_in(stage: Done) -> dict[int, Found | None]:
-    """Return the designs of a stage by the number of the start; None where nothing could be followed."""
+    """Return the designs of a stage by the number of the start; None if nothing could be followed."""
     records = {index: stage.records[index]["found"] for index in sorted(stage.records)}
     return {index: restored(Found, record) if record else None for index, record in records.items()}
 
 
 def _better(task: Task, one: Found | None, other: Found | None) -> bool:
-    """Tell whether one design of a start takes the place of the other."""
+    """Return True if one design of a start takes the place of the other."""
     if one is None or not one.feasible:
         return False
     return other is None or not other.feasible or rank_of(task, one) < rank_of(task, other)

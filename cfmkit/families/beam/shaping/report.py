@@ -35,29 +35,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Judged:
-    """A design with what the analysis of its specification and the audit say about it.
+    """A design with what the analysis of its specification and the audit say about it."""
 
-    Attributes
-    ----------
-    spec : BeamSpec
-        As it is written; its window is the one that the analysis confirms.
-    found : Found
-        What came out of the search.
-    audit : Audit
-        Whether it exists as drawn.
-    half_band : float or None
-        The metric of this name of the analysis, over the window.
-    faults : tuple of str
-        What analysis and audit hold against it.
-    miss : float or None
-        Largest distance from the target curve over its largest force, where there is one: a metric of the analysis.
-    """
-
-    spec: BeamSpec
-    found: Found
-    audit: Audit
-    half_band: float | None
-    faults: tuple[str, ...]
+    spec: BeamSpec  # as it is written; its window is the one that the analysis confirms
+    found: Found  # what came out of the search
+    audit: Audit  # whether it exists as drawn
+    half_band: float | None  # the metric of this name of the analysis, over the window
+    faults: tuple[str, ...]  # what analysis and audit hold against it
+    # largest distance from the target curve over its largest force, where there is one: a metric of the analysis
     miss: float | None = None
 
     @property

@@ -38,27 +38,13 @@ _MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the 
 
 @dataclass(frozen=True)
 class PosePlan:
-    """Displacements, and which of them are what.
+    """Displacements, and which of them are what."""
 
-    Attributes
-    ----------
-    at : (p,) array
-        From rest, increasing [m].
-    window : (j,) array
-        Indices of those in the window.
-    shown : (3,) array
-        Indices of those at which gaps are looked at: rest, on the way, and the end.
-    mean : (p,) array
-        Weights of the mean over the window.
-    compared : (2,) array
-        Indices of a and b; of the end where the paper's objective is not requested.
-    """
-
-    at: FloatArray
-    window: Any
-    shown: Any
-    mean: FloatArray
-    compared: Any
+    at: FloatArray  # (p,): from rest, increasing [m]
+    window: Any  # (j,): indices of those in the window
+    shown: Any  # (3,): indices of those at which gaps are looked at: rest, on the way, and the end
+    mean: FloatArray  # (p,): weights of the mean over the window
+    compared: Any  # (2,): indices of a and b; of the end where the paper's objective is not requested
 
 
 def poses_of(task: Task, start: float) -> PosePlan:
@@ -96,25 +82,14 @@ class NoAnswer(Exception):
 
 @dataclass(frozen=True)
 class BeamAtPoses:
-    """One beam at p poses, at r places along it.
+    """One beam at p poses, at r places along it."""
 
-    Attributes
-    ----------
-    place : (r,) array
-        Fraction of the arc length.
-    x, y : (p, r) array
-        Centre line [m].
-    stress : (p, r) array
-        Bending stress on the left side [Pa]: signed.
-    axial : (p, r) array or None
-        Axial stress, where it counts [Pa].
-    """
-
-    place: FloatArray
+    place: FloatArray  # (r,): fraction of the arc length
+    # x, y, (p, r): centre line [m]
     x: FloatArray
     y: FloatArray
-    stress: FloatArray
-    axial: FloatArray | None = None
+    stress: FloatArray  # (p, r): bending stress on the left side [Pa]: signed
+    axial: FloatArray | None = None  # (p, r): axial stress, where it counts [Pa]
 
     @property
     def left(self) -> FloatArray:
@@ -139,17 +114,10 @@ class NetworkAtPoses:
 
 @dataclass(frozen=True)
 class RowsOfBeam:
-    """How a beam is sampled by the engine, at r places.
+    """How a beam is sampled by the engine, at r places."""
 
-    Attributes
-    ----------
-    place : (r,) array
-        Fraction of the arc length.
-    row, index : (r,) array
-        Which of the beam's rows, and of all rows, they are.
-    """
-
-    place: FloatArray
+    place: FloatArray  # (r,): fraction of the arc length
+    # row, index, (r,): which of the beam's rows, and of all rows, they are
     row: Any
     index: Any
 
@@ -268,7 +236,7 @@ class Response:
 def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
     """Return the response of a network at poses that begin with rest [m].
 
-    None where it does not reach them all, or has a beam of no length.
+    None if it does not reach them all, or has a beam of no length.
     """
     task, network = variables.task, variables.build(x)
     if has_vanished_beam(network):
@@ -358,7 +326,7 @@ class CloseView:
 
 
 def looked_at(task: Task, network: Network) -> CloseView | None:
-    """Return a network at many poses; None where it does not reach the end, or loses stability on the way."""
+    """Return a network at many poses; None if it does not reach the end, or loses stability on the way."""
     at = np.linspace(0.0, task.window[1], MANY_POSES)
     try:
         path = trace(network, Displacement(task.driven, task.direction, at), _CLOSE_CONTROL)

@@ -63,27 +63,21 @@ _STEEP = 20.0  # what a half band beyond that counts against the violation of th
 
 @dataclass(frozen=True)
 class StartBudget:
-    """How much is tried at one start.
+    """How much is tried at one start."""
 
-    Attributes
-    ----------
-    drawn, tries : int
-        Random networks that are looked at, and how many of the best are made to meet the limits until one does.
-    meeting, flattening, widening : int
-        Steps of one round towards the limits, of one flattening, and of the widening of the window.
-    clock : Clock
-        Whether the time is up.
-    """
-
+    # drawn, tries: random networks that are looked at, and how many of the best are made to meet the limits until one
+    # does
     drawn: int = 80
     tries: int = 4
+    # meeting, flattening, widening: steps of one round towards the limits, of one flattening, and of the widening of
+    # the window
     meeting: int = 12
     flattening: int = 40
     widening: int = 50
-    clock: Clock = field(default_factory=Clock)
+    clock: Clock = field(default_factory=Clock)  # whether the time is up
 
     def late(self) -> bool:
-        """Tell whether the time is up."""
+        """Return True if the time is up."""
         return self.clock.late()
 
     def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION) -> Effort:
@@ -93,34 +87,17 @@ class StartBudget:
 
 @dataclass(frozen=True)
 class Found:
-    """A design on the way.
+    """A design on the way."""
 
-    Attributes
-    ----------
-    x, order : (k,) array and int
-        The design variables and the order of their shapes.
-    start : float
-        Where the window begins [m].
-    objective : float
-        Half band over the window, or the objective of the paper [1].
-    violation : float
-        By how much the worst limit is missed, in its own scale [1].
-    ending : str
-        Why the last minimisation ended.
-    evaluations : int
-        Traces of the network so far.
-    points : int
-        Poses in the window that it was searched with last.
-    """
-
+    # x, order, (k,): the design variables and the order of their shapes
     x: FloatArray
     order: int
-    start: float
-    objective: float
-    violation: float
-    ending: str
-    evaluations: int
-    points: int = 17
+    start: float  # where the window begins [m]
+    objective: float  # half band over the window, or the objective of the paper [1]
+    violation: float  # by how much the worst limit is missed, in its own scale [1]
+    ending: str  # why the last minimisation ended
+    evaluations: int  # traces of the network so far
+    points: int = 17  # poses in the window that it was searched with last
 
     @property
     def feasible(self) -> bool:
@@ -129,7 +106,7 @@ class Found:
 
 
 def searched(task: Task, seed: int, index: int, plan: StartBudget) -> Found | None:
-    """Return what a start leads to; None where no random network could be followed over the window.
+    """Return what a start leads to; None if no random network could be followed over the window.
 
     Parameters
     ----------
@@ -159,7 +136,7 @@ def searched_far(task: Task, seed: int, index: int, plan: StartBudget) -> Found 
     """Return the random network of a start flattened in the finest order at once, over a window that begins farther.
 
     It begins halfway between rest and the requested window. What is flat over that seldom is the flattest over the
-    requested one: order by order a start ends in another family of shapes. None where nothing could be followed.
+    requested one: order by order a start ends in another family of shapes. None if nothing could be followed.
 
     Parameters
     ----------
@@ -257,7 +234,7 @@ def confirmed(task: Task, found: Found, plan: StartBudget, again: Callable[[Task
 
 
 def _shows_all(task: Task, found: Found, view: CloseView | None) -> bool:
-    """Tell whether a design is at many poses what it was found to be at those of the search."""
+    """Return True if a design is at many poses what it was found to be at those of the search."""
     if view is None or _overstress(task, view) > 0:
         return False
     if task.objective == "paper":

@@ -44,22 +44,13 @@ class NetworkScatter:
 
 @dataclass(frozen=True)
 class Audit:
-    """Whether a mechanism exists as drawn.
+    """Whether a mechanism exists as drawn."""
 
-    Attributes
-    ----------
-    complete, stable : bool
-        Whether the whole way is reached, and stable at all poses.
-    crossings : int
-        Poses, of 61 from rest to the end, at which beams cross.
-    gap : float or None
-        Least distance of surfaces away from joints at any pose [m].
-    """
-
+    # complete, stable: whether the whole way is reached, and stable at all poses
     complete: bool
     stable: bool
-    crossings: int
-    gap: float | None
+    crossings: int  # poses, of 61 from rest to the end, at which beams cross
+    gap: float | None  # least distance of surfaces away from joints at any pose [m]
 
     @property
     def sound(self) -> bool:
@@ -69,19 +60,12 @@ class Audit:
 
 @dataclass(frozen=True)
 class Drawn:
-    """Networks drawn within the tolerances.
+    """Networks drawn within the tolerances."""
 
-    Attributes
-    ----------
-    bands, ranges : (n,) array
-        Half bands and strict shares of those that could be followed.
-    lost : int
-        Those that could not.
-    """
-
+    # bands, ranges, (n,): half bands and strict shares of those that could be followed
     bands: FloatArray
     ranges: FloatArray
-    lost: int
+    lost: int  # those that could not
 
 
 def audited(variables: Variables, found: Found) -> Audit:
@@ -134,7 +118,7 @@ def tolerated(variables: Variables, found: Found, spread: NetworkScatter) -> Dra
 
 
 def crossing(task: Task, path: Path, pose: int) -> bool:
-    """Tell whether centre lines of different beams cross at a pose, or one crosses itself."""
+    """Return True if centre lines of different beams cross at a pose, or one crosses itself."""
     lines = {name: path.shape(name, pose) for name in task.network.beams}
     shared = {pair.beams: pair.joints for pair in pairs(task.network)}
     return any(
@@ -143,7 +127,7 @@ def crossing(task: Task, path: Path, pose: int) -> bool:
 
 
 def lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
-    """Tell whether two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
+    """Return True if two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
     p, q = one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1]
     a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
     first = _side(a, b, c) * _side(a, b, d)

@@ -30,26 +30,17 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class Shaping(DesignProgram):
-    """The design variables, then the goal's own ones: what `cfmkit.numerics.sqp.minimize` wants to know of them.
+    """The design variables, then the goal's own ones: what `cfmkit.numerics.sqp.minimize` wants to know of them."""
 
-    Attributes
-    ----------
-    variables, start, goal : Variables, float, Goal
-        What varies, where the window begins [m], what is minimised.
-    elastic : tuple of str
-        Limits that may give way; the last variable is by how much, and is minimised in place of the goal.
-    cap : float, optional
-        Largest value of the goal's last own variable.
-    near : float
-        Derivatives of rows of stress, envelopes and clearance that hold by more than this are left out: no step that
-        can be trusted makes them miss. The rows themselves are all there.
-    """
-
+    # variables, start, goal: what varies, where the window begins [m], what is minimised
     variables: Variables
     start: float
     goal: Goal
+    # limits that may give way; the last variable is by how much, and is minimised in place of the goal
     elastic: tuple[str, ...] = ()
-    cap: float | None = None
+    cap: float | None = None  # largest value of the goal's last own variable
+    # derivatives of rows of stress, envelopes and clearance that hold by more than this are left out: no step that can
+    # be trusted makes them miss. The rows themselves are all there
     near: float = np.inf
     _last: View | None = field(default=None, repr=False)
 

@@ -41,38 +41,19 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """What must hold; None: not asked.
+    """What must hold; None: not asked."""
 
-    Attributes
-    ----------
-    stress : float
-        Largest stress at every pose [Pa]: by the margin `MARGIN` below the allowable one.
-    envelope : (xmin, xmax, ymin, ymax)
-        Where the centre lines must lie before loading [m].
-    deformed_envelope : (xmin, xmax, ymin, ymax)
-        The same at every pose.
-    length_ratio : float
-        Largest length over distance of the ends [1].
-    slenderness : float
-        Least length over thickness [1].
-    clearance : float
-        Least gap between the surfaces of beams, before and under load [m].
-    opening : float
-        Near a joint the gap between centre lines grows at least so fast with the way around the joint [1].
-    radius : float
-        Least radius of curvature of a centre line before loading [m].
-    force_min, force_target, force_tolerance : float
-        Least mean force over the window, and a mean force to meet within a share [N, N, 1].
-    """
-
-    stress: float | None = None
-    envelope: tuple[float, float, float, float] | None = None
-    deformed_envelope: tuple[float, float, float, float] | None = None
-    length_ratio: float | None = 1.5
-    slenderness: float | None = 10.0
-    clearance: float | None = None
+    stress: float | None = None  # largest stress at every pose [Pa]: by the margin `MARGIN` below the allowable one
+    envelope: tuple[float, float, float, float] | None = None  # where the centre lines must lie before loading [m]
+    deformed_envelope: tuple[float, float, float, float] | None = None  # the same at every pose
+    length_ratio: float | None = 1.5  # largest length over distance of the ends [1]
+    slenderness: float | None = 10.0  # least length over thickness [1]
+    clearance: float | None = None  # least gap between the surfaces of beams, before and under load [m]
+    # near a joint the gap between centre lines grows at least so fast with the way around the joint [1]
     opening: float = 0.35
-    radius: float | None = None
+    radius: float | None = None  # least radius of curvature of a centre line before loading [m]
+    # force_min, force_target, force_tolerance: least mean force over the window, and a mean force to meet within a
+    # share [N, N, 1]
     force_min: float | None = None
     force_target: float | None = None
     force_tolerance: float = 0.01
@@ -80,69 +61,32 @@ class TaskLimits:
 
 @dataclass(frozen=True)
 class Task:
-    """A network to be shaped.
+    """A network to be shaped."""
 
-    Attributes
-    ----------
-    network : Network
-        As it stands: fixed nodes, sections, supports; the start where its shapes are wanted.
-    driven, direction : str and float
-        The node that is moved, and where to [rad].
-    copies : float
-        Forces of the mechanism are so many times those of the network.
-    window : (float, float)
-        Displacements between which the force is to be constant [m].
-    coordinates : tuple of Coordinate
-        What may vary of the nodes.
-    shaped : tuple of str
-        The beams whose shape may vary.
-    orders : tuple of int
-        Orders of the shape polynomials, from coarse to fine.
-    coefficient_limit : float
-        Largest coefficient [rad].
-    limits : TaskLimits
-        What must hold.
-    objective : str
-        "ripple": flattest over the window; "range": the widest window with `half_band`; "paper": F(a)/F(b) - 1.
-    half_band : float
-        (max - min)/(max + min) that is to hold over the widest window [1].
-    compared : (float, float)
-        a and b of the objective of the paper [m].
-    points : int
-        Poses in the window.
-    fidelity : str
-        The model of the network, as ``analysis.fidelity`` names it.
-    total_stress : bool
-        Whether the axial part counts as stress, too: as in the analysis of the design.
-    safety_factor : float
-        Yield strength over allowable stress [1].
-    layers : int
-        How many of the network stand in series in the mechanism: its displacements are so many times as large.
-    shape : TargetCurve or None
-        Force over the mechanism's displacements that is wanted, as a share of its mean in the window; None: constant.
-    bending_only : Network or None
-        The network with beams that bend only, which a start begins with; None where those of the network do no more.
-    """
-
-    network: Network
+    network: Network  # as it stands: fixed nodes, sections, supports; the start where its shapes are wanted
+    # driven, direction: the node that is moved, and where to [rad]
     driven: str
     direction: float
-    copies: float
-    window: tuple[float, float]
-    coordinates: tuple[Coordinate, ...]
-    shaped: tuple[str, ...]
-    orders: tuple[int, ...] = (0, 1, 2)
-    coefficient_limit: float = 0.5 * np.pi
-    limits: TaskLimits = field(default_factory=TaskLimits)
+    copies: float  # forces of the mechanism are so many times those of the network
+    window: tuple[float, float]  # displacements between which the force is to be constant [m]
+    coordinates: tuple[Coordinate, ...]  # what may vary of the nodes
+    shaped: tuple[str, ...]  # the beams whose shape may vary
+    orders: tuple[int, ...] = (0, 1, 2)  # orders of the shape polynomials, from coarse to fine
+    coefficient_limit: float = 0.5 * np.pi  # largest coefficient [rad]
+    limits: TaskLimits = field(default_factory=TaskLimits)  # what must hold
+    # "ripple": flattest over the window; "range": the widest window with `half_band`; "paper": F(a)/F(b) - 1
     objective: Objective = "range"
-    half_band: float = 0.025
-    compared: tuple[float, float] | None = None
-    points: int = 17
-    fidelity: str = BENDING_ONLY
-    total_stress: bool = False
-    safety_factor: float = 1.0
+    half_band: float = 0.025  # (max - min)/(max + min) that is to hold over the widest window [1]
+    compared: tuple[float, float] | None = None  # a and b of the objective of the paper [m]
+    points: int = 17  # poses in the window
+    fidelity: str = BENDING_ONLY  # the model of the network, as ``analysis.fidelity`` names it
+    total_stress: bool = False  # whether the axial part counts as stress, too: as in the analysis of the design
+    safety_factor: float = 1.0  # yield strength over allowable stress [1]
+    # how many of the network stand in series in the mechanism: its displacements are so many times as large
     layers: int = 1
+    # force over the mechanism's displacements that is wanted, as a share of its mean in the window; None: constant
     shape: TargetCurve | None = None
+    # the network with beams that bend only, which a start begins with; None if those of the network do no more
     bending_only: Network | None = None
 
     @property
@@ -160,7 +104,7 @@ class Task:
 
     @property
     def allowable_stress(self) -> float | None:
-        """The stress that the analysis allows [Pa]; None where it is not limited."""
+        """The stress that the analysis allows [Pa]; None if it is not limited."""
         return None if self.limits.stress is None else self.limits.stress / (1 - MARGIN)
 
     @cached_property

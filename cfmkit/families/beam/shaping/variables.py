@@ -186,7 +186,7 @@ def candidates(variables: Variables, rng: np.random.Generator) -> Iterator[Float
 
 
 def sound(variables: Variables, x: FloatArray) -> bool:
-    """Tell whether the chords of the beams do not cross and are long enough."""
+    """Return True if the chords of the beams do not cross and are long enough."""
     network = variables.build(x)
     chords = {name: _chord(network, name) for name in network.beams}
     least = _least_chord(variables, network)
@@ -206,7 +206,7 @@ _NOTHING = 1e-6  # of the mean distance of joined nodes: shorter beams are none,
 
 
 def has_vanished_beam(network: Network) -> bool:
-    """Tell whether the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
+    """Return True if the nodes of a beam coincide but for rounding, as two that are pushed into one corner do."""
     chords = [abs(end - start) for start, end in (_chord(network, name) for name in network.beams)]
     return min(chords) <= _NOTHING * float(np.mean(chords))
 
@@ -218,7 +218,7 @@ def _chord(network: Network, name: str) -> tuple[complex, complex]:
 
 
 def _cross(a: complex, b: complex, c: complex, d: complex) -> bool:
-    """Tell whether the segments a-b and c-d cross; sharing an end is no crossing."""
+    """Return True if the segments a-b and c-d cross; sharing an end is no crossing."""
     if {a, b} & {c, d}:
         return False
     return _side(a, b, c) * _side(a, b, d) < 0 and _side(c, d, a) * _side(c, d, b) < 0

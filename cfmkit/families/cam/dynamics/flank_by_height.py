@@ -51,25 +51,14 @@ class FlankPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class FlankLine:
-    """A flank at a distance outwards from a roller path, turned by an angle about a point on the axis.
+    """A flank at a distance outwards from a roller path, turned by an angle about a point on the axis."""
 
-    Attributes
-    ----------
-    path : RollerPath
-        The roller path.
-    distance : float
-        From the path to the flank, negative inwards [m].
-    angle, height : float
-        See `cfmkit.families.cam.dynamics.roller_curves_and_motion.Side`.
-    ends : (float, float)
-        First and last path coordinate of the flank [m].
-    """
-
-    path: RollerPath
-    distance: float
+    path: RollerPath  # the roller path
+    distance: float  # from the path to the flank, negative inwards [m]
+    # angle, height: see `cfmkit.families.cam.dynamics.roller_curves_and_motion.Side`
     angle: float
     height: float
-    ends: tuple[float, float]
+    ends: tuple[float, float]  # first and last path coordinate of the flank [m]
 
     @cached_property
     def _turn(self) -> tuple[float, float]:

@@ -262,7 +262,7 @@ class MotionEnding:
 
 
 def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
-    """Return where a motion becomes impossible; None where it never does.
+    """Return where a motion becomes impossible; None if it never does.
 
     Parameters
     ----------

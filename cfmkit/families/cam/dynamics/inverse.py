@@ -79,33 +79,20 @@ class MovingLoads(NamedTuple):
 
 @dataclass(frozen=True)
 class MotionResponse:
-    """Forces and speeds of a motion; rows of (2, n) arrays are right and left, x outwards.
+    """Forces and speeds of a motion; rows of (2, n) arrays are right and left, x outwards."""
 
-    Attributes
-    ----------
-    machine, moment : Machine, Moment
-        What was asked.
-    at : Kinematics
-        How the sides follow the slider.
-    force : (n,) array
-        On the slider, upwards [N].
-    contact, traction : (2, n) array
-        Normal and tangential force of the cam on a roller [N]; traction along the way up.
-    roller_pin, slider_pin : (2, n) complex array
-        Force on a brace at the roller's axis and at the slider [N].
-    on_corner : (n,) array of bool
-        Whether a roller pivots on the corner of its cam.
-    """
-
+    # machine, moment: what was asked
     machine: Machine
     moment: Moment
-    at: Kinematics
-    force: FloatArray
+    at: Kinematics  # how the sides follow the slider
+    force: FloatArray  # (n,): on the slider, upwards [N]
+    # contact, traction, (2, n): normal and tangential force of the cam on a roller [N]; traction along the way up
     contact: FloatArray
     traction: FloatArray
+    # roller_pin, slider_pin, (2, n): force on a brace at the roller's axis and at the slider [N]
     roller_pin: ComplexArray
     slider_pin: ComplexArray
-    on_corner: NDArray[np.bool_]
+    on_corner: NDArray[np.bool_]  # (n,): whether a roller pivots on the corner of its cam
 
     @cached_property
     def spin(self) -> FloatArray:

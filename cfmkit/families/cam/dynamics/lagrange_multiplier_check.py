@@ -64,22 +64,13 @@ class Posture(NamedTuple):
 
 @dataclass(frozen=True)
 class SideChain:
-    """One side: brace, roller, flank.
+    """One side: brace, roller, flank."""
 
-    Attributes
-    ----------
-    hand : float
-        1 on the right, -1 on the left: the left flank is the mirror image of `line`.
-    length, radius : float
-        Of brace and roller [m].
-    line : FlankLine
-        The flank, as on the right.
-    """
-
-    hand: float
+    hand: float  # 1 on the right, -1 on the left: the left flank is the mirror image of `line`
+    # length, radius: of brace and roller [m]
     length: float
     radius: float
-    line: FlankLine
+    line: FlankLine  # the flank, as on the right
 
     @property
     def columns(self) -> slice:
@@ -148,17 +139,10 @@ class SideChain:
 
 @dataclass(frozen=True)
 class Scheme:
-    """How the equations are integrated.
+    """How the equations are integrated."""
 
-    Attributes
-    ----------
-    steps : int
-        Runge-Kutta steps between two points of output.
-    stabilisation : float
-        Baumgarte's beta times the duration of the motion; beta times a step must stay below 2.785.
-    """
-
-    steps: int = 4
+    steps: int = 4  # runge-Kutta steps between two points of output
+    # baumgarte's beta times the duration of the motion; beta times a step must stay below 2.785
     stabilisation: float = 10.0
 
 
@@ -168,29 +152,16 @@ class CornerContact(ValueError):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the integration and the inverse dynamics give at n times.
+    """What the integration and the inverse dynamics give at n times."""
 
-    Attributes
-    ----------
-    times : (n,) array
-        [s].
-    coordinates, velocities, accelerations : (n, 9) array
-        s2, theta3, theta4, xi4, y4, theta5, theta6, xi6, y6 [m, rad, s].
-    multipliers : (n, 9) array
-        Of six holonomic constraints, two rolling constraints and the motion.
-    residual : float
-        Largest violation of a holonomic constraint [m].
-    postures : (Posture, Posture)
-        Right and left, at the same times.
-    """
-
-    times: FloatArray
+    times: FloatArray  # (n,) [s]
+    # coordinates, velocities, accelerations, (n, 9): s2, theta3, theta4, xi4, y4, theta5, theta6, xi6, y6 [m, rad, s]
     coordinates: FloatArray
     velocities: FloatArray
     accelerations: FloatArray
-    multipliers: FloatArray
-    residual: float
-    postures: tuple[Posture, Posture]
+    multipliers: FloatArray  # (n, 9): of six holonomic constraints, two rolling constraints and the motion
+    residual: float  # largest violation of a holonomic constraint [m]
+    postures: tuple[Posture, Posture]  # right and left, at the same times
 
     @property
     def force(self) -> FloatArray:

@@ -52,34 +52,20 @@ class Constants(NamedTuple):
 
 @dataclass(frozen=True)
 class Machine:
-    """Everything that decides the forces of a motion, SI units.
+    """Everything that decides the forces of a motion, SI units."""
 
-    Attributes
-    ----------
-    right, left : Side
-        The left one as its mirror image; they need not be alike.
-    slider_mass : float
-        [kg].
-    stiffness, rest_length : float
-        Of all springs together, between the axes of the rollers [N/m, m]; at that distance they would pull no more.
-    gravity : float
-        Acceleration against the slider's travel up; 0 switches weight off [m/s^2].
-    friction : float
-        Rolling resistance over roller radius.
-    sideways : float
-        Acceleration across the slider's travel, to the right, with which weight acts [m/s^2].
-    tension_stretch : float
-        How much farther apart than `rest_length` the axes are when springs with initial tension begin to open [m].
-    """
-
+    # right, left: the left one as its mirror image; they need not be alike
     right: Side
     left: Side
-    slider_mass: float
+    slider_mass: float  # [kg]
+    # stiffness, rest_length: of all springs together, between the axes of the rollers [N/m, m]; at that distance they
+    # would pull no more
     stiffness: float
     rest_length: float
-    gravity: float
-    friction: float = 0.0
-    sideways: float = 0.0
+    gravity: float  # acceleration against the slider's travel up; 0 switches weight off [m/s^2]
+    friction: float = 0.0  # rolling resistance over roller radius
+    sideways: float = 0.0  # acceleration across the slider's travel, to the right, with which weight acts [m/s^2]
+    # how much farther apart than `rest_length` the axes are when springs with initial tension begin to open [m]
     tension_stretch: float = 0.0
 
     @cached_property
@@ -118,21 +104,11 @@ class Moment(NamedTuple):
 
 @dataclass(frozen=True)
 class Cycloid:
-    """Cycloidal motion: rest to rest without a jump of acceleration [SS, eq. 17].
+    """Cycloidal motion: rest to rest without a jump of acceleration [SS, eq. 17]."""
 
-    Attributes
-    ----------
-    start : float
-        Slider position at the beginning [m].
-    stroke : float
-        Travel, negative for lowering [m].
-    time : float
-        Duration [s].
-    """
-
-    start: float
-    stroke: float
-    time: float
+    start: float  # slider position at the beginning [m]
+    stroke: float  # travel, negative for lowering [m]
+    time: float  # duration [s]
 
     def times(self, points: int) -> FloatArray:
         """Return `points` equal steps from beginning to end [s]."""
@@ -277,24 +253,12 @@ class RisingStretch:
 
 @dataclass(frozen=True)
 class Side:
-    """One side, turned by `angle` about the point at `height` above the start of the roller path.
+    """One side, turned by `angle` about the point at `height` above the start of the roller path."""
 
-    Attributes
-    ----------
-    parts : SideParts
-        Brace and roller.
-    pieces : tuple of CurvePiece
-        The curve of the roller's centre, before it is turned.
-    angle : float
-        Counter-clockwise, as seen on the right side [rad].
-    height : float
-        Of the origin of all positions above the start of the roller path [m].
-    """
-
-    parts: SideParts
-    pieces: tuple[CurvePiece, ...]
-    angle: float = 0.0
-    height: float = 0.0
+    parts: SideParts  # brace and roller
+    pieces: tuple[CurvePiece, ...]  # the curve of the roller's centre, before it is turned
+    angle: float = 0.0  # counter-clockwise, as seen on the right side [rad]
+    height: float = 0.0  # of the origin of all positions above the start of the roller path [m]
 
     @cached_property
     def turn(self) -> complex:

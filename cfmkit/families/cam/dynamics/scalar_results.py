@@ -24,7 +24,7 @@ SLOW = 1.0
 
 
 def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
-    """Return the scalar results by name; None where a value does not exist."""
+    """Return the scalar results by name; None if a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         numbers = _shared(moved) | _own(moved)
     known = {name: value if np.isfinite(value) else None for name, value in numbers.items()}

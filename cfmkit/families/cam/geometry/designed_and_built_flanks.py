@@ -17,18 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DesignFlank:
-    """One flank of a designed cam, over the path coordinate.
+    """One flank of a designed cam, over the path coordinate."""
 
-    Attributes
-    ----------
-    profile : CamProfile
-        The cam as designed.
-    side : float
-        1 for the right flank, -1 for the left.
-    """
-
-    profile: CamProfile
-    side: float
+    profile: CamProfile  # the cam as designed
+    side: float  # 1 for the right flank, -1 for the left
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -55,20 +47,11 @@ class BuiltFlank:
     """A flank as it was measured: the design, moved along its normal by a smooth error.
 
     Mirrored to the right where it is the left one, so that both are treated alike.
-
-    Attributes
-    ----------
-    design : DesignFlank
-        The right flank of the design.
-    error : SmoothedFunction
-        Distance from it over the arc length [m], positive outside.
-    arc : ((m,) array, (m,) array)
-        Path coordinate and arc length of the design, both increasing [m].
     """
 
-    design: DesignFlank
-    error: SmoothedFunction
-    arc: tuple[FloatArray, FloatArray]
+    design: DesignFlank  # the right flank of the design
+    error: SmoothedFunction  # distance from it over the arc length [m], positive outside
+    arc: tuple[FloatArray, FloatArray]  # ((m,), (m,): path coordinate and arc length of the design, both increasing [m]
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -30,21 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CamCorner:
-    """The corner at which an undercut cam begins.
+    """The corner at which an undercut cam begins."""
 
-    Attributes
-    ----------
-    point : (float, float)
-        Where it is [m], right flank.
-    first_contact : float
-        Path coordinate x at which the roller leaves the corner for the flank [m].
-    cusp : float
-        Path coordinate x at which the path's radius of curvature equals the roller's [m].
-    """
-
-    point: tuple[float, float]
-    first_contact: float
-    cusp: float
+    point: tuple[float, float]  # where it is [m], right flank
+    first_contact: float  # path coordinate x at which the roller leaves the corner for the flank [m]
+    cusp: float  # path coordinate x at which the path's radius of curvature equals the roller's [m]
 
 
 @dataclass(frozen=True)

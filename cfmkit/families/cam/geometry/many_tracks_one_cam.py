@@ -68,21 +68,11 @@ class Poses(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ManyTracks:
-    """Tracks on one cam, (d,) each [m].
+    """Tracks on one cam, (d,) each [m]."""
 
-    Attributes
-    ----------
-    profile : CamProfile
-        The cam as cut.
-    radius : (d,) array
-        Of the rollers that run on it, with the material that is left on the flank.
-    brace : (d,) array
-        Of the braces built in.
-    """
-
-    profile: CamProfile
-    radius: FloatArray
-    brace: FloatArray
+    profile: CamProfile  # the cam as cut
+    radius: FloatArray  # (d,): of the rollers that run on it, with the material that is left on the flank
+    brace: FloatArray  # (d,): of the braces built in
 
     def __len__(self) -> int:
         """Return the number of tracks."""

@@ -48,28 +48,15 @@ class NoTrack(ValueError):
 
 @dataclass(frozen=True, repr=False)
 class TrackStates(ShortRepr):
-    """Where the right roller is, for each requested slider position.
+    """Where the right roller is, for each requested slider position."""
 
-    Attributes
-    ----------
-    x, y : (n,) array
-        Roller centre [m].
-    slope : (n,) array
-        dy/dx of the centre's track there.
-    bend : (n,) array
-        d2y/dx2 of the centre's track there [1/m].
-    on_corner : (n,) array of bool
-        Whether the roller pivots on the cam's corner.
-    parameter : (n,) array
-        Path coordinate of the contact on the flank [m]; that of the corner while on it.
-    """
-
+    # x, y, (n,): roller centre [m]
     x: FloatArray
     y: FloatArray
-    slope: FloatArray
-    bend: FloatArray
-    on_corner: NDArray[np.bool_]
-    parameter: FloatArray
+    slope: FloatArray  # (n,): dy/dx of the centre's track there
+    bend: FloatArray  # (n,): d2y/dx2 of the centre's track there [1/m]
+    on_corner: NDArray[np.bool_]  # (n,): whether the roller pivots on the cam's corner
+    parameter: FloatArray  # (n,): path coordinate of the contact on the flank [m]; that of the corner while on it
 
     def fields(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays in the order in which the class takes them."""
@@ -78,45 +65,29 @@ class TrackStates(ShortRepr):
 
 @dataclass(frozen=True)
 class TrackStretch:
-    """A part of the track on which the slider rises.
+    """A part of the track on which the slider rises."""
 
-    Attributes
-    ----------
-    on_corner : bool
-        Whether the roller pivots on the corner.
-    low, high : float
-        Range of the parameter: the angle of the contact normal on the corner [rad], the path
-        coordinate on the flank [m].
-    at : callable
-        ``at(parameter) -> (slider position, x, slope of the centre's track)``.
-    """
-
-    on_corner: bool
+    on_corner: bool  # whether the roller pivots on the corner
+    # low, high: range of the parameter: the angle of the contact normal on the corner [rad], the path coordinate on the
+    # flank [m]
     low: float
     high: float
-    at: Callable[[Any], tuple[Any, Any, Any]]
+    at: Callable[[Any], tuple[Any, Any, Any]]  # ``at(parameter) -> (slider position, x, slope of the centre's track)``
 
 
 KNOTS = 65
 
 
 class Pivot(NamedTuple):
-    """A roller that pivots on a corner, of one cam or of many side by side.
+    """A roller that pivots on a corner, of one cam or of many side by side."""
 
-    Attributes
-    ----------
-    x, y : float or array
-        The corner [m].
-    radius, brace : float or array
-        Between corner and roller centre, and between that and the slider's pin [m].
-    low, high : float or array
-        Angles of the contact normal between which it pivots [rad].
-    """
-
+    # x, y: the corner [m]
     x: Any
     y: Any
+    # radius, brace: between corner and roller centre, and between that and the slider's pin [m]
     radius: Any
     brace: Any
+    # low, high: angles of the contact normal between which it pivots [rad]
     low: Any
     high: Any
 

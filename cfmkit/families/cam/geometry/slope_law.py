@@ -61,29 +61,15 @@ def drop(x: Real, x0: Real | float, brace_length: Real | float) -> Real:
 
 @dataclass(frozen=True)
 class SlopeLaw:
-    """The slope that makes the force constant.
+    """The slope that makes the force constant."""
 
-    Attributes
-    ----------
-    force_constant : float
-        A [m]; the force is 4 K A, K the sum of all parallel springs.
-    rest_half_width : float
-        x0 [m]: the path starts here.
-    brace_length : float
-        l [m].
-    friction : float
-        Rolling friction the profile is cut for, positive for the way up, negative for the way down.
-    slope_factor : float
-        c: 1, larger where the profile carries dead weight, smaller where weight that hangs down helps the springs.
-    preload : float
-        d0 [m]: half the elongation of the springs at the start; 0 for springs that are at rest there.
-    """
-
-    force_constant: float
-    rest_half_width: float
-    brace_length: float
-    friction: float = 0.0
+    force_constant: float  # a [m]; the force is 4 K A, K the sum of all parallel springs
+    rest_half_width: float  # x0 [m]: the path starts here
+    brace_length: float  # l [m]
+    friction: float = 0.0  # rolling friction the profile is cut for, positive for the way up, negative for the way down
+    # c: 1, larger where the profile carries dead weight, smaller where weight that hangs down helps the springs
     slope_factor: float = 1.0
+    # d0 [m]: half the elongation of the springs at the start; 0 for springs that are at rest there
     preload: float = 0.0
 
     @property

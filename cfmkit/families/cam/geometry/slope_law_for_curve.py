@@ -43,14 +43,9 @@ NEWTON_STEPS = 6
 
 @dataclass(frozen=True)
 class CurveSlopeLaw(SlopeLaw):
-    """The slope that makes the force follow a curve.
+    """The slope that makes the force follow a curve."""
 
-    Attributes
-    ----------
-    shape : ThroughPoints
-        phi: the force over travel [m], as a share of that which goes with `force_constant`.
-    """
-
+    # phi: the force over travel [m], as a share of that which goes with `force_constant`
     shape: ThroughPoints = field(kw_only=True)
 
     @property

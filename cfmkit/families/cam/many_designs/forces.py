@@ -88,21 +88,11 @@ class Designs:
 
 
 class Pose(NamedTuple):
-    """How the rollers stand, (designs, points) each.
+    """How the rollers stand, (designs, points) each."""
 
-    Attributes
-    ----------
-    stretch : array
-        Of the springs on one side [m].
-    slope : array
-        Of the roller's path.
-    tangent : array
-        Of the brace's angle from the axis.
-    """
-
-    stretch: FloatArray
-    slope: FloatArray
-    tangent: FloatArray
+    stretch: FloatArray  # of the springs on one side [m]
+    slope: FloatArray  # of the roller's path
+    tangent: FloatArray  # of the brace's angle from the axis
 
 
 class Begin(NamedTuple):
@@ -257,7 +247,7 @@ class Slab:
 
     @cached_property
     def begin(self) -> Begin | None:
-        """Where rollers leave the corner; None where there is none."""
+        """Where rollers leave the corner; None if there is none."""
         if not self.corner_travel.any():
             return None
         rows, corner = np.arange(len(self.designs)), self.corner_travel[:, None]
@@ -340,7 +330,7 @@ class Slab:
 
     @cached_property
     def peaks(self) -> FloatArray | None:
-        """Travels next to which a force has a peak that the samples miss, (designs, k) [m]; None where it has none."""
+        """Travels next to which a force has a peak that the samples miss, (designs, k) [m]; None if it has none."""
         corner = np.minimum(self.corner_travel, self.travel[:, -1])
         return corner[:, None] * ON_CORNER if corner.any() else None
 

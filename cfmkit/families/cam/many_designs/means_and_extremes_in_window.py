@@ -28,22 +28,13 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class SampledBranch:
-    """One branch of many cams, force or stress.
+    """One branch of many cams, force or stress."""
 
-    Attributes
-    ----------
-    travel, values : (d, n) array
-        Samples.
-    exact : callable
-        ``exact(travel, rows)``, the values at any travels of some rows, (r, m) -> (r, m).
-    peaks : (d, k) array, optional
-        Travels next to which an extreme may stand that the samples miss.
-    """
-
+    # travel, values, (d, n): samples
     travel: FloatArray
     values: FloatArray
-    exact: Exact
-    peaks: FloatArray | None = None
+    exact: Exact  # ``exact(travel, rows)``, the values at any travels of some rows, (r, m) -> (r, m)
+    peaks: FloatArray | None = None  # (d, k): travels next to which an extreme may stand that the samples miss
 
     @cached_property
     def heights(self) -> FloatArray:

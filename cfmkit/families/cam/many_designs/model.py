@@ -64,7 +64,7 @@ VARIED = {
 
 
 def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
-    """Return what is requested about many variants of a cam; None where this model does not apply.
+    """Return what is requested about many variants of a cam; None if this model does not apply.
 
     Parameters
     ----------

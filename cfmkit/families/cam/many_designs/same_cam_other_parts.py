@@ -43,30 +43,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """What is built around one cam: (d,) arrays.
+    """What is built around one cam: (d,) arrays."""
 
-    Attributes
-    ----------
-    cam : Assembly
-        The cam, with the parts of the specification.
-    tracks : ManyTracks
-        Of the different pairs of roller and brace, (t,).
-    which : (d,) array of int
-        Which of them each mechanism has.
-    asked : float or None
-        Requested travel [m]; None: as far as the flank goes.
-    roller_weight, slider_weight : (d,) array
-        Weight that hangs on one roller, and on the slider [N].
-    roller_radius, width : (d,) array
-        Of the rollers without the material left on the flank, and of the line contact [m].
-    """
-
-    cam: Assembly
-    tracks: ManyTracks
-    which: Rows
-    asked: float | None
+    cam: Assembly  # the cam, with the parts of the specification
+    tracks: ManyTracks  # of the different pairs of roller and brace, (t,)
+    which: Rows  # (d,): which of them each mechanism has
+    asked: float | None  # requested travel [m]; None: as far as the flank goes
+    # roller_weight, slider_weight, (d,): weight that hangs on one roller, and on the slider [N]
     roller_weight: FloatArray
     slider_weight: FloatArray
+    # roller_radius, width, (d,): of the rollers without the material left on the flank, and of the line contact [m]
     roller_radius: FloatArray
     width: FloatArray
 
@@ -219,7 +205,7 @@ class BuiltSlab(Slab):
         return contact
 
     def _weight(self, rows: Rows) -> FloatArray | None:
-        """Return the weight on each roller, (r, 1) [N]; None where none weighs anything."""
+        """Return the weight on each roller, (r, 1) [N]; None if none weighs anything."""
         weight = self.around.roller_weight[rows, None]
         return weight if weight.any() else None
 

@@ -74,18 +74,10 @@ def shapes(designs: Designs, points: int) -> tuple[list[Shape | None], NDArray[n
 
 
 class CornerSlab(Slab):
-    """Some undercut designs whose shapes exist, at all their samples.
+    """Some undercut designs whose shapes exist, at all their samples."""
 
-    Attributes
-    ----------
-    found : list of Shape
-        Different cams.
-    which : (d,) array of int
-        Which of them each design has.
-    """
-
-    found: list[Shape]
-    which: NDArray[np.intp]
+    found: list[Shape]  # different cams
+    which: NDArray[np.intp]  # (d,): which of them each design has
 
     def with_shapes(self, found: list[Shape], which: NDArray[np.intp]) -> CornerSlab:
         """Return the slab itself, with the shapes of its designs."""

@@ -32,34 +32,17 @@ HELD = 0.02  # a limit that is so near, as a share of itself, holds the design
 
 @dataclass(frozen=True)
 class FinishedStrip:
-    """A finished strip.
+    """A finished strip."""
 
-    Attributes
-    ----------
-    strip : Strip
-        Rounded.
-    shares : tuple of tuples or None
-        Where its stations are, as `mechanism.beam.shares` says it.
-    window : (float, float)
-        Travel over which it keeps its limits [m].
-    ripple, rms : float
-        Largest deviation in it as a share, and root mean square of ten points [N].
-    active : tuple of str
-        What holds it.
-    opinion : SecondOpinion
-        Of corotational elements.
-    overstress : float
-        Largest stress over the allowed one where the stroke is given; 1 where the stress ends it.
-    """
-
-    strip: Strip
-    shares: tuple[tuple[float, ...], ...] | None
-    window: tuple[float, float]
+    strip: Strip  # rounded
+    shares: tuple[tuple[float, ...], ...] | None  # where its stations are, as `mechanism.beam.shares` says it
+    window: tuple[float, float]  # travel over which it keeps its limits [m]
+    # ripple, rms: largest deviation in it as a share, and root mean square of ten points [N]
     ripple: float
     rms: float
-    active: tuple[str, ...]
-    opinion: SecondOpinion
-    overstress: float
+    active: tuple[str, ...]  # what holds it
+    opinion: SecondOpinion  # of corotational elements
+    overstress: float  # largest stress over the allowed one where the stroke is given; 1 where the stress ends it
 
 
 def judge(

@@ -157,28 +157,16 @@ def _made(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> Desig
 
 @dataclass(frozen=True)
 class Reported:
-    """What the analysis of a finished strip says of it: what is reported of a design are these numbers.
+    """What the analysis of a finished strip says of it: what is reported of a design are these numbers."""
 
-    Attributes
-    ----------
-    spec : SliderCrankSpec
-        With the strip.
-    deviation, rms : float or None
-        Over the window: as a share of the force, and in N; None where the analysis ends before it.
-    stress : float or None
-        Largest one in the window [Pa].
-    opinion : (float, float) or None
-        Differences of corotational elements in force and stress, where the analysis computes them.
-    ending : str
-        How the analysis ended.
-    """
-
-    spec: SliderCrankSpec
+    spec: SliderCrankSpec  # with the strip
+    # deviation, rms: over the window: as a share of the force, and in N; None if the analysis ends before it
     deviation: float | None
     rms: float | None
-    stress: float | None
+    stress: float | None  # largest one in the window [Pa]
+    # differences of corotational elements in force and stress, where the analysis computes them
     opinion: tuple[float, float] | None
-    ending: str = ""
+    ending: str = ""  # how the analysis ended
 
     def keeps(self, ripple: float | None, stress: float | None) -> bool:
         """Return whether the analysis has all of the window, and the strip is within its band and stress there."""

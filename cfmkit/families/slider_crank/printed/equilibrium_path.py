@@ -76,24 +76,12 @@ class PressingEnd(Enum):
 
 @dataclass(frozen=True, repr=False)
 class Pressed(ShortRepr):
-    """The equilibria of a pressed chain.
+    """The equilibria of a pressed chain."""
 
-    Attributes
-    ----------
-    path : Path
-        Converged points only.
-    ending : PressingEnd
-        Why it ended, or that it is complete.
-    message : str
-        One sentence with the place.
-    side : int
-        1: the crank pin is to the left of the line from pivot to slider pin; -1: to its right.
-    """
-
-    path: Path
-    ending: PressingEnd
-    message: str
-    side: int = 0
+    path: Path  # converged points only
+    ending: PressingEnd  # why it ended, or that it is complete
+    message: str  # one sentence with the place
+    side: int = 0  # 1: the crank pin is to the left of the line from pivot to slider pin; -1: to its right
 
     @property
     def travel(self) -> FloatArray:
@@ -110,27 +98,13 @@ class Pressed(ShortRepr):
 
 @dataclass(frozen=True, repr=False)
 class Chain(ShortRepr):
-    """A chain ready to be pressed.
+    """A chain ready to be pressed."""
 
-    Attributes
-    ----------
-    points : (k, 2) array
-        What the network is built on, from the clamped end to the slider [m].
-    pins : (3, 2) array
-        Pivot, crank pin and slider pin [m].
-    build : callable
-        From such points to the network.
-    direction : float
-        Of the travel [rad]: pi where the slider moves towards smaller x.
-    knee : callable
-        From a path and a point of it to where the crank pin is [m].
-    """
-
-    points: FloatArray
-    pins: FloatArray
-    build: Callable[[FloatArray], Network]
-    direction: float
-    knee: Callable[[Path, int], FloatArray]
+    points: FloatArray  # (k, 2): what the network is built on, from the clamped end to the slider [m]
+    pins: FloatArray  # (3, 2): pivot, crank pin and slider pin [m]
+    build: Callable[[FloatArray], Network]  # from such points to the network
+    direction: float  # of the travel [rad]: pi where the slider moves towards smaller x
+    knee: Callable[[Path, int], FloatArray]  # from a path and a point of it to where the crank pin is [m]
 
     @property
     def side(self) -> int:

@@ -101,40 +101,20 @@ _SLENDER = 2.0  # length over thickness below which a flexure is none
 
 @dataclass(frozen=True)
 class Sized:
-    """Flexures, and what the beams made of the closed forms.
+    """Flexures, and what the beams made of the closed forms."""
 
-    Attributes
-    ----------
-    flexures : tuple of Flexure
-        From the ground to the slider.
-    force_factor : float
-        Force of the closed forms' flexures over that of the springs.
-    stress_factor : float
-        Their largest stress over that of pure bending.
-    over : float
-        Largest stress at last over the allowable one.
-    """
-
-    flexures: tuple[Flexure, ...]
-    force_factor: float
-    stress_factor: float
-    over: float
+    flexures: tuple[Flexure, ...]  # from the ground to the slider
+    force_factor: float  # force of the closed forms' flexures over that of the springs
+    stress_factor: float  # their largest stress over that of pure bending
+    over: float  # largest stress at last over the allowable one
 
 
 @dataclass(frozen=True)
 class FixedWidth:
-    """Flexures of a width that stays, that of a sheet: thicknesses follow from the force, lengths from the stress.
+    """Flexures of a width that stays, that of a sheet: thicknesses follow from the force, lengths from the stress."""
 
-    Attributes
-    ----------
-    shortest : tuple of float
-        Lengths as stated; they grow where the stress asks for it [m].
-    stays : bool
-        Whether they do not.
-    """
-
-    shortest: tuple[float, ...]
-    stays: bool
+    shortest: tuple[float, ...]  # lengths as stated; they grow where the stress asks for it [m]
+    stays: bool  # whether they do not
 
     def corrected(self, parts: Sequence[Flexure], by_force: float, by_stress: float) -> tuple[Flexure, ...]:
         """Return flexures whose force is smaller by a factor, and whose stress is the allowable one or less.

@@ -29,20 +29,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Flexure:
-    """A flexure with a rectangular section, lying across a joint.
+    """A flexure with a rectangular section, lying across a joint."""
 
-    Attributes
-    ----------
-    length, thickness, width : float
-        Along the link, in the plane of bending, out of it [m].
-    before : float
-        Share of the length that lies before the joint.
-    """
-
+    # length, thickness, width: along the link, in the plane of bending, out of it [m]
     length: float
     thickness: float
     width: float
-    before: float = 0.5
+    before: float = 0.5  # share of the length that lies before the joint
 
     def rate(self, youngs_modulus: float) -> float:
         """Return the rate as a torsion spring [N m/rad] [B, eq. 12].
@@ -89,24 +82,12 @@ class Elasticity:
 
 @dataclass(frozen=True)
 class Strip:
-    """One strip along a polyline, its thickness linear between places.
+    """One strip along a polyline, its thickness linear between places."""
 
-    Attributes
-    ----------
-    corners : (k, 2) array
-        Centre line before any load, from the clamped end to the slider [m].
-    width : float
-        Out of the plane [m].
-    thickness : (n,) array
-        In the plane [m]; complex where derivatives are taken.
-    places : (n,) array
-        Where, as fractions of the length from 0 to 1.
-    """
-
-    corners: FloatArray
-    width: Any
-    thickness: Any
-    places: FloatArray
+    corners: FloatArray  # (k, 2): centre line before any load, from the clamped end to the slider [m]
+    width: Any  # out of the plane [m]
+    thickness: Any  # (n,): in the plane [m]; complex where derivatives are taken
+    places: FloatArray  # (n,): where, as fractions of the length from 0 to 1
 
     def __post_init__(self) -> None:
         """Freeze the corners and places."""

@@ -91,31 +91,17 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
 
 @dataclass(frozen=True)
 class SolvedPiece:
-    """One leg as it is printed.
+    """One leg as it is printed."""
 
-    Attributes
-    ----------
-    contour, holes : Contour, tuple of Contour
-        The outline with its fillets, thicker than drawn where printing adds to it.
-    pads : two (4, 2) arrays
-        At the ground and at the slider: the face where the leg begins comes first [m].
-    sheet : Sheet
-        Widths.
-    thinnest : float
-        Of flexures or strip [m].
-    frame : tuple of (n, 2) arrays
-        What stands around it and does not bend [m].
-    sharp : tuple of str
-        One line per inside corner that no fillet fits, with its place.
-    """
-
+    # contour, holes: the outline with its fillets, thicker than drawn where printing adds to it
     contour: Contour
     holes: tuple[Contour, ...]
+    # at the ground and at the slider: the face where the leg begins comes first [m]
     pads: tuple[FloatArray, FloatArray]
-    sheet: Sheet
-    thinnest: float
-    frame: tuple[FloatArray, ...] = ()
-    sharp: tuple[str, ...] = ()
+    sheet: Sheet  # widths
+    thinnest: float  # of flexures or strip [m]
+    frame: tuple[FloatArray, ...] = ()  # what stands around it and does not bend [m]
+    sharp: tuple[str, ...] = ()  # one line per inside corner that no fillet fits, with its place
 
 
 def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:

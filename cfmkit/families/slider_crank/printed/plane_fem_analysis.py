@@ -57,23 +57,12 @@ ELSEWHERE = "the model of the part as a solid does not compute it"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SolidSolution(ShortRepr):
-    """A part that was solved.
+    """A part that was solved."""
 
-    Attributes
-    ----------
-    spec : SliderCrankSpec
-        With every default written out.
-    solved : AdaptiveSolution
-    travel : (n,) array
-        Of the slider, at the points of the curve [m].
-    chain : Chain
-        The leg as beams.
-    """
-
-    spec: SliderCrankSpec
+    spec: SliderCrankSpec  # with every default written out
     solved: AdaptiveSolution
-    travel: FloatArray
-    chain: Chain
+    travel: FloatArray  # (n,): of the slider, at the points of the curve [m]
+    chain: Chain  # the leg as beams
 
     @cached_property
     def force(self) -> FloatArray:

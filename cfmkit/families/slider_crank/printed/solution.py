@@ -48,20 +48,11 @@ HALVINGS = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ChainCurve(ShortRepr):
-    """Force and stress of a chain at every travel (a `cfmkit.results.ClosedForm`).
+    """Force and stress of a chain at every travel (a `cfmkit.results.ClosedForm`)."""
 
-    Attributes
-    ----------
-    ends : (float, float)
-        Of the curve [m].
-    first : (float, float)
-        Force [N] and stress [Pa] where it begins.
-    laws : (ChebyshevPanels, ChebyshevPanels)
-        Force [N], of all legs, and stress [Pa] over the logarithm of the travel [m].
-    """
-
-    ends: tuple[float, float]
-    first: tuple[float, float]
+    ends: tuple[float, float]  # of the curve [m]
+    first: tuple[float, float]  # force [N] and stress [Pa] where it begins
+    # force [N], of all legs, and stress [Pa] over the logarithm of the travel [m]
     laws: tuple[ChebyshevPanels, ChebyshevPanels]
 
     @cached_property
@@ -120,12 +111,12 @@ def course(
     ends: tuple[float, float],
     first: tuple[float, float],
 ) -> ChainCurve | None:
-    """Return the course between two travels; None where the chain cannot be pressed to every node.
+    """Return the course between two travels; None if the chain cannot be pressed to every node.
 
     Parameters
     ----------
     pressed : callable
-        Force [N] and stress [Pa] at increasing travels [m]; None where one of them is not reached.
+        Force [N] and stress [Pa] at increasing travels [m]; None if one of them is not reached.
     ends : (float, float)
         Of the curve [m].
     first : (float, float)
@@ -164,42 +155,18 @@ class SecondOpinion:
 
 @dataclass(frozen=True, repr=False)
 class Solution(ShortRepr):
-    """A chain with its equilibria; forces of all legs together, stresses of one.
+    """A chain with its equilibria; forces of all legs together, stresses of one."""
 
-    Attributes
-    ----------
-    model : {"lumped", "beam"}
-        Which.
-    chain : Chain
-        What is pressed.
-    pressed : Pressed
-        The outcome.
-    material : Elasticity
-        With the stress allowed.
-    legs : int
-        Equal ones on one slider.
-    window : (float, float)
-        Where metrics are taken [m].
-    checked : bool
-        Whether a second opinion was requested.
-    side : int
-        To which it was to bend, as `Chain.press` takes it.
-    accuracy : float
-        Of the path, relative.
-    mirrored : bool
-        Whether a mirrored pair keeps the guide free of load.
-    """
-
-    model: ChainModel
-    chain: Chain
-    pressed: Pressed
-    material: Elasticity
-    legs: int
-    window: tuple[float, float]
-    checked: bool = False
-    side: int = 0
-    accuracy: float = 1e-7
-    mirrored: bool = False
+    model: ChainModel  # which
+    chain: Chain  # what is pressed
+    pressed: Pressed  # the outcome
+    material: Elasticity  # with the stress allowed
+    legs: int  # equal ones on one slider
+    window: tuple[float, float]  # where metrics are taken [m]
+    checked: bool = False  # whether a second opinion was requested
+    side: int = 0  # to which it was to bend, as `Chain.press` takes it
+    accuracy: float = 1e-7  # of the path, relative
+    mirrored: bool = False  # whether a mirrored pair keeps the guide free of load
 
     @cached_property
     def _at(self) -> Any:
@@ -276,12 +243,12 @@ class Solution(ShortRepr):
 
     @cached_property
     def course(self) -> ChainCurve | None:
-        """Force and stress at every travel; None where the chain cannot be followed to places between its points."""
+        """Force and stress at every travel; None if the chain cannot be followed to places between its points."""
         low, high = float(self.travel[0]), float(self.travel[-1])
         return course(self._at_travels, (low, high), (float(self.force[0]), float(self.stress[0])))
 
     def _at_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Return force [N] and stress [Pa] at other travels than those of the points; None where one is not reached."""
+        """Return force [N] and stress [Pa] at other travels than those of the points; None if one is not reached."""
         found = self.chain.press(travel, self.side, self.accuracy)
         if found.ending not in FOLLOWED or len(found.travel) < len(travel):
             return None
@@ -340,7 +307,7 @@ class Solution(ShortRepr):
 
 
 def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:
-    """Return where values first reach a level from below, linear between points; None where they do not."""
+    """Return where values first reach a level from below, linear between points; None if they do not."""
     above = np.flatnonzero(values >= level)
     if not len(above):
         return None

@@ -136,7 +136,7 @@ class Printed(RoundedCorners, Model):
 
     @property
     def resolved(self) -> tuple[float | None, float | None]:
-        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None where not stated."""
+        """What the process resolves in the plane, and the thinnest wall that it makes [m]; None if not stated."""
         position = thinnest = None
         if self.part is not None and self.part.process is not None:
             stated = self.part.process

@@ -49,43 +49,21 @@ Goal = Literal["stroke", "ripple", "rms"]
 
 @dataclass(frozen=True)
 class StripTask:
-    """What the strip is to do.
+    """What the strip is to do."""
 
-    Attributes
-    ----------
-    corners : (k, 2) array
-        Its centre line [m].
-    direction : float
-        Of the slider's travel [rad].
-    material : Elasticity
-        With the stress allowed, if there is a limit.
-    force : float
-        Wanted of one set [N].
-    start, stroke : float
-        Ends of the travel over which it is wanted [m]; the stroke is the first guess where it is maximised.
-    ripple : float
-        Largest deviation allowed, as a share of the force; of no use where it is minimised.
-    goal : {"stroke", "ripple", "rms"}
-        Longest stroke within the ripple; smallest ripple, or smallest root mean square, over the stroke.
-    longest : float
-        Stroke never exceeded [m].
-    shape : TargetCurve or None
-        Force over travel that is wanted, as a share of `force`; None: it is constant.
-    sets : int
-        Equal strips that share what the design asks for.
-    """
-
-    corners: FloatArray
-    direction: float
-    material: Elasticity
-    force: float
+    corners: FloatArray  # (k, 2): its centre line [m]
+    direction: float  # of the slider's travel [rad]
+    material: Elasticity  # with the stress allowed, if there is a limit
+    force: float  # wanted of one set [N]
+    # start, stroke: ends of the travel over which it is wanted [m]; the stroke is the first guess where it is maximised
     start: float
     stroke: float
-    ripple: float
+    ripple: float  # largest deviation allowed, as a share of the force; of no use where it is minimised
+    # longest stroke within the ripple; smallest ripple, or smallest root mean square, over the stroke
     goal: Goal = "stroke"
-    longest: float = 0.08
-    shape: TargetCurve | None = None
-    sets: int = 1
+    longest: float = 0.08  # stroke never exceeded [m]
+    shape: TargetCurve | None = None  # force over travel that is wanted, as a share of `force`; None: it is constant
+    sets: int = 1  # equal strips that share what the design asks for
 
     def asked(self, force: float) -> float:
         """Return what a design is to ask for where one set has a force [N]."""
@@ -98,24 +76,14 @@ class StripTask:
 
 @dataclass(frozen=True)
 class Form:
-    """How a strip is described by numbers: thicknesses, then shares that place them, then the width.
+    """How a strip is described by numbers: thicknesses, then shares that place them, then the width."""
 
-    Attributes
-    ----------
-    count : int
-        Thicknesses; 1: the same everywhere.
-    per_piece : tuple of int
-        How many stations each straight piece has where their shares vary; empty: evenly spaced, fixed.
-    shares : tuple of tuples
-        Shares at which stations are fixed, by piece; empty with `per_piece` empty: evenly spaced.
-    width : float or None
-        Fixed width [m]; None: it varies too.
-    """
-
-    count: int
+    count: int  # thicknesses; 1: the same everywhere
+    # how many stations each straight piece has where their shares vary; empty: evenly spaced, fixed
     per_piece: tuple[int, ...] = ()
+    # shares at which stations are fixed, by piece; empty with `per_piece` empty: evenly spaced
     shares: tuple[tuple[float, ...], ...] = ()
-    width: float | None = None
+    width: float | None = None  # fixed width [m]; None: it varies too
 
     @property
     def placed(self) -> int:
@@ -167,21 +135,11 @@ _NUDGE = 1e-5  # of a share, or of the width as a share of itself, for central d
 
 @dataclass(frozen=True)
 class State:
-    """A strip pressed to the points of a task.
+    """A strip pressed to the points of a task."""
 
-    Attributes
-    ----------
-    path : Path
-        Its equilibria.
-    force : (p,) array
-        [N].
-    watched : Watched
-        Where the stress is looked at.
-    """
-
-    path: Path
-    force: FloatArray
-    watched: Watched
+    path: Path  # its equilibria
+    force: FloatArray  # (p,) [N]
+    watched: Watched  # where the stress is looked at
 
     @cached_property
     def stress(self) -> FloatArray:
@@ -239,7 +197,7 @@ class StripProgram(DesignProgram):
         return self.form.strip(x, self.task.corners).network(self.task.material)
 
     def state(self, z: FloatArray) -> State | None:
-        """Return the pressed strip; None where it has no stable equilibrium at all points."""
+        """Return the pressed strip; None if it has no stable equilibrium at all points."""
         if self._last is not None and np.array_equal(self._last[0], z):
             return self._last[1]
         if not self.form.ordered(z, self.task.corners):
@@ -309,7 +267,7 @@ class StripProgram(DesignProgram):
         return [LimitRows("stress", 10.0 * (1.0 - state.stress / limit), None if by is None else -10.0 * by / limit)]
 
     def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
-        """Return the derivatives of force (p, n) and stress (r, n) by all variables; None where one has none."""
+        """Return the derivatives of force (p, n) and stress (r, n) by all variables; None if one has none."""
         found = self._by_form(z, state)
         if found is None or not self.extra:
             return found
@@ -318,7 +276,7 @@ class StripProgram(DesignProgram):
         return np.column_stack([force, last[0]]), np.column_stack([stress, last[1]])
 
     def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray] | None:
-        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables; None where one has none."""
+        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables; None if one has none."""
         form, path, x = self.form, state.path, z[: self.form.size]
 
         def build(values: Any) -> Network:
@@ -343,7 +301,7 @@ class StripProgram(DesignProgram):
         return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
 
     def _by_difference(self, z: FloatArray, k: int, nudge: float, state: State) -> tuple[FloatArray, FloatArray] | None:
-        """Return the derivatives by one variable by a difference of neighbouring equilibria; None where there is none.
+        """Return the derivatives by one variable by a difference of neighbouring equilibria; None if there is none.
 
         It is central, but where only one neighbour has equilibria. Beside a strip with a station at the end of one of
         its segments others are cut into more segments, and are compared with each other.
@@ -388,7 +346,7 @@ class StripProgram(DesignProgram):
 
 
 def _traced(network: Network, drive: Displacement) -> Path | None:
-    """Return the equilibria that are reached from rest; None where one is not, or is not stable."""
+    """Return the equilibria that are reached from rest; None if one is not, or is not stable."""
     path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
     good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
     return path if good else None
@@ -409,19 +367,13 @@ _NEWTON = 8
 
 @dataclass(frozen=True)
 class Watched:
-    """From bending and axial stress at the samples of the last points to the stress looked at.
+    """From bending and axial stress at the samples of the last points to the stress looked at."""
 
-    Attributes
-    ----------
-    bending, axial : (4, r, rows) arrays
-        To the tops of r pieces, with the signs: both add up on the side where they have the same.
-    between : (13, 4) array
-        Interpolation between the points.
-    """
-
+    # bending, axial, (4, r, rows): to the tops of r pieces, with the signs: both add up on the side where they have the
+    # same
     bending: FloatArray
     axial: FloatArray
-    between: FloatArray
+    between: FloatArray  # (13, 4): interpolation between the points
 
     def stress(self, bending: FloatArray, axial: FloatArray) -> FloatArray:
         """Return the stress (13 r, ...) of stresses (4, rows, ...) at the samples [Pa], or derivatives of theirs."""

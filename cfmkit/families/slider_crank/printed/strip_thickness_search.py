@@ -96,29 +96,17 @@ class Ranges:
 
 @dataclass(frozen=True)
 class FoundStrip:
-    """A strip that was found.
+    """A strip that was found."""
 
-    Attributes
-    ----------
-    task, form, ranges : StripTask, Form, Ranges
-        What was asked.
-    program : StripProgram
-        Of the last search.
-    descent : Optimum
-        Its outcome.
-    uniform : Optimum or None
-        That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
-    lost : tuple of str
-        Why processes died that searched from other starts.
-    """
-
+    # task, form, ranges: what was asked
     task: StripTask
     form: Form
     ranges: Ranges
-    program: StripProgram
-    descent: Optimum
+    program: StripProgram  # of the last search
+    descent: Optimum  # its outcome
+    # that of one thickness, within `LOOSE` at least, for comparison; None if it has no equilibrium
     uniform: Optimum | None
-    lost: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()  # why processes died that searched from other starts
 
     @property
     def values(self) -> FloatArray:
@@ -148,7 +136,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
     """Return thickness and width [m] of the strip that has the allowable stress within the travel, and the force.
 
     The stress does not depend on the width and the force is proportional to it, nearly so in wide strips: first the
-    thickness from the stress, then the width from the force. None where there is no stress limit or no equilibrium.
+    thickness from the stress, then the width from the force. None if there is no stress limit or no equilibrium.
     """
     limit, width = task.material.allowable_stress, 5e-3
     if limit is None:
@@ -171,7 +159,7 @@ def uniform_for_stroke(task: StripTask) -> tuple[float, float] | None:
 def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | None:
     """Return thickness [m] and largest stress [Pa] of the strip of a width [m] that has the force.
 
-    The force goes nearly with the cube of the thickness. None where there is no equilibrium.
+    The force goes nearly with the cube of the thickness. None if there is no equilibrium.
     """
     worst = 0.0
 
@@ -188,7 +176,7 @@ def uniform_for_width(task: StripTask, width: float) -> tuple[float, float] | No
 
 
 def _settled(step: Callable[[float], float | None], guess: float) -> float | None:
-    """Return the thickness [m] that steps from a guess lead to, each by a factor; None where there is no factor."""
+    """Return the thickness [m] that steps from a guess lead to, each by a factor; None if there is no factor."""
     thickness = guess
     for _ in range(_ROUNDS):
         factor = step(thickness)

@@ -195,7 +195,7 @@ def _highest(function: Callable[[FloatArray], FloatArray], low: Any, high: Any) 
 
 
 def small_angle_number(assembly: Assembly) -> float | None:
-    """Return p of the law for small angles; None where the springs are relaxed stretched, or there is no torsion."""
+    """Return p of the law for small angles; None if the springs are relaxed stretched, or there is no torsion."""
     link = assembly.linkage
     lead = remainder(link.stretched_angle - assembly.unloaded, tau)
     ratio = link.crank / link.coupler

@@ -75,24 +75,12 @@ def best_sets(goal: RateGoal, offered: Sequence[FloatArray], count: int = 1) -> 
 
 @dataclass(frozen=True)
 class SpringOption:
-    """A spring for a joint, in a number.
+    """A spring for a joint, in a number."""
 
-    Attributes
-    ----------
-    joint : int
-        Which, an index of `JOINTS`.
-    offer : Offer
-        The spring.
-    count : int
-        How many in parallel, in one leg.
-    deflection : float
-        Largest one over the travel [rad or m].
-    """
-
-    joint: int
-    offer: Offer
-    count: int
-    deflection: float = 0.0
+    joint: int  # which, an index of `JOINTS`
+    offer: Offer  # the spring
+    count: int  # how many in parallel, in one leg
+    deflection: float = 0.0  # largest one over the travel [rad or m]
 
     @property
     def written(self) -> Bought:
@@ -227,7 +215,7 @@ def _options(task: SpringTask, window: tuple[float, float]) -> tuple[list[Spring
 
 
 def _why_not(offer: Offer, ends: tuple[float, float], wanted: CrankDesign) -> tuple[float, str] | None:
-    """Return by what share a spring misses, and why; None where it can be used.
+    """Return by what share a spring misses, and why; None if it can be used.
 
     `ends`: how far its joint is moved from the unloaded position at least and at most, over the travel [rad or m].
     """

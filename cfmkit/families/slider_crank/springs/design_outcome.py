@@ -26,37 +26,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solved:
-    """A design that was found.
+    """A design that was found."""
 
-    Attributes
-    ----------
-    task : SpringTask
-        With the lengths chosen.
-    window : tuple of (float, float)
-        Where the target is kept [rad or m].
-    rates : (4,) array
-        Of the springs of one leg [N m/rad; the last N/m].
-    deviation, rms : float
-        Largest and root mean square deviation, as fractions of the target.
-    proven : bool
-        Of a widest window: whether all others were ruled out.
-    places : int
-        At so many of the window the deviations were looked at.
-    exact : bool
-        Whether deviation and rms are those that the analysis of the design measures.
-    bought : tuple of SpringOption
-        Springs of a catalogue; none where any rate may be had.
-    """
-
-    task: SpringTask
-    window: tuple[float, float]
-    rates: FloatArray
+    task: SpringTask  # with the lengths chosen
+    window: tuple[float, float]  # where the target is kept [rad or m]
+    rates: FloatArray  # (4,): of the springs of one leg [N m/rad; the last N/m]
+    # deviation, rms: largest and root mean square deviation, as fractions of the target
     deviation: float
     rms: float
-    proven: bool = True
-    places: int = 0
-    exact: bool = False
-    bought: tuple[SpringOption, ...] = ()
+    proven: bool = True  # of a widest window: whether all others were ruled out
+    places: int = 0  # at so many of the window the deviations were looked at
+    exact: bool = False  # whether deviation and rms are those that the analysis of the design measures
+    bought: tuple[SpringOption, ...] = ()  # springs of a catalogue; none where any rate may be had
 
     @property
     def judged(self) -> tuple[float, float]:

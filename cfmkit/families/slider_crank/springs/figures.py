@@ -45,21 +45,13 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class KeyPosition:
-    """The linkage at one place of its motion.
+    """The linkage at one place of its motion."""
 
-    Attributes
-    ----------
-    name : str
-        What is special about it.
-    motion, angle : float
-        The place [rad or m], and the crank's angle there [rad].
-    crank_pin, slider_pin : (float, float)
-        B and C [m].
-    """
-
-    name: str
+    name: str  # what is special about it
+    # motion, angle: the place [rad or m], and the crank's angle there [rad]
     motion: float
     angle: float
+    # crank_pin, slider_pin: B and C [m]
     crank_pin: Point
     slider_pin: Point
 
@@ -85,21 +77,11 @@ class KeyPosition:
 
 @dataclass(frozen=True)
 class PanelView:
-    """What all panels have in common.
+    """What all panels have in common."""
 
-    Attributes
-    ----------
-    box : (float, float, float, float)
-        Left, bottom, right, top [m].
-    size : float
-        Of symbols [m].
-    wall : float
-        Where the slider's spring is fixed: its x [m].
-    """
-
-    box: tuple[float, float, float, float]
-    size: float
-    wall: float
+    box: tuple[float, float, float, float]  # left, bottom, right, top [m]
+    size: float  # of symbols [m]
+    wall: float  # where the slider's spring is fixed: its x [m]
 
 
 def key(solution: Solution, name: str, motion: float) -> KeyPosition:

@@ -20,30 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RateGoal:
-    """What the springs are to add up to, in units of the target.
+    """What the springs are to add up to, in units of the target."""
 
-    Attributes
-    ----------
-    matrix : (n, m) array
-        What a rate of 1 gives at each of n places, over the target.
-    wanted : (n,) array
-        1 for a constant; something sloping for a stiffness.
-    upper : (m,) array
-        Largest rates, perhaps infinite; zero for a spring that may not be used.
-    held : tuple of (m,) array and float, or None
-        A row and what it must give exactly.
-    lower : (m,) array or None
-        Smallest rates; None: zero.
-    least : tuple of (m,) array and float, or None
-        A row and what it must give at least.
-    """
-
-    matrix: FloatArray
-    wanted: FloatArray
-    upper: FloatArray
-    held: tuple[FloatArray, float] | None = None
-    lower: FloatArray | None = None
-    least: tuple[FloatArray, float] | None = None
+    matrix: FloatArray  # (n, m): what a rate of 1 gives at each of n places, over the target
+    wanted: FloatArray  # (n,): 1 for a constant; something sloping for a stiffness
+    upper: FloatArray  # (m,): largest rates, perhaps infinite; zero for a spring that may not be used
+    held: tuple[FloatArray, float] | None = None  # a row and what it must give exactly
+    lower: FloatArray | None = None  # (m,): smallest rates; None: zero
+    least: tuple[FloatArray, float] | None = None  # a row and what it must give at least
 
     @property
     def bounds(self) -> list[tuple[float, float | None]]:

@@ -135,7 +135,7 @@ def link_loads(assembly: Assembly, motion: FloatArray, legs: Any) -> LinkLoads:
 
 
 def link_of(spec: SliderCrankSpec) -> LinkBar | None:
-    """Return the links of a mechanism; None where their material or their thickness is not stated."""
+    """Return the links of a mechanism; None if their material or their thickness is not stated."""
     part, material = spec.mechanism.part, spec.mechanism.material
     if material is None or part is None or part.sheet is None:
         return None

@@ -37,20 +37,11 @@ DENSE = 1001
 
 @dataclass(frozen=True)
 class SpringTask:
-    """A design that is wanted of a mechanism with certain lengths.
+    """A design that is wanted of a mechanism with certain lengths."""
 
-    Attributes
-    ----------
-    spec : SliderCrankSpec
-        With the lengths; its springs do not matter.
-    assembly : Assembly
-        The same put together; its rates do not matter.
-    rates : (4,) array or None
-        Springs of one leg whose friction is compensated, from the round before; None: none is.
-    """
-
-    spec: SliderCrankSpec
-    assembly: Assembly
+    spec: SliderCrankSpec  # with the lengths; its springs do not matter
+    assembly: Assembly  # the same put together; its rates do not matter
+    # (4,): springs of one leg whose friction is compensated, from the round before; None: none is
     rates: FloatArray | None = None
 
     @property
@@ -126,7 +117,7 @@ class SpringTask:
         return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
 
     def goal(self, window: tuple[float, float], count: int | None = None) -> RateGoal | None:
-        """Return the goal over a window; None where the linkage does not get there with finite efforts."""
+        """Return the goal over a window; None if the linkage does not get there with finite efforts."""
         places = self.places(window, count)
         effort = self.assembly.units(places).effort
         if not np.isfinite(effort).all():

@@ -57,22 +57,13 @@ KEPT = 1.0 - 2e-5
 
 @dataclass(frozen=True)
 class FittedWindow:
-    """A window, its springs and how far they are off.
+    """A window, its springs and how far they are off."""
 
-    Attributes
-    ----------
-    low, high : float
-        Ends [rad or m].
-    rates : (4,) array
-        Of the springs of one leg.
-    deviation : float
-        Largest one, as a fraction of the target.
-    """
-
+    # low, high: ends [rad or m]
     low: float
     high: float
-    rates: FloatArray
-    deviation: float
+    rates: FloatArray  # (4,): of the springs of one leg
+    deviation: float  # largest one, as a fraction of the target
 
     @property
     def width(self) -> float:
@@ -237,7 +228,7 @@ def _best_place(task: SpringTask, width: float, middle: float, look: float) -> F
 
 
 def judged(task: SpringTask, low: float, high: float) -> FittedWindow | None:
-    """Return the best springs for a window, judged on many places; None where there are none."""
+    """Return the best springs for a window, judged on many places; None if there are none."""
     return _solved(task, low, high, DENSE)
 
 

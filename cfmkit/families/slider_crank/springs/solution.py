@@ -60,7 +60,7 @@ NO_LEVEL = 1e-9
 
 
 def target_of(spec: SliderCrankSpec) -> float | None:
-    """Return what the effort is to be [N m or N]; None where the design says nothing about this drive."""
+    """Return what the effort is to be [N m or N]; None if the design says nothing about this drive."""
     if spec.design is None:
         return None
     return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
@@ -234,7 +234,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
-        """The motion with friction, forth and back; None where nothing rubs."""
+        """The motion with friction, forth and back; None if nothing rubs."""
         if not self.assemblies[0].rubbing.there:
             return None
         return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
